@@ -48,7 +48,7 @@ fn main() {
     }
 }
 
-/// Results of all items in the order of the items, computed on all cores.
+/// Results of the work for all items, in the order of the items, computed on all cores.
 fn all<T: Sync, R: Send>(of: &[T], run: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let work = || {

@@ -13,7 +13,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_tests::interventions::{Judged, Matrix, UpperBound, intervene, kinds, remedies};
 
-/// Ratio of the hole to the target after removal of each single cause: median and largest over a stretch.
+/// Ratio of the hole's diameter to the target after one injected cause is removed, for each cause: median and maximum
+/// over the stretch.
 fn over_target(sections: &[Judged], target_m: f64) -> String {
     let of_cause = |k: usize| {
         let mut over: Vec<f64> =

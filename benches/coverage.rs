@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use headrace_coverage::hole::FARTHEST_M;
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
 use headrace_geometry::math;
-use headrace_geometry::tunnel::shapes;
+use headrace_geometry::tunnel::{WallPoint, shapes};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
@@ -56,7 +56,7 @@ fn main() {
     memory();
 }
 
-/// Samples of ideal heads in time order; all heads are at the circle's centre.
+/// Samples of ideal heads in time order; all heads are at the centre of a circular tunnel.
 fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -88,7 +88,8 @@ fn store(length_m: f64, capacity: u32) -> SampleStore {
 fn covered(samples: &[WallSample]) -> SampleStore {
     let mut store = store(LENGTH_M, u32::try_from(samples.len()).unwrap());
     for sample in samples {
-        black_box(store.nearest_pass_m(sample.x_m, sample.arc_m, FARTHEST_M));
+        let at = WallPoint { x_m: sample.x_m, arc_m: sample.arc_m };
+        black_box(store.nearest_pass_m(at, FARTHEST_M));
         store.insert(*sample).unwrap();
     }
     store
@@ -128,7 +129,8 @@ fn covering(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// Finds the holes of all sections with each method. Times are divided by the number of samples in those sections.
+/// Finds the holes of all sections with each method. The printed times are divided by the number of samples in these
+/// sections.
 fn holes(what: &str, samples: &[WallSample]) {
     let store = covered(samples);
     let sections = || (0..SECTIONS).map(|k| 7.0 + SECTION_M * k as f64);
@@ -143,12 +145,12 @@ fn holes(what: &str, samples: &[WallSample]) {
     let (to_a_centimetre, _) =
         best(|| sections().map(|x| tolerant.largest(&store, x, x + SECTION_M).most_m).sum::<f64>());
     row(&what, per_sample(ours), "ours, to 1 cm", per_sample(to_a_centimetre));
-    // Search radius of the other methods.
+    // Search radius of the methods other than headrace's, m.
     let reach_m = exact.iter().copied().fold(0.0, f64::max) / 2.0 + 0.05;
     let around = |x: f64| {
         let window = (x - reach_m)..(x + SECTION_M + reach_m);
         let near = samples.iter().filter(move |s| window.contains(&s.x_m));
-        // Samples near the seam get an image on its other side.
+        // Samples near the seam of the unrolled wall get an image on the seam's other side.
         near.flat_map(move |s| [-perimeter_m(), 0.0, perimeter_m()].map(|turn| [s.x_m, s.arc_m + turn]))
             .filter(move |s| s[1] > -reach_m - 0.1 && s[1] < perimeter_m() + reach_m + 0.1)
             .collect::<Vec<_>>()
@@ -208,7 +210,7 @@ fn by_triangulation(from_m: f64, near: &[[f64; 2]]) -> f64 {
     2.0 * math::sqrt(largest2)
 }
 
-/// Grid points of a section.
+/// Grid points of a section: chainage and arc length, m.
 fn places(from_m: f64) -> impl Iterator<Item = [f64; 2]> {
     let columns = math::floor_to_i64(perimeter_m() / GRID_M);
     let rows = math::round_to_i64(SECTION_M / GRID_M);
@@ -233,7 +235,7 @@ fn by_hash_map(from_m: f64, near: &[[f64; 2]]) -> f64 {
         let [row, column] = cell_of(&place);
         let mut best2 = f64::INFINITY;
         for ring in 0_i64.. {
-            // All cells of this ring are at least `ring` - 1 cell widths away.
+            // All cells of ring number `ring` are at least `ring` - 1 cell widths away from the query point.
             let inner_m = (ring - 1) as f64 * CELL_M;
             if ring > 0 && inner_m > 0.0 && inner_m * inner_m > best2 {
                 break;

@@ -123,7 +123,7 @@ fn row(dive: &str, what: &str, times: &[Duration]) {
 }
 
 fn scene(seconds: u64) -> Scene {
-    // The path is slightly longer than the dive needs.
+    // The vehicle's path is slightly longer than the dive needs.
     let distance_m = (seconds + 10) as f64 * SPEED_MPS;
     scenes::scene(&format!(
         "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = {SPEED_MPS}\n[trajectory]\n\
@@ -131,14 +131,14 @@ fn scene(seconds: u64) -> Scene {
     ))
 }
 
-/// A message of the simulation, to be fed to the loop.
+/// A message of a simulated device, to be fed to the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
     bytes: Vec<u8>,
 }
 
-/// Messages for the loop in the first seconds of a scene.
+/// Messages that the simulated devices send in the first seconds of a scene.
 fn messages_of(scene: &Scene, seconds: u64) -> Vec<Kept> {
     let mut simulation = Simulation::new(scene).unwrap();
     let until = tick_end(seconds * TICKS_PER_S);
@@ -163,14 +163,14 @@ fn tick_end(number: u64) -> MonoNs {
 struct Measured {
     /// Durations of the ticks, including the time to fill the rings.
     ticks: Vec<Duration>,
-    /// Durations of the collector's work after each tick.
+    /// Durations of the work that the page's collector does after each tick.
     collecting: Vec<Duration>,
-    /// Times from the due time of a tick to the end of both the tick and the collector's work.
+    /// Times from a tick's due time to the end of both the tick and the collector's work after it.
     ends: Vec<Duration>,
     samples: u64,
     digest: u64,
     notices_dropped: u64,
-    /// Counters of the page, as text.
+    /// Counters of the page's server (`/metrics`), as text.
     page: String,
 }
 
@@ -256,7 +256,7 @@ fn run(dive: &mut Loop, messages: &[Kept], seconds: u64, mut beside: impl FnMut(
     Measured { ticks, collecting, ends, samples: 0, digest: 0, notices_dropped: 0, page: String::new() }
 }
 
-/// The page's follower, as in the program.
+/// The part of the program that follows the loop and passes its results to the page.
 struct Follower {
     collector: Collector,
     teller: LiveMessages,
@@ -288,7 +288,7 @@ impl Follower {
     }
 }
 
-/// Work of the program after each tick. Without a page, this work only takes the notices.
+/// Work that the program does after each tick. Without a page, it only empties the queue of notices.
 fn follow(mut follower: Option<&mut Follower>, notices: &NoticeReceiver, dive: &Loop) {
     while let Some(notice) = notices.next() {
         if let Some(follower) = &mut follower {
@@ -329,9 +329,8 @@ fn site(scene: &Scene) -> Site {
         mode: Mode::Live,
         dive: "bench".to_owned(),
         vehicle: vehicle.name.clone(),
-        target_m: vehicle.target_m,
+        target: vehicle.target,
         section_m: vehicle.section_m,
-        confidence_sd: vehicle.coverage.confidence_sd,
         length_m: vehicle.tunnel.length_m,
         profile: vehicle.tunnel.profile.clone(),
         heads,
@@ -345,7 +344,7 @@ fn site(scene: &Scene) -> Site {
     }
 }
 
-/// Counters of the page after the last tick.
+/// Counters of the page's server (`/metrics`) after the last tick.
 fn counts(page: &Page) -> String {
     let (status, text) = ask(&page.address().to_string(), "GET", "/metrics", &[], "");
     assert_eq!(status, 200, "{text}");
@@ -369,12 +368,12 @@ fn counts(page: &Page) -> String {
     )
 }
 
-/// Ten viewers.
+/// The ten viewers of a dive; one of them never reads, and one floods.
 struct Viewers {
     /// Number of samples that each viewer received, and whether it received the end.
     reading: Vec<JoinHandle<(u64, bool)>>,
     _never_reads: Viewer,
-    /// Number of messages sent.
+    /// Number of messages that the flooding viewer sent.
     flooding: JoinHandle<u64>,
 }
 
@@ -400,7 +399,7 @@ impl Viewers {
         Self { reading, _never_reads: never_reads, flooding }
     }
 
-    /// Waits for the viewers' threads to end; the page must have ended before.
+    /// Waits for the viewers' threads to end; the page's server must have ended before.
     fn end(self) -> String {
         let seen: Vec<_> = self.reading.into_iter().map(|viewer| viewer.join().unwrap()).collect();
         let ended = seen.iter().filter(|(_, has_ended)| *has_ended).count();
@@ -412,7 +411,8 @@ impl Viewers {
     }
 }
 
-/// Sends as fast as possible and reconnects after each disconnection. Returns the number of messages sent.
+/// Floods the page: sends messages as fast as possible and reconnects after each disconnection. Returns the number of
+/// messages sent.
 fn flood(address: &str, is_over: &AtomicBool) -> u64 {
     let mut sent = 0;
     let message = Message::Text(json!({"do": "mark", "by": "flood"}).to_string().into());

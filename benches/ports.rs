@@ -34,7 +34,7 @@ const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const WARMING: DurNs = DurNs::from_millis(10_000);
 /// Default duration of each part, s.
 const MEASURED_S: u64 = 60;
-/// Longest time for which the devices wait for a host's bytes, ns.
+/// Longest time for which an emulated device waits for bytes from the host, ns.
 const WAIT_NS: u32 = 1_000_000;
 
 const WAY: &str = "[trajectory]\n[[trajectory.legs]]\ndistance_m = 60\nspeed_mps = 0.1\n";
@@ -106,7 +106,7 @@ fn answer(program: &str, arguments: &[&str]) -> String {
     said.ok().filter(|said| !said.is_empty()).unwrap_or_else(|| format!("unknown ({program} doesn't say)"))
 }
 
-/// Messages on their way to the loop with their send times, and the measured delays.
+/// Messages on their way from a device to the loop with their send times, and the delays measured so far.
 #[derive(Clone, Default)]
 struct Course {
     sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
@@ -140,7 +140,7 @@ impl Finish {
         self.waiting.extend(std::iter::from_fn(|| self.course.sent.pop()));
     }
 
-    /// Length of the next message.
+    /// Length of the next message that hasn't been received yet, bytes.
     fn next_len(&mut self) -> Option<usize> {
         self.look();
         self.waiting.front().map(|(_, message)| message.len())
@@ -219,7 +219,7 @@ impl Driver for Timed {
     }
 }
 
-/// Reference: reads data as it arrives and records the delay.
+/// The bare read loop, which is the reference: reads data as it arrives and records the delay.
 fn bare(connect: &Connect, finish: Finish) {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => {
@@ -261,7 +261,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     loop {
         let count = read(&mut buffer);
         let at = now();
-        // An end of file: the device's end is closed at the end of the measurement.
+        // A count of zero means end of file: the device's end is closed at the end of the measurement.
         if count == 0 {
             return;
         }
@@ -277,7 +277,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     }
 }
 
-/// Starts a thread that is woken like the program's loop, but does no work.
+/// Starts a thread that is woken like the program's loop. It only records the delays of messages.
 fn empty_loop(course: &Course) -> thread::Thread {
     let course = course.clone();
     let empty = named("empty", move || {
@@ -347,9 +347,9 @@ impl Ends {
     }
 }
 
-/// Results of a part.
+/// Results of one part of the bench.
 struct Measured {
-    /// Delays of the driver and of the reference, for each sensor.
+    /// Delays of messages through the driver and through the bare read loop, for each sensor.
     delays: Vec<[Vec<DurNs>; 2]>,
     /// Delays of the driver to the end of the tick, and of the reference to the end of a pass of the empty loop.
     ends: Vec<[Vec<DurNs>; 2]>,

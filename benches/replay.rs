@@ -35,7 +35,7 @@ fn main() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// Prints the replay times of a log beside its bare read time.
+/// Prints the replay times of a log beside the time to read the log with `mcap` alone.
 fn compare(log: &Path, name: &str, folder: &Path) {
     let report_file = folder.join("report.json");
     let (messages, _, first) = bare_read(log);

@@ -22,7 +22,7 @@ use headrace_coverage::{
 use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_geometry::tunnel::shapes;
+use headrace_geometry::tunnel::{WallPoint, shapes};
 use headrace_monitor::merge::MAX_TICK_BYTES;
 use headrace_monitor::outlet::Outlet;
 use headrace_monitor::part::Part;
@@ -31,6 +31,7 @@ use headrace_monitor::run::Loop;
 use headrace_monitor::stage::Stage;
 use headrace_monitor::view::DiveView;
 use headrace_monitor::{App, SourceSpec};
+use headrace_sampling::Target;
 use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::{Decoder, Direction};
 use headrace_sensor::reading::{Decoded, Packet};
@@ -103,11 +104,11 @@ impl Decoder for Nothing {
     }
 }
 
-/// End times of stages, in the order in which they ended.
+/// Names and end times of the loop's stages, in the order in which the stages ended.
 #[derive(Resource, Clone)]
 struct Ends(Arc<Mutex<Vec<(String, Instant)>>>);
 
-/// Adds a system after each stage of a world that records the stage's end.
+/// Adds a system after each stage of a world. The system records the stage's end.
 fn note_stages<S: Stage>(part: &mut Part<S>, ends: &Ends) {
     part.insert_resource(ends.clone());
     for stage in S::ALL {
@@ -128,7 +129,7 @@ impl Outlet for Alerted {
     }
 }
 
-/// Name of the alerter among the stages.
+/// Name under which the alerter is listed among the loop's stages.
 const ALERTER: &str = "Alerter";
 
 /// A loop that records the end of each stage.
@@ -167,7 +168,7 @@ fn app(scene: &Scene, decoding: bool) -> App {
     app
 }
 
-/// A message of the simulation, to be fed to the loop.
+/// A message of a simulated device, to be fed to the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
@@ -261,7 +262,7 @@ fn spans(scene: &Scene) -> (Loop, Vec<(String, Vec<f64>)>) {
     let (_, messages) = messages_of(scene);
     let ends = Ends(Arc::default());
     let mut dive = noting(scene, &ends);
-    // Arming runs a tick, too.
+    // Arming a loop runs a tick, too.
     ends.0.lock().unwrap().clear();
     let mut begins = Vec::new();
     run_noting(&mut dive, &messages, &mut begins);
@@ -345,7 +346,7 @@ fn idle_tick() {
     let mut world = World::new();
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());
-    // A chain with as many systems as the loop has.
+    // A schedule with as many chained systems as the loop has.
     schedule.add_systems((|| nothing(), || nothing(), || nothing(), || nothing(), || nothing()).chain());
     let bare = best(|| {
         let started = Instant::now();
@@ -362,7 +363,7 @@ fn idle_tick() {
     );
 }
 
-/// Samples of ideal heads in time order; all heads are at the circle's centre.
+/// Samples of ideal heads in time order; all heads are at the centre of a circular tunnel.
 fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -393,7 +394,7 @@ fn store(length_m: f64, capacity: usize) -> SampleStore {
 fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
     let mut coverage = Coverage {
         store: store(length_m, samples.len()),
-        sections: Sections::new(0.25, 0.5, -1.0, length_m + 1.0),
+        sections: Sections::new(0.25, Target::new(0.5), -1.0, length_m + 1.0),
         frontier: headrace_coverage::Frontier::default(),
         soundings: Soundings::new(GridLayout {
             perimeter_m: shapes::ceran().unwrap().perimeter_m(),
@@ -409,14 +410,15 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
     let errors = [PassError::default(); 2];
     let visit = Visit { number: 0, tie: 0, at: MonoNs(0), errors };
     for (x_m, arc_m, head) in samples {
-        black_box(coverage.store.nearest_pass_m(*x_m, *arc_m, FARTHEST_M));
+        let at = WallPoint { x_m: *x_m, arc_m: *arc_m };
+        black_box(coverage.store.nearest_pass_m(at, FARTHEST_M));
         let step_m = last[*head].map(|(from_x_m, from_arc_m): (f64, f64)| {
             [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, coverage.store.perimeter_m())]
         });
         last[*head] = Some((*x_m, *arc_m));
         let sample = WallSample { x_m: *x_m, arc_m: *arc_m, head: *head, step_m, visit: 0 };
         coverage.store.insert(sample).unwrap();
-        coverage.soundings.add(*x_m, *arc_m);
+        coverage.soundings.add(at);
         coverage.sections.touch(*x_m, &visit, &profile);
     }
     coverage
@@ -471,7 +473,8 @@ fn holes() {
             let mut store = coverage.store.clone();
             let started = Instant::now();
             for (x_m, arc_m, _) in &samples {
-                black_box(store.nearest_pass_m(x_m + 0.1, arc_m + 0.1, FARTHEST_M));
+                let at = WallPoint { x_m: x_m + 0.1, arc_m: arc_m + 0.1 };
+                black_box(store.nearest_pass_m(at, FARTHEST_M));
             }
             started.elapsed()
         });

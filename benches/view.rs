@@ -17,10 +17,10 @@ use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 
 const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_under_test");
-/// Number of passes over the log; the fastest pass counts.
+/// Number of timed passes over the log; the fastest pass counts.
 const PASSES: u32 = 5;
 
-/// A message of the recorder's queue.
+/// A message that the loop puts into the recorder's queue.
 struct Entry {
     lane: Lane,
     at: MonoNs,
@@ -136,7 +136,7 @@ fn written(header: &LogHeader, entries: &[Entry], with_view: bool) -> u64 {
     for entry in entries {
         match entry.lane {
             Lane::Raw(source) => log.raw(source, entry.at, entry.at, &entry.data).unwrap(),
-            // The tick's message contains the order of its packets.
+            // The message of a tick contains the order of the packets in that tick.
             Lane::Tick => {
                 let tick = headrace_replay::log::format::Tick::decode(&entry.data).unwrap();
                 log.tick(tick.index, tick.now, &tick.order().collect::<Vec<_>>()).unwrap();

@@ -1,4 +1,4 @@
-//! A custom outlet: it puts flagged sections into a bounded queue. Another thread prints them.
+//! A custom outlet: it puts flagged sections into a bounded queue, and another thread prints them.
 //!
 //! Run: `cargo run --example own_outlet [LOG.mcap]`. Without a log it uses a golden log of a vehicle that moves too
 //! fast.
@@ -28,7 +28,7 @@ use headrace_vehicle::VehicleConfig;
 const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/too-fast.mcap");
 const CAPACITY: usize = 256;
 
-/// A flagged section, as passed to the thread.
+/// A flagged section, as passed to the printing thread.
 struct Flag {
     at: MonoNs,
     from_m: f64,
@@ -36,7 +36,7 @@ struct Flag {
     cause: Option<Cause>,
 }
 
-/// The queue between the loop and the thread.
+/// The queue between the loop and the printing thread.
 struct Queue {
     flags: ArrayQueue<Flag>,
     dropped: AtomicU64,
@@ -78,7 +78,7 @@ impl Outlet for FlagOutlet {
 /// Prints flags until the dive has ended and the queue is empty.
 fn print(queue: &Queue) {
     loop {
-        // Read before the queue, so that flags pushed before the end are printed.
+        // The end of the dive is read before the queue, so that flags pushed before the end are printed.
         let ended = queue.ended.load(Ordering::Acquire);
         while let Some(Flag { at, from_m, hole_m, cause }) = queue.flags.pop() {
             let cause = cause.map_or("unknown", Cause::as_str);

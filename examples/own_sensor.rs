@@ -28,7 +28,7 @@ const PERIOD: DurNs = DurNs::from_millis(100);
 /// Longest pause between two bytes of a line.
 const SILENCE: DurNs = DurNs::from_millis(200);
 
-/// The format of a line.
+/// The format of a line, as a codec.
 #[derive(Clone, Copy, Default)]
 struct Lines;
 

@@ -37,10 +37,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dive = app.arm(vehicle.navigation())?;
     player.connect(dive.sources());
     drive(&mut dive, &mut player, Pace::default(), &mut |_| ())?;
-    // Judges the last sections too, which stay open as long as later samples could change them.
+    // Ends the dive, which also judges the last sections. Until then they are open, because later samples
+    // could change them.
     dive.finish(&mut |_, _| ());
 
-    println!("{}, target {} m", vehicle.name, vehicle.target_m);
+    println!("{}, target {} m", vehicle.name, vehicle.target.max_hole_m);
     println!("{:>10}  {:>8}  {:>6}  verdict", "from", "hole m", "sd m");
     let sections = &dive.view().coverage().sections;
     let first = sections.index_of(0.0);

@@ -11,7 +11,7 @@ use headrace_sampling::head::Turn;
 use headrace_sampling::ring::{Ring, Standing};
 use headrace_sampling::spacing::{Spiral, speed_for_target_mps};
 
-/// The paper's speed, m/s.
+/// The vehicle's speed in the paper, m/s.
 const SPEED_MPS: f64 = 0.197;
 const TARGET_M: f64 = 0.5;
 /// Number of rays cast per step. Rays between the pings show the largest step for any phase of the pings.
@@ -19,10 +19,10 @@ const PER_STEP: u32 = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let tunnel = shapes::ceran()?;
-    // FAST: steps of 0.9 degrees, 8 s per turn.
+    // Mode FAST: steps of 0.9 degrees, 8 s per turn.
     let fast = Turn::new(0.9_f64.to_radians(), 8.0)?;
 
-    // Halfway between floor and crown, looking along the tunnel.
+    // The vehicle's position is halfway between floor and crown, and it looks along the tunnel.
     let at = |z_m| {
         let pose = Pose { position: Point3::new(0.0, 0.0, z_m), attitude: Rot::identity() };
         Standing::new(&tunnel, &pose, &Mount { position: Vec3::zero(), rotation: Rot::identity() })

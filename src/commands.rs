@@ -39,7 +39,7 @@ use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
 
-/// `headrace demo`.
+/// Runs `headrace demo`.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let (name, text) = files::DEMO_SCENE;
     let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in, None)?;
@@ -62,7 +62,10 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let shown = followers.show(Show::Lines);
     let mut watch = Watch::new(shown);
     if watch.shows_lines() {
-        say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
+        say(&format!(
+            "{}, target {} m: a simulated dive",
+            scene.vehicle.name, scene.vehicle.target.max_hole_m
+        ));
     }
     let served = is_served.then(|| demo_page(args, &scene, &log, &dive, watch.shows_lines())).flatten();
     if let Some(served) = &served {
@@ -106,7 +109,7 @@ fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool
     Some(served)
 }
 
-/// `headrace run`.
+/// Runs `headrace run`.
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
     let mut inputs = vehicle_file::files(&args.vehicle, &vehicle);
@@ -163,7 +166,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     finish(&report, &args.output)
 }
 
-/// `headrace replay`.
+/// Runs `headrace replay`.
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let given = Given::read(args.vehicle.as_deref())?;
@@ -235,7 +238,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     Ok(if differs { failure::FAILED } else { code })
 }
 
-/// Files that a player plays.
+/// Files that the replay reads.
 fn files_of_player(player: &Player) -> Vec<PathBuf> {
     player.files().iter().map(|file| file.path.clone()).collect()
 }
@@ -281,7 +284,7 @@ fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(),
 /// Overrides the vehicle's settings by the options. The first of several targets or section lengths is the
 /// dive's own.
 fn set(args: &Replay, vehicle: &mut VehicleConfig) {
-    vehicle.target_m = args.target.first().copied().unwrap_or(vehicle.target_m);
+    vehicle.target.max_hole_m = args.target.first().copied().unwrap_or(vehicle.target.max_hole_m);
     vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);
     vehicle.site.sound_speed_mps = args.sound_speed.unwrap_or(vehicle.site.sound_speed_mps);
 }

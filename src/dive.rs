@@ -41,7 +41,7 @@ const NOTICES: usize = 1 << 10;
 /// nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
-/// Callback after every tick.
+/// Function that is called after every tick.
 type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
 
 /// An armed loop with the vehicle's sensors, and the consumers of its results.
@@ -56,17 +56,17 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Whether the loop has been informed that a recording fails.
+    /// Last state given to the loop: whether a recording is failing.
     fails: bool,
 }
 
-/// A log to be written.
+/// A log to which a dive is recorded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Recording<'a> {
-    /// Paths. Each path is a separate recording.
+    /// Paths of the log. Each path is a separate recording of the same dive.
     pub(crate) paths: &'a [PathBuf],
     pub(crate) clock: Clock,
-    /// Size or duration of a part; `None` for a recording in a single file.
+    /// Size or duration after which a recording begins a new part; `None` for a recording in a single file.
     pub(crate) rotate: Option<Every>,
     /// Name of the scene, for a simulation.
     pub(crate) scene: Option<&'a str>,
@@ -79,7 +79,7 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Clock of the timestamps.
+/// Clock that gives a dive its timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Clock {
     /// This machine's monotonic clock.
@@ -88,7 +88,7 @@ pub(crate) enum Clock {
     Theirs,
 }
 
-/// Inputs for assembling a dive: a vehicle and options.
+/// Builder of a dive from a vehicle and options.
 pub(crate) struct Assembly<'a> {
     vehicle: &'a VehicleConfig,
     text: &'a str,
@@ -108,12 +108,12 @@ impl<'a> Assembly<'a> {
         Self { recording, ..self }
     }
 
-    /// Keeps the results of each tick, if a follower or a comparison needs them.
+    /// Sets whether the results of each tick are kept for a follower or a comparison.
     pub(crate) fn kept(self, keeps_results: bool) -> Self {
         Self { keeps_results, ..self }
     }
 
-    /// Uses another navigation than that of the vehicle file.
+    /// Replaces the navigation that the vehicle file states.
     pub(crate) fn navigated(self, navigation: Box<dyn Navigation>) -> Self {
         Self { navigation: Some(navigation), ..self }
     }
@@ -175,7 +175,7 @@ fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Re
     Ok(armed)
 }
 
-/// Size of all sensors' rings, bytes.
+/// Size of all sensors' ring buffers, bytes.
 fn ring_bytes(vehicle: &VehicleConfig) -> usize {
     vehicle.sensors.iter().map(|sensor| sensor.specification().ring_bytes).sum()
 }
@@ -194,22 +194,22 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     Ok((app, notices))
 }
 
-/// Tunnel and heads for viewers.
+/// Description of the tunnel and the heads for viewers such as Foxglove.
 pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
     let mission = vehicle.mission();
     let specified = vehicle.sensors.iter().filter_map(|sensor| {
         let (device, spec) = (sensor.as_ref(), sensor.head()?);
         let head = HeadSpecification::of(device, spec, &mission);
-        Some(head.settings(&sensor.specification().sensor.id, &mission.profile, mission.target_m))
+        Some(head.settings(&sensor.specification().sensor.id, &mission.profile, mission.target.max_hole_m))
     });
     let head_descriptions = HeadDescriptions::of(specified);
     let reaches = heads.clone().map(|(_, sensor)| sensor.specification().sensor.mount.position.x().abs());
     Site {
         profile: vehicle.tunnel.profile.clone(),
-        target_m: vehicle.target_m,
+        target_m: vehicle.target.max_hole_m,
         section_m: vehicle.section_m,
-        run_up_m: reaches.fold(0.0, f64::max) + vehicle.target_m,
+        run_up_m: reaches.fold(0.0, f64::max) + vehicle.target.max_hole_m,
         length_m: vehicle.tunnel.length_m,
         head_descriptions,
         heads: heads.map(|(source, _)| source).collect(),
@@ -265,7 +265,7 @@ fn sonars(vehicle: &VehicleConfig) -> Vec<u16> {
 }
 
 impl Dive {
-    /// Accepts an operator's commands from now on. This is for live dives, not for replays.
+    /// Accepts an operator's commands from now on. Only live dives call this function.
     pub(crate) fn operated(mut self, clock: Clock) -> Self {
         let clock: Option<Arc<dyn Fn() -> MonoNs + Send + Sync>> = match clock {
             Clock::Ours => Some(Arc::new(headrace_ports::now)),
@@ -348,7 +348,7 @@ impl Dive {
         Ok(report)
     }
 
-    /// Lets `direct` run the loop, and returns the report.
+    /// Lets the function `direct` run the loop, and returns the report of the dive.
     pub(crate) fn play(
         mut self,
         watch: &mut Watch,
@@ -403,12 +403,12 @@ impl Dive {
         report
     }
 
-    /// Ports of the recorders for traffic on devices' lines outside the loop.
+    /// Handles by which port threads record device traffic that doesn't pass through the loop.
     pub(crate) fn line_ports(&self) -> Vec<LinePort> {
         self.recordings.line_ports()
     }
 
-    /// Ports of the recorders for recordings of voice notes.
+    /// Handles by which other threads add recordings of voice notes to each log.
     pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
         self.recordings.voice_ports()
     }
@@ -419,7 +419,7 @@ impl Dive {
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
         watch.end(&self.armed);
         beside(&self.armed);
-        // This tick records the last judgements.
+        // This tick writes the last sections' verdicts to the recording.
         let now = self.armed.now();
         self.armed.tick(now);
         // The samples are no longer needed. They are freed now, because the report of a long dive takes as
@@ -434,8 +434,8 @@ impl Dive {
 }
 
 impl Operator {
-    /// Tells the loop whether a recording fails. Other recordings, and later parts of this one, thus contain
-    /// the fact.
+    /// Tells the loop whether a recording is failing, so that other recordings and later parts of the same
+    /// one state it.
     fn recording(&mut self, fails: bool) {
         if core::mem::replace(&mut self.fails, fails) == fails {
             return;

@@ -23,7 +23,7 @@ use crate::outputs::{self, Claims, Kind, REHEARSAL};
 /// Longest wait for bytes from a host, ns. It limits the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
 
-/// `headrace emulate`.
+/// Runs `headrace emulate`.
 pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     let (name, text) = (args.scene.display().to_string(), files::read(&args.scene)?);
     let beside = Beside::of(&args.scene);
@@ -143,7 +143,7 @@ fn with_connects(scene: &Scene) -> String {
 struct Rehearsal {
     simulation: Simulation,
     stands: Vec<EmulatedPort>,
-    /// Start of the simulation on this machine's clock.
+    /// Time on this machine's clock at which the simulation started.
     origin: MonoNs,
 }
 
@@ -176,7 +176,8 @@ impl Rehearsal {
         Ok(())
     }
 
-    /// Passes bytes from hosts to the devices, and due bytes from the devices to the ports.
+    /// Passes bytes from the ports to the simulated devices, and the devices' bytes that are due to the
+    /// ports.
     fn go_on(&mut self) -> Result<(), Failure> {
         let failed = |source| Failure::System { what: "emulating a device on its port", source };
         wait_for_any(&self.stands, WAIT_NS);

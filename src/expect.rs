@@ -9,10 +9,11 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Maximum number of differences listed.
+/// Maximum number of differences between two reports that are listed.
 const SHOWN: usize = 20;
 
-/// A golden report. The log's name and hash, and the history of ports, are left out.
+/// A golden report, which replays are compared with. It lacks the log's name and hash, and the history of
+/// ports.
 pub(crate) struct Golden {
     expected: Value,
     allowed: Allowed,
@@ -107,7 +108,7 @@ impl Allowed {
     fn covers(&self, path: &str, expected: &Value, got: &Value) -> bool {
         let names: Vec<&str> = path.split('/').collect();
         let fits = |wanted: &[String]| {
-            // The tolerance "any" covers everything below its path.
+            // The tolerance "any" also covers all paths that begin with its path.
             wanted.len() <= names.len()
                 && wanted.iter().zip(&names).all(|(wanted, name)| {
                     wanted == "*" || wanted == name || name.split('[').next() == Some(wanted)

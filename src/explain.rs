@@ -1,4 +1,5 @@
-//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and their worth.
+//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and the change in
+//! results without each.
 
 use headrace_replay::effect_influence::{
     EffectInfluence, HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, measure,
@@ -12,10 +13,10 @@ use crate::output::{append, deliver, show};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
-/// Width of a column that has a figure and the figure's interval.
+/// Width of a column that shows a figure with its confidence interval, characters.
 const COLUMN: usize = 20;
 
-/// Measures the worth of a scene's effects. `scenes` is the scene, read with several seeds.
+/// Measures how a scene's results change without each effect. `scenes` is the scene, read with several seeds.
 pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure> {
     let _phase = Phase::start("worth");
     let mut progress = Progress::start();
@@ -61,7 +62,7 @@ pub(crate) fn explain(scene: &Scene, worth: Option<&EffectInfluence>, as_json: b
     Ok(failure::OK)
 }
 
-/// Effects that aren't simulated.
+/// Text about the effects that aren't simulated.
 fn left_out(added: &[Added]) -> impl Iterator<Item = &'static str> {
     let names = EFFECTS.iter().map(|kind| kind.name());
     names.filter(|name| added.iter().all(|effect| effect.effect != *name))
@@ -108,7 +109,7 @@ fn worth_in_json(worth: &EffectInfluence) -> Value {
     })
 }
 
-/// Text on the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
+/// Text about the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
 /// first.
 fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =
@@ -153,7 +154,7 @@ fn worth_in_words(worth: &EffectInfluence) -> String {
     text
 }
 
-/// A mean with its interval, both multiplied by `scale`.
+/// A mean with its confidence interval, both multiplied by `scale`.
 fn plus_minus(mean: &Mean, scale: f64, digits: usize) -> String {
     format!("{:.digits$} +- {:.digits$}", mean.mean * scale, mean.half * scale)
 }
@@ -169,7 +170,7 @@ fn called_in_words(called: &[Called]) -> String {
     text
 }
 
-/// Callers of an effect. If there are many, only the first is named.
+/// Reasons that call for an effect, as text. Only the first three are listed.
 fn by(callers: &[String]) -> String {
     const SHOWN: usize = 3;
     let shown = callers.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");

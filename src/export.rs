@@ -25,10 +25,10 @@ use crate::report_output::{exit_code, note_losses};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
-/// Maximum total size of the recordings in a page, bytes. It is enough for two hours.
+/// Maximum total size of the voice notes' recordings in an exported page, bytes. It is enough for two hours.
 const MOST_VOICE_BYTES: usize = 24 << 20;
 
-/// `headrace export`.
+/// Runs `headrace export`.
 pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let given = Given::read(args.vehicle.as_deref())?;
@@ -76,7 +76,8 @@ fn voices(files: &[PathBuf], report: &Report) -> Result<(Vec<Voice>, u64), Failu
     // Without voice notes, as in most dives, the log needn't be read again.
     if report.notes.iter().any(|note| note.voice.is_some()) {
         each_voice(files, |voice| {
-            // The page sends a recording again if it didn't receive the first answer.
+            // A voice note's recording may be in the log twice, because a page without an answer sends it
+            // again.
             if voices.iter().any(|other| other.id == voice.id) {
                 return Ok::<_, Failure>(());
             }

@@ -15,9 +15,9 @@ pub(crate) struct Program {
     package: &'static str,
 }
 
-/// `headrace campaign` and `headrace batch`.
+/// Program for `headrace campaign` and `headrace batch`.
 pub(crate) const CAMPAIGN: Program = Program { name: "headrace-campaign", package: "headrace_campaign" };
-/// `headrace cost`.
+/// Program for `headrace cost`.
 pub(crate) const COST: Program = Program { name: "headrace-cost", package: "headrace_cost" };
 
 /// Runs a program of `lab/` with `arguments` after `first`, and returns its exit code.
@@ -35,7 +35,7 @@ pub(crate) fn run(program: &Program, first: Option<&str>, args: &ExternalArgumen
     let found = places.into_iter().flatten().find(|path| path.is_file());
     let arguments = first.map(OsStr::new).into_iter().chain(args.arguments.iter().map(OsStr::new));
     match Command::new(found.unwrap_or_else(|| PathBuf::from(name))).args(arguments).status() {
-        // A signal ended the program.
+        // If a signal ended the program, it has no exit code.
         Ok(status) => Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(failure::FAILED)),
         Err(error) if error.kind() == ErrorKind::NotFound => Err(Failure::Usage(format!(
             "{name} is neither beside this program, nor in lab/target/release, nor on PATH; build it with: \

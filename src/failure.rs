@@ -28,7 +28,7 @@ pub(crate) const DATA_LOST: u8 = 3;
 /// Exit code: the replay differs from the dive.
 pub(crate) const DIVERGED: u8 = 4;
 
-/// Reason for which a command failed.
+/// Reason why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
     #[error("reading {}: {source}", path.display())]
@@ -105,7 +105,7 @@ impl Failure {
         }
     }
 
-    /// Exit code.
+    /// Exit code for this error.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Config(_)

@@ -1,4 +1,4 @@
-//! Feeds of a dive that can end early, and that report their progress.
+//! Wrappers around a dive's packet source that let it end early and report its progress.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,7 +8,7 @@ use headrace_monitor::ring::{Port, RingError};
 use headrace_replay::drive::{Coming, PacketSource};
 use headrace_replay::log::LogError;
 
-/// A feed that ends when its flag is set.
+/// A packet source that ends when the flag `interrupted` is set.
 pub(crate) struct Interruptible<'a> {
     pub(crate) feed: &'a mut dyn PacketSource,
     pub(crate) interrupted: &'a AtomicBool,
@@ -28,7 +28,7 @@ impl PacketSource for Interruptible<'_> {
     }
 }
 
-/// A feed that reports the time of its next packet.
+/// A packet source that stores the time of its next packet in `at`.
 pub(crate) struct Followed<'a> {
     pub(crate) feed: &'a mut dyn PacketSource,
     pub(crate) at: &'a Cell<MonoNs>,

@@ -17,7 +17,7 @@ pub(crate) const DEMO_SCENE: (&str, &str) =
 const DEMO_VEHICLE: (&str, &str) =
     ("../vehicles/vita2-4.toml", include_str!("../deploy/vehicles/vita2-4.toml"));
 
-/// First of the logs named on the command line. Messages about several logs name only this one.
+/// Path of the first log on the command line. Messages about several logs name only this one.
 pub(crate) fn first_named(logs: &[PathBuf]) -> &Path {
     logs.first().map_or(Path::new(""), PathBuf::as_path)
 }
@@ -94,7 +94,7 @@ impl Beside {
         Self { folder, read: RefCell::new(vec![file.to_owned()]) }
     }
 
-    /// Loads one of the referenced files.
+    /// Loads one of the files that a vehicle or scene file refers to.
     pub(crate) fn load(&self, name: &str) -> Result<Vec<u8>, String> {
         let path = self.folder.join(name);
         self.read.borrow_mut().push(path.clone());
@@ -102,7 +102,7 @@ impl Beside {
             .map_err(|error| format!("can't be read at {}: {error}", path.display()))
     }
 
-    /// The file itself, and the referenced files that have been loaded.
+    /// Paths of the file itself and of the referenced files loaded so far.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         self.read.borrow().clone()
     }

@@ -1,4 +1,4 @@
-//! Interface of followers of a dive besides the terminal, such as a page or another program.
+//! Interface of a dive's followers: the page, the full-screen display, and outputs to other programs.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::live_messages::LiveMessage;
@@ -14,8 +14,8 @@ use crate::recording_state::RecordingState;
 /// A follower takes values from the loop and hands them to a thread of its own. In a live dive a follower
 /// never waits; a replay may wait for its followers.
 pub(crate) trait Follower {
-    /// Called before [`notice`](Self::notice), [`tick`](Self::tick) and [`end`](Self::end), with the live
-    /// messages that follow from the result, from the tick, and from the end of the dive.
+    /// Called before each call of [`notice`](Self::notice), [`tick`](Self::tick) and [`end`](Self::end), with
+    /// the live messages that the result, the tick or the end of the dive causes.
     fn messages(&mut self, _told: &[LiveMessage], _dive: &Loop) {}
     /// Called for each result of the last tick.
     fn notice(&mut self, _notice: &Notice, _dive: &Loop) {}
@@ -31,8 +31,8 @@ pub(crate) trait Follower {
     fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
     /// Called with the state of the recordings that is to be shown from now on.
     fn recorded(&mut self, _state: &RecordingState) {}
-    /// Called when a replay has paused, jumped or ended at `time` after its beginning. The state of the loop
-    /// may be that of another time.
+    /// Called when a replay has paused, jumped or ended, `time` after the log's beginning. The loop may hold
+    /// the state of another time.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
     /// Called when the dive has ended and all sections are judged.
     fn end(&mut self, dive: &Loop);

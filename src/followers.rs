@@ -14,10 +14,10 @@ use crate::mavlink_out::MavlinkOut;
 use crate::tui::{Mode, Start, Tui};
 use crate::watch::{Show, Watch};
 
-/// Requested followers.
+/// Followers of a dive that the command line requests.
 pub(crate) struct Followers {
     tui: bool,
-    /// Address to send to, and system id of the vehicle.
+    /// Address that receives MAVLink, and MAVLink system id of the vehicle.
     mavlink_out: Option<(String, u8)>,
     foxglove: Option<SocketAddr>,
 }
@@ -34,13 +34,13 @@ pub(crate) struct Joining<'a> {
 }
 
 impl<'a> Joining<'a> {
-    /// A dive of a vehicle. The flag `interrupted` ends it.
+    /// Describes a vehicle's dive for its followers. The flag `interrupted` ends the dive.
     pub(crate) fn new(vehicle: &'a VehicleConfig, mode: Mode, interrupted: &Arc<AtomicBool>) -> Self {
         let interrupted = Arc::clone(interrupted);
         Self { vehicle, mode, interrupted, first: None, console: None, span: None }
     }
 
-    /// Accepts an operator's commands, unless `console` is `None` because the dive is recorded.
+    /// Sets the port for the operator's commands; `None` for a replay, which accepts none.
     pub(crate) fn operated(self, console: Option<ConsolePort>) -> Self {
         Self { console, ..self }
     }
@@ -116,6 +116,6 @@ fn foxglove(watch: Watch, at: SocketAddr, joining: &Joining<'_>) -> Result<Watch
 #[cfg(not(feature = "foxglove"))]
 #[expect(clippy::unnecessary_wraps, reason = "with the feature it may fail")]
 fn foxglove(watch: Watch, _: SocketAddr, _: &Joining<'_>) -> Result<Watch, Failure> {
-    // A program without the feature has refused the option earlier.
+    // If the program lacks the feature `foxglove`, the option has been refused earlier.
     Ok(watch)
 }

@@ -26,12 +26,12 @@ use headrace_replay::view::{Site, View};
 use crate::failure::Failure;
 use crate::follower::Follower;
 
-/// Maximum number of ticks whose results are waiting. It corresponds to about ten seconds at 50 ticks a
-/// second.
+/// Maximum number of ticks whose results wait for the server's thread. It corresponds to about ten seconds at
+/// 50 ticks a second.
 const WAITING: usize = 512;
-/// Time that the server has to close its connections.
+/// Time limit for the server to close its connections.
 const ENDS_WITHIN: Duration = Duration::from_millis(500);
-/// Interval at which an interruption is checked.
+/// Interval at which the server's thread checks the flag of Ctrl-C.
 const WAIT: Duration = Duration::from_millis(200);
 
 /// A replay that Foxglove may control.
@@ -47,7 +47,7 @@ pub(crate) struct Controlled {
 enum Message {
     /// Time of a tick, and its results as channel and message.
     Results(MonoNs, Vec<(u16, Vec<u8>)>),
-    /// A replay has paused, jumped, or ended.
+    /// Time at which a replay has paused, jumped or ended, and whether it has ended.
     Stopped(MonoNs, bool),
 }
 
@@ -113,7 +113,8 @@ impl Foxglove {
         Ok(Self { results: Some(sender), thread: Some(thread), is_live, dropped: 0 })
     }
 
-    /// Hands a message to the server's thread. In a live dive, messages without room are dropped and counted.
+    /// Hands a message to the server's thread. In a live dive, messages that find no room in the queue are
+    /// dropped and counted.
     fn send(&mut self, message: Message) {
         let Some(results) = &self.results else { return };
         if self.is_live {
@@ -173,7 +174,7 @@ impl Drop for Foxglove {
     }
 }
 
-/// State of the server's thread.
+/// State of the thread that serves Foxglove.
 struct Server {
     handle: WebSocketServerHandle,
     channels: Vec<Option<Arc<RawChannel>>>,

@@ -87,7 +87,7 @@ impl Seek for Counted {
     }
 }
 
-/// Writes the log of the messages that sensors receive.
+/// Writes the log with the messages that are assigned to sensors.
 fn write<S: Source>(
     args: &cli::Import,
     kind: FileKind,

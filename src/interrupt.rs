@@ -33,13 +33,14 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// Counts a request that comes now.
+    /// Counts a request to end the program that comes now.
     #[expect(clippy::disallowed_methods, reason = "how long somebody waits to ask again is wall time")]
     pub(crate) fn is_second_now(&mut self) -> bool {
         self.is_second(Instant::now())
     }
 
-    /// Counts a request at `now`. Returns true for a second request, which ends the program at once.
+    /// Counts a request to end the program at the time `now`. Returns true for a second request, which ends
+    /// the program at once.
     fn is_second(&mut self, now: Instant) -> bool {
         now.duration_since(*self.first.get_or_insert(now)) >= ONE_REQUEST
     }
@@ -51,8 +52,8 @@ impl Requests {
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     on(SIGHUP, &flag)?;
-    // Without a handler of this signal, a write beyond the limit of file sizes would end a recording from a
-    // log or a simulation.
+    // Without a handler of SIGXFSZ, a write beyond the limit of file sizes would end a recording from a log
+    // or a simulation.
     on(SIGXFSZ, &Arc::default())?;
     Ok(flag)
 }
@@ -66,15 +67,17 @@ pub(crate) fn flag_of_a_dive() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Whether the reader of keys handles a second signal. It restores the terminal before the program ends.
+/// Whether the thread that reads keys handles a second signal. That thread restores the terminal before the
+/// program ends.
 static LEFT_TO_KEYS: AtomicBool = AtomicBool::new(false);
 
-/// Leaves a second SIGINT or SIGTERM to the reader of [`seconds`], which ends the program.
+/// Leaves a second SIGINT or SIGTERM to the thread that reads the stream from [`seconds`]. That thread ends
+/// the program.
 pub(crate) fn leave_second_to_keys() {
     LEFT_TO_KEYS.store(true, Ordering::Relaxed);
 }
 
-/// Stream with a byte for every SIGINT and SIGTERM.
+/// Creates a stream that receives a byte for every SIGINT and SIGTERM.
 pub(crate) fn seconds() -> std::io::Result<UnixStream> {
     let (read, write) = UnixStream::pair()?;
     signal_hook::low_level::pipe::register(SIGINT, write.try_clone()?)?;
@@ -99,7 +102,8 @@ fn ending() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Sets `armed` as soon as a further request no longer counts as a repetition of the first.
+/// Sets `armed` as soon as a further request to end the program no longer counts as a repetition of the
+/// first.
 fn arm_later(armed: Arc<AtomicBool>) -> Result<(), Failure> {
     let mut signals = seconds().map_err(failed)?;
     let wait = move || {
@@ -126,7 +130,7 @@ mod tests {
 
     #[test]
     #[expect(clippy::disallowed_methods, reason = "any moment will do")]
-    fn requests_within_a_second_count_as_one() {
+    fn stop_requests_within_a_second_count_as_one() {
         let (begun, mut requests) = (Instant::now(), Requests::default());
         let is_second = [0, 1, 300, 999, 1000, 1500]
             .map(|at_ms| requests.is_second(begun + Duration::from_millis(at_ms)));

@@ -132,7 +132,7 @@ fn live_page(
     page::serve(&args.page, of, if shows_lines { Some(&mut say) } else { None })
 }
 
-/// Text shown at the beginning of a dive.
+/// Text about ports and recordings that is shown at the beginning of a dive.
 fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
     let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
     let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
@@ -142,19 +142,19 @@ fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
         (false, None) => format!("recorded to {firsts}"),
         (false, Some(_)) => format!("recorded in parts, starting with {firsts}"),
     };
-    format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m)
+    format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target.max_hole_m)
 }
 
 /// Checks that a dive can be recorded to these files.
 ///
-/// With `--force` existing files are removed. This is the last step that may fail.
+/// With `--force` existing files are removed. After this step no check can prevent the dive.
 pub(crate) fn make_room(logs: &[PathBuf], args: &Run, mut claims: Claims) -> Result<(), Failure> {
     let first = |log: &PathBuf| claims.claim_recording("--record", log, args.rotate.is_some());
     let firsts = logs.iter().map(first).collect::<Result<Vec<_>, _>>()?;
     firsts.iter().try_for_each(|first| outputs::make_way(first))
 }
 
-/// Id of each sensor and its connection, or the reason for which `connect` is invalid.
+/// Id of each sensor and its connection, or the reason why `connect` is invalid.
 pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect, ConnectError>)> {
     let sensors = vehicle.sensor_configs.iter().zip(&vehicle.sensors);
     let connect = sensors.map(|(config, device)| {
@@ -164,7 +164,7 @@ pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect,
     connect.collect()
 }
 
-/// Numbers of the required sensors.
+/// Numbers of the sensors that `--require` names.
 ///
 /// Errors: the vehicle has no sensor with the id, or a required sensor has an invalid `connect`.
 fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> {
@@ -230,7 +230,7 @@ struct SensorStates {
     words: Vec<String>,
     /// Numbers of required sensors that aren't running yet.
     required: Vec<usize>,
-    /// Deadline for the required sensors.
+    /// Time by which the required sensors must run.
     required_by: MonoNs,
     begun: MonoNs,
 }
@@ -252,7 +252,7 @@ impl SensorStates {
         }
     }
 
-    /// Text on a required sensor that isn't running at the deadline, with the sensor's last status.
+    /// Text about a required sensor that isn't running at the deadline, with the sensor's last status.
     fn missing(&self, now: MonoNs) -> Option<String> {
         let number = *self.required.first().filter(|_| now > self.required_by)?;
         let within_s = self.required_by.since(self.begun).as_secs_f64();

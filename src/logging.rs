@@ -62,30 +62,30 @@ fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Optio
     (filter, error)
 }
 
-/// Maximum number of lines that wait in a dive whose stderr isn't read.
+/// Maximum number of log lines in the queue for stderr.
 const WAITING: usize = 1 << 10;
-/// Longest wait for these lines at the end of a dive.
+/// Longest wait at the end of a dive until the queued lines are written to stderr.
 const ENDS_WITHIN: Duration = Duration::from_secs(2);
 
 /// Writer of stderr on a separate thread.
 struct Background {
     lines: Sender<Line>,
-    /// Number of lines dropped for lack of room.
+    /// Number of log lines dropped because the queue was full.
     dropped: AtomicU64,
 }
 
 enum Line {
     Text(Vec<u8>),
-    /// Mark in the queue. It is dropped when all earlier lines have been written, which disconnects its
-    /// channel.
+    /// Marks a place in the queue. When all earlier lines have been written, the mark is dropped, which
+    /// disconnects its channel.
     Mark(Sender<()>),
 }
 
 static BACKGROUND: OnceLock<Background> = OnceLock::new();
 
-/// From now on no thread waits for stderr. If nobody reads stderr, a dive and its recorder continue.
+/// From now on no thread waits for stderr, so a dive and its recorder continue if nobody reads stderr.
 ///
-/// Lines without room are dropped and counted.
+/// Lines that find no room in the queue are dropped and counted.
 pub(crate) fn never_wait() {
     let (lines, queue) = bounded(WAITING);
     // If the thread can't be started, all lines are dropped as soon as the queue is full.
@@ -102,13 +102,13 @@ pub(crate) fn never_wait() {
     }
 }
 
-/// Lines kept while a screen uses the terminal. The oldest lines are dropped and counted.
+/// Log lines kept while `--tui` uses the terminal. The oldest lines are dropped and counted.
 struct Held {
     is_on: AtomicBool,
     /// Lines to be written to stderr when the terminal is released.
     kept: ArrayQueue<Vec<u8>>,
     dropped: AtomicU64,
-    /// Lines to be shown on the screen.
+    /// Log lines that the screen of `--tui` is to show.
     shown: ArrayQueue<String>,
 }
 
@@ -126,19 +126,19 @@ fn held() -> &'static Held {
     })
 }
 
-/// Keeps lines from now on, because a screen uses the terminal.
+/// Keeps log lines from now on, because the screen of `--tui` uses the terminal.
 ///
 /// The screen shows the lines. They aren't written to stderr if stderr is a terminal.
 pub(crate) fn hold() {
     held().is_on.store(true, Ordering::Relaxed);
 }
 
-/// Next line for the screen.
+/// Next log line that the screen of `--tui` is to show.
 pub(crate) fn next_held() -> Option<String> {
     HELD.get().and_then(|held| held.shown.pop())
 }
 
-/// Writes the kept lines once the terminal is released.
+/// Writes the kept log lines to stderr, since the terminal has been released.
 pub(crate) fn release() {
     let Some(held) = HELD.get().filter(|held| held.is_on.swap(false, Ordering::Relaxed)) else { return };
     let dropped = held.dropped.swap(0, Ordering::Relaxed);
@@ -150,7 +150,8 @@ pub(crate) fn release() {
     }
 }
 
-/// Writes a line to stderr after the waiting ones. The line may hold external text.
+/// Writes a line to stderr after the lines that are queued. The line may contain text from outside the
+/// program.
 pub(crate) fn complain(text: &str) {
     pass(format!("{}\n", one_line(text)).as_bytes());
 }
@@ -175,7 +176,7 @@ fn pass(bytes: &[u8]) {
     }
 }
 
-/// Writes bytes to stderr at once, unless a screen uses the terminal.
+/// Writes bytes to stderr at once, unless the screen of `--tui` uses the terminal.
 ///
 /// Stderr is shared with self-overwriting lines. Failed writes are ignored: a closed stderr must not end a
 /// dive.
@@ -197,7 +198,7 @@ fn write_now(bytes: &[u8]) {
     cleared.and_then(|()| stderr.write_all(bytes)).ok();
 }
 
-/// A line without colours and without the line end.
+/// A log line without colours and without its line end.
 fn plain(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let mut parts = text.trim_end().split("\x1b[");
@@ -205,7 +206,7 @@ fn plain(bytes: &[u8]) -> String {
     parts.fold(first, |line, part| line + part.split_once('m').map_or(part, |(_, rest)| rest))
 }
 
-/// An event as one line. External text is escaped; the formatter's colours are kept.
+/// A log event as one line. External text is escaped; the formatter's colours are kept.
 fn event(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let (line, end) = text.strip_suffix('\n').map_or((&*text, ""), |line| (line, "\n"));
@@ -247,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn event_is_one_line_without_control_codes_except_colours() {
+    fn log_event_is_one_line_without_control_codes_except_colours() {
         let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
         let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
         assert_eq!(event(text.as_bytes()), line);
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn log_variable_sets_the_levels_of_named_crates() {
+    fn rust_log_sets_the_levels_of_named_crates() {
         let shows = enabled(None, Some("headrace_ports=debug"));
         assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace_replay", Level::WARN));
         assert!(!shows("headrace_replay", Level::INFO));
@@ -280,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_log_variable_is_named_and_ignored() {
+    fn invalid_rust_log_is_named_and_ignored() {
         let (filter, error) = filter(None, Some("headrace=loud"));
         assert!(error.unwrap().starts_with("RUST_LOG = \"headrace=loud\": "));
         assert!(

@@ -18,14 +18,14 @@ use headrace_monitor::run::Loop;
 use crate::failure::Failure;
 use crate::follower::Follower;
 
-/// Interval of heartbeats, in the loop's time. Source: MAVLink, "Heartbeat/Connection Protocol".
+/// Interval between heartbeats, in the loop's time. Source: MAVLink, "Heartbeat/Connection Protocol".
 const HEARTBEAT_EVERY: DurNs = DurNs(1_000_000_000);
-/// Interval of the figures, in the loop's time.
+/// Interval between messages with the dive's figures, in the loop's time.
 const FIGURES_EVERY: DurNs = DurNs(500_000_000);
-/// Maximum number of frames that wait. It corresponds to about ten seconds.
+/// Maximum number of MAVLink frames in the queue. It corresponds to about ten seconds.
 const WAITING: usize = 256;
 
-/// Follower that sends the state of the dive.
+/// Follower that sends the state of the dive over MAVLink.
 pub(crate) struct MavlinkOut {
     speaker: Speaker,
     frames: Option<Sender<Vec<u8>>>,
@@ -37,7 +37,7 @@ pub(crate) struct MavlinkOut {
 }
 
 impl MavlinkOut {
-    /// Starts to send to an address, as a component of the vehicle with this system id.
+    /// Starts to send to an address, as a component of the vehicle that has this MAVLink system id.
     ///
     /// Errors: a socket or thread can't be created. An address at which nobody listens is not an error.
     pub(crate) fn start(to: &str, system_id: u8) -> Result<Self, Failure> {
@@ -58,7 +58,8 @@ impl MavlinkOut {
         })
     }
 
-    /// Hands a frame to the sending thread. A frame without room is dropped, since a newer one follows.
+    /// Hands a MAVLink frame to the sending thread. If the queue is full, the frame is dropped, since a newer
+    /// one follows.
     fn send(&self, frame: Vec<u8>) {
         if let Some(frames) = &self.frames {
             frames.try_send(frame).ok();
@@ -134,7 +135,8 @@ impl Drop for MavlinkOut {
     }
 }
 
-/// Figures by name; NaN for a missing one. `docs/reference/screens.md` has the table with their units.
+/// Figures of the dive, by their MAVLink names. A missing figure is NaN. `docs/reference/screens.md` has the
+/// table with their units.
 #[expect(clippy::cast_possible_truncation, reason = "MAVLink's figures are of single precision")]
 fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] {
     let known = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
@@ -158,7 +160,7 @@ fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] 
     ]
 }
 
-/// Sends frames as they come. At the end of a dive, the remaining frames are sent first.
+/// Sends MAVLink frames as they come. At the end of a dive, sends the remaining frames before it returns.
 fn send_all(socket: &UdpSocket, to: &str, frames: &Receiver<Vec<u8>>) {
     let mut failed: u64 = 0;
     for frame in frames {

@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use crate::failure::Failure;
 
-/// Address space of an assembled dive without the rings of its sensors, bytes.
+/// Address space that a dive needs besides the ring buffers of its sensors, bytes.
 ///
 /// With less, replays of a vehicle with two heads abort in a tunnel of 100 m. Longer tunnels need more. The
 /// figure was measured in steps of 10 MB of `ulimit -v`. Most of this space is never used.
@@ -17,7 +17,7 @@ const DIVE_BYTES: usize = 232 << 20;
 pub(crate) fn check_room(ring_bytes: usize) -> Result<(), Failure> {
     let bytes = DIVE_BYTES.saturating_add(ring_bytes);
     let mut room = Vec::<u8>::new();
-    // The black box keeps the compiler from removing the unused allocation.
+    // `black_box` keeps the compiler from removing the unused allocation.
     match black_box(&mut room).try_reserve_exact(bytes) {
         Ok(()) => Ok(()),
         Err(_) => Err(Failure::NoRoom { mib: bytes.div_ceil(1 << 20) }),

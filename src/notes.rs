@@ -16,7 +16,7 @@ use crate::files;
 use crate::output::{deliver, say};
 use crate::outputs::{self, Claims, Kind};
 
-/// `headrace notes`.
+/// Runs `headrace notes`.
 pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
     let logs = files_of(&args.logs)?;
     let found = notes_of(&logs)?;
@@ -38,9 +38,10 @@ pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
     Ok(if is_whole { failure::OK } else { failure::DATA_LOST })
 }
 
-/// File names of the recordings by id.
+/// File names for the recordings of voice notes, by the recording's id.
 ///
-/// A file is named after its note's number, or after the id if there is no such note.
+/// A file is named after its note's number. If no note has the recording, it is named after the recording's
+/// id.
 fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     let name = |(id, (_, container, _)): (&u32, &(u32, Container, usize))| {
         let is_it = |note: &&NoteJson| note.voice.as_ref().is_some_and(|voice| voice.id == *id);
@@ -53,7 +54,7 @@ fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     found.voices.iter().map(name).collect()
 }
 
-/// Texts on voice notes whose recordings are missing in the log.
+/// Texts about voice notes whose recordings are missing in the log.
 fn missing(found: &LoggedNotes) -> Vec<String> {
     let lacks = |note: &NoteJson| {
         let voice = note.voice.as_ref().filter(|voice| voice.seconds.is_some())?;

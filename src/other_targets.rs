@@ -19,8 +19,8 @@ use crate::watch::Watch;
 /// Judges the dive for each combination of the requested targets and section lengths. Returns nothing if
 /// there is only one combination.
 ///
-/// Counted visits and the times of flags depend on the target. Each combination is therefore replayed, except
-/// the one that was played already.
+/// The counted passes and the times at which sections are flagged depend on the target. Each combination is
+/// therefore replayed, except the one that was played already.
 pub(crate) fn reports(
     args: &Replay,
     files: &[PathBuf],
@@ -29,7 +29,7 @@ pub(crate) fn reports(
 ) -> Result<Vec<OtherTargetReport>, Failure> {
     let own = |asked: &[f64], own: f64| if asked.is_empty() { vec![own] } else { asked.to_vec() };
     let (targets_m, sections_m) =
-        (own(&args.target, vehicle.target_m), own(&args.section, vehicle.section_m));
+        (own(&args.target, vehicle.target.max_hole_m), own(&args.section, vehicle.section_m));
     let mut all = Vec::new();
     if !is_asked(args) {
         return Ok(all);
@@ -37,7 +37,7 @@ pub(crate) fn reports(
     let _phase = Phase::start("other targets and sections");
     for section_m in sections_m {
         for target_m in &targets_m {
-            (vehicle.target_m, vehicle.section_m) = (*target_m, section_m);
+            (vehicle.target.max_hole_m, vehicle.section_m) = (*target_m, section_m);
             let is_played = target_m.to_bits() == played.target_m.to_bits()
                 && section_m.to_bits() == played.section_m.to_bits();
             all.push(if is_played {

@@ -15,12 +15,12 @@ use rustix::event::{PollFd, PollFlags, poll};
 use crate::failure::Failure;
 use crate::terminal;
 
-/// Time for which a live dive waits while nobody reads stdout.
+/// Longest time for which a live dive waits for a reader of stdout.
 pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
-/// Number of bytes that any reader takes within [`UNREAD_FOR`].
+/// Length of one write, bytes. Any active reader takes this many within [`UNREAD_FOR`].
 const PIECE: usize = 1 << 10;
 
-/// Whether stdout has been given up. Nothing more is written to it then.
+/// Whether stdout has been given up. If so, nothing more is written to it.
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 /// Whether stdout is given up if nobody reads it.
 static NEVER_WAITS: AtomicBool = AtomicBool::new(false);
@@ -39,7 +39,8 @@ pub(crate) fn never_wait() {
     NEVER_WAITS.store(true, Ordering::Relaxed);
 }
 
-/// Stdout for one piece of output that no separate thread writes. It is flushed once, at the end.
+/// Opens stdout for one output, which is flushed once, at its end. After [`never_wait`], a caller waits for
+/// at most [`UNREAD_FOR`].
 ///
 /// Errors: stdout has been given up.
 fn stdout() -> io::Result<Box<dyn Write>> {
@@ -50,9 +51,9 @@ fn stdout() -> io::Result<Box<dyn Write>> {
     }
 }
 
-/// Stdout that waits until it accepts more.
+/// Writer to stdout that waits until stdout accepts more bytes.
 ///
-/// It waits even if another process that shares the pipe has made it non-blocking.
+/// The writer waits even if another process that shares the pipe has made the pipe non-blocking.
 struct Waiting(StdoutLock<'static>);
 
 impl Waiting {
@@ -91,7 +92,7 @@ fn unread() -> io::Error {
     io::Error::new(io::ErrorKind::TimedOut, "it is not read")
 }
 
-/// Stdout on a separate thread. It blocks no caller for longer than [`UNREAD_FOR`].
+/// Writer to stdout through a separate thread. It blocks no caller for longer than [`UNREAD_FOR`].
 struct Unheld {
     pieces: Option<Sender<Vec<u8>>>,
     done: Receiver<io::Result<()>>,
@@ -99,21 +100,21 @@ struct Unheld {
 
 impl Unheld {
     fn start() -> io::Result<Self> {
-        // A piece is handed over as soon as the previous one has been written.
+        // The channel has no buffer, so a piece is taken only when the previous one has been written.
         let (pieces, queue) = bounded::<Vec<u8>>(0);
         let (ended, done) = bounded(1);
         let write = move || {
             let mut stdout = Waiting::start();
             let result = queue.iter().try_for_each(|piece| stdout.write_all(&piece));
             drop(queue);
-            // The receiver may have given up.
+            // The receiver may have stopped waiting for the result.
             ended.send(result.and_then(|()| stdout.flush())).ok();
         };
         thread::Builder::new().name("stdout".to_owned()).spawn(write)?;
         Ok(Self { pieces: Some(pieces), done })
     }
 
-    /// Waits for the thread, and returns the result of writing.
+    /// Waits until the thread has written everything, and returns the result of writing.
     fn end(&mut self) -> io::Result<()> {
         self.pieces = None;
         match self.done.recv_timeout(UNREAD_FOR) {
@@ -149,7 +150,7 @@ impl Write for Unheld {
 
 /// Writes `text` unchanged, however long that takes. Otherwise like [`put`].
 ///
-/// For a thread that blocks no other thread.
+/// Only for a thread for which no other thread waits.
 pub(crate) fn put_waiting(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
@@ -199,17 +200,17 @@ pub(crate) fn put_line(text: &str) {
     put(&format!("{text}\n"));
 }
 
-/// Writes lines that may hold external text.
+/// Writes lines that may contain text from outside the program, and makes them printable.
 pub(crate) fn show(text: &str) {
     put(&lines(text));
 }
 
-/// Writes a line that may hold external text.
+/// Writes a line that may contain text from outside the program, and makes it printable.
 pub(crate) fn say(text: &str) {
     put(&format!("{}\n", one_line(text)));
 }
 
-/// Writes a line in place of a transient one. May be called from any thread.
+/// Writes a line, and removes a transient status line first. May be called from any thread.
 pub(crate) fn aside(text: &str) {
     let clear = if terminal::take_transient() { terminal::CLEAR } else { "" };
     put(&format!("{clear}{}\n", one_line(text)));
@@ -261,7 +262,7 @@ fn failed(source: io::Error) -> Failure {
     Failure::Write { path: "standard output".into(), source }
 }
 
-/// Writer that makes text printable, wherever the text is cut into pieces.
+/// Writer that replaces control codes in text. The text may come in pieces that are cut anywhere.
 struct Plain<W>(W);
 
 impl<W: Write> Write for Plain<W> {

@@ -1,5 +1,5 @@
-//! Checks before the work whether a command may overwrite its output files and can write them. Claims keep the outputs
-//! of a command different from its inputs and from one another.
+//! Checks, before the work begins, whether a command may overwrite its output files and can write them. Claims
+//! keep the outputs of a command different from its inputs and from one another.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
@@ -18,18 +18,18 @@ pub(crate) const SIMULATED: &str = "simulated";
 pub(crate) const IMPORTED: &str = "import_format";
 /// First line of a rehearsal's vehicle file.
 pub(crate) const REHEARSAL: &str = "# Rehearsal by headrace emulate: ";
-/// Last line of a plan's picture.
+/// Last line of an SVG chart of a plan.
 pub(crate) const PICTURE: &str = "<!-- headrace plan -->\n";
 /// First line of a manual page.
 pub(crate) const MANUAL: &str = ".\\\" Written by headrace man.\n";
-/// Last line of a page with a dive.
+/// Last line of an HTML page of a dive written by `headrace export`.
 pub(crate) const EXPORTED: &str = "<!-- headrace export -->\n";
-/// First line of a table of true values.
+/// First line of the CSV file with a simulation's ground truth.
 pub(crate) const TRUTH: &str = "# true values: ";
 /// Text that every report contains.
 const REPORT: &str = "\"report_version\":";
 
-/// A kind of output. A file of the same kind is overwritten. Other files need `--force`.
+/// A kind of output file. An existing file of the same kind is overwritten. Other files need `--force`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Report,
@@ -49,7 +49,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Reason for which a file of another kind is not overwritten.
+    /// Reason why output of this kind doesn't overwrite a file of another kind.
     fn refusal(self) -> &'static str {
         match self {
             Self::Report => "isn't a report",
@@ -67,7 +67,7 @@ impl Kind {
         }
     }
 
-    /// Whether a file is of this kind.
+    /// Whether an existing file is output of this kind.
     fn is(self, path: &Path) -> bool {
         let logged = |key: &str| {
             let log = DiveLog::open(&[path.to_owned()]);
@@ -114,7 +114,7 @@ fn ends(path: &Path, mark: &str) -> bool {
     end().unwrap_or(false)
 }
 
-/// Checks before the work that a file may be overwritten and can be written. The file isn't changed.
+/// Checks, before the work begins, that a file may be overwritten and can be written. The file isn't changed.
 ///
 /// Errors: the existing file is of another kind and there is no `--force`, or the file can't be written or
 /// created.
@@ -163,29 +163,30 @@ pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(path).map_err(|source| Failure::Unwritable { path: path.to_owned(), source })
 }
 
-/// Files that a command reads, and files that it will write.
+/// Claims of a command: the files that it reads, and those that it will write.
 pub(crate) struct Claims {
     force: bool,
     inputs: Vec<PathBuf>,
     outputs: Vec<Claimed>,
 }
 
-/// An output file.
+/// An output file that a command has claimed.
 struct Claimed {
     /// Option or argument that names the output.
     option: &'static str,
     path: PathBuf,
-    /// Whether the output is a recording, which may also write parts.
+    /// Whether the output is a recording, which may also write files of further parts.
     is_recording: bool,
 }
 
 impl Claims {
-    /// Creates the claims of a command that reads these files.
+    /// Creates the claims of a command that reads the files `inputs` and has no output yet.
     pub(crate) fn reading(inputs: impl IntoIterator<Item = PathBuf>, overwrite: &Overwrite) -> Self {
         Self { force: overwrite.force, inputs: inputs.into_iter().collect(), outputs: Vec::new() }
     }
 
-    /// Checks before the work that a file may be overwritten and can be written. The file isn't changed.
+    /// Checks, before the work begins, that a file may be overwritten and can be written. The file isn't
+    /// changed.
     ///
     /// Errors: the command reads the file or already writes it, the existing file is of another kind and
     /// there is no `--force`, or the file can't be written or created.
@@ -252,7 +253,7 @@ impl Claims {
 }
 
 impl Claimed {
-    /// Whether the output has the name of a part of `recording`.
+    /// Whether the output has the file name that a part of `recording` would have.
     fn is_part_of(&self, recording: &Self) -> bool {
         recording.is_recording && named_part(&self.path).is_some_and(|(of, _)| is_same(&of, &recording.path))
     }
@@ -270,7 +271,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     place(one) == place(other) || number(one).is_some_and(|one| number(other) == Some(one))
 }
 
-/// File to which a path leads. The file may not exist yet.
+/// Canonical path of the file to which a path leads. The file needn't exist.
 fn place(path: &Path) -> PathBuf {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

@@ -43,7 +43,7 @@ use crate::logging::complain;
 use crate::recording_state::RecordingState;
 use crate::report_output::exit_code;
 
-/// Interval at which an interruption is checked while a replay is paused.
+/// Interval at which a paused replay checks for an interruption.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Name of a BlueOS machine.
 const BLUEOS: &str = "blueos.local";
@@ -55,21 +55,21 @@ pub(crate) struct Of<'a> {
     /// Name of the log or scene.
     pub(crate) dive: String,
     pub(crate) recorded_to: Option<String>,
-    /// Second target that the dive is compared with, m.
+    /// Second target for which the page shows verdicts, too, m.
     pub(crate) compared_m: Option<f64>,
     /// UTC of the clock's zero, s, if the clock is that of this machine.
     pub(crate) utc_of_zero_s: Option<f64>,
-    /// First and last time of a log.
+    /// First and last time of the replayed log; `None` in a live dive.
     pub(crate) span: Option<(MonoNs, MonoNs)>,
-    /// Whether the dive can be paused and can jump.
+    /// Whether the dive is a replay that can be paused and can jump to another time.
     pub(crate) is_playback: bool,
     /// Receiver of the operator's commands; `None` in a replay.
     pub(crate) console: Option<ConsolePort>,
-    /// Source or destination of the recordings of voice notes.
+    /// Source from which the audio of voice notes is read, or logs to which it is written.
     pub(crate) voices: VoicesOf,
 }
 
-/// Source or destination of the recordings of voice notes.
+/// Source from which the audio of voice notes is read, or logs to which it is written.
 pub(crate) enum VoicesOf {
     /// Logs of a live dive, to which recordings are written; empty if the dive isn't recorded.
     Dive(Vec<VoicePort>),
@@ -77,7 +77,7 @@ pub(crate) enum VoicesOf {
     Log(Vec<PathBuf>),
 }
 
-/// A served page.
+/// An operator's page that is being served.
 pub(crate) struct Served {
     page: Page,
     span: Option<(MonoNs, MonoNs)>,
@@ -86,7 +86,7 @@ pub(crate) struct Served {
     commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>>,
 }
 
-/// Whether to serve a page: it was requested, or a person watches on a terminal.
+/// Whether to serve a page: true if it was requested, or if a person watches on a terminal.
 pub(crate) fn is_wanted(args: &PageArgs, is_watched: bool) -> bool {
     !args.no_page && (args.page.is_some() || is_watched && std::io::stdout().is_terminal())
 }
@@ -227,10 +227,9 @@ pub(crate) fn site(of: Of<'_>) -> Site {
         mode: of.mode,
         dive: of.dive,
         vehicle: vehicle.name.clone(),
-        target_m: vehicle.target_m,
+        target: vehicle.target,
         compared_m: of.compared_m,
         section_m: vehicle.section_m,
-        confidence_sd: vehicle.coverage.confidence_sd,
         length_m: vehicle.tunnel.length_m,
         profile: vehicle.tunnel.profile.clone(),
         heads,
@@ -280,9 +279,9 @@ fn act(console: Option<ConsolePort>) -> Act {
     })
 }
 
-/// Creates the function that hands recordings of voice notes to all logs, or that finds them in a log.
+/// Creates the function that hands the audio of voice notes to all logs, or that finds it in a log.
 ///
-/// The loop is informed when at least one log has taken a recording.
+/// The loop is informed when at least one log has taken the audio.
 fn voices(of: &Of<'_>) -> Voices {
     match (&of.voices, &of.console) {
         (VoicesOf::Log(files), _) => {
@@ -307,7 +306,8 @@ fn voices(of: &Of<'_>) -> Voices {
     }
 }
 
-/// Creates the function that hands the page's commands to playback, as long as there is one.
+/// Creates the function that hands the page's commands to playback. The function fails if no playback is
+/// running.
 fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
     let commands = Arc::clone(commands);
     Arc::new(move |play| {
@@ -340,7 +340,7 @@ impl Served {
     /// Lets the page control a replay.
     ///
     /// With `stays` the replay remains at the end of the log until `interrupted`. Otherwise the returned
-    /// function ends the control.
+    /// function ends the page's control of the replay.
     pub(crate) fn direct(
         &self,
         to: &Sender<PlaybackCommand>,
@@ -359,7 +359,7 @@ impl Served {
             while !interrupted.load(Ordering::Relaxed) {
                 std::thread::sleep(LOOK_EVERY);
             }
-            // Playback may have ended already.
+            // The command fails if playback has ended already.
             let _ended = sender.send(PlaybackCommand::End);
         });
         None
@@ -394,7 +394,7 @@ pub(crate) fn end_message(report: &Report) -> Value {
         "exit": exit_code(report)})
 }
 
-/// A follower that passes everything to a collector.
+/// A follower that passes all events of the dive to the page's collector.
 pub(crate) fn following(collector: Collector) -> Box<dyn Follower> {
     Box::new(PageFollower { collector, span: None, now: MonoNs(0) })
 }

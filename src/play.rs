@@ -27,19 +27,19 @@ use crate::watch::Watch;
 use keys::Keyboard;
 pub(crate) use keys::{Hand, Key};
 
-/// Computing time between two snapshots. A jump thus takes well under a second, including the time to restore
-/// a snapshot.
+/// Computing time between two snapshots of the loop. A jump thus takes well under a second, including the
+/// time to restore a snapshot.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
 /// Memory for snapshots, bytes. When it is full, every other snapshot is dropped and the interval is doubled.
 const SNAPSHOT_BYTES: usize = 256 << 20;
 
-/// Controllers of playback besides standard input.
+/// Controllers of playback besides standard input, such as the page or a full-screen terminal.
 ///
-/// Each has a sender of commands. Playback continues as long as there is a sender.
+/// Each controller has a sender of commands. Playback continues as long as there is a sender.
 pub(crate) struct Directors {
     /// Whether one of the controllers reads the terminal's keys.
     pub(crate) takes_keys: bool,
-    /// Drops the sender of a controller, unless the controller stays at the end of the log.
+    /// Function that drops a controller's sender at the end of the log; `None` if the controller stays.
     pub(crate) close: Option<Box<dyn Fn()>>,
 }
 
@@ -54,10 +54,10 @@ pub(crate) struct Playing {
 }
 
 impl Playing {
-    /// Plays a dive, and returns the report.
+    /// Plays a recorded dive, and returns its report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
         let Self { from, interactive, pace, commands: (sender, commands), others } = self;
-        // Without commands no jump goes back, so no snapshots are needed.
+        // Without commands playback never jumps back, so no snapshots are needed.
         let interval = if interactive || others.is_some() { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
             let interactive = interactive && !others.as_ref().is_some_and(|others| others.takes_keys);
@@ -108,7 +108,7 @@ struct Screen<'a> {
     watch: &'a mut Watch,
     begun: MonoNs,
     has_keys: bool,
-    /// Releases the other controllers at the end of the log.
+    /// Function that drops the other controllers' senders at the end of the log.
     close: Option<Box<dyn Fn()>>,
 }
 
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unknown_line_is_refused_with_the_list_of_commands() {
+    fn unknown_playback_command_is_refused_with_the_list_of_commands() {
         let command = |line| command(line, MonoNs(5));
         assert_eq!(command(" step 12 "), Ok(PlaybackCommand::Step(12)));
         assert_eq!(command("seek 10s"), Ok(PlaybackCommand::Seek(MonoNs(10_000_000_005))));

@@ -8,7 +8,8 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bound
 use crate::output::{UNREAD_FOR, give_up, put_waiting};
 use crate::terminal;
 
-/// Maximum number of lines that wait. A dive has about one line a second, and a few for each stretch.
+/// Maximum number of lines in the queue for stdout. A dive has about one line a second, and a few for each
+/// stretch.
 const WAITING: usize = 1 << 10;
 
 enum Message {
@@ -17,22 +18,23 @@ enum Message {
     Status(String),
 }
 
-/// Writes lines in order.
+/// Writes lines to stdout in order, on a separate thread.
 pub(crate) struct Printer {
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
     /// Channel that is disconnected when the thread has written all lines.
     done: Receiver<()>,
-    /// Whether lines without room are dropped, instead of waiting.
+    /// Whether lines that find no room in the queue are dropped. Otherwise the caller waits.
     lossy: bool,
     dropped: u64,
 }
 
 impl Printer {
-    /// Starts the thread. A `lossy` printer never waits. It drops and counts lines without room.
+    /// Starts the thread. A `lossy` printer never waits. It drops and counts lines that find no room in the
+    /// queue.
     pub(crate) fn start(lossy: bool) -> Self {
         let (sender, messages) = bounded(WAITING);
-        // If the thread can't be started, all lines are dropped, and the end of the dive reports that.
+        // If the thread can't be started, all lines are dropped, which is reported at the end of the dive.
         let (writing, done) = bounded(0);
         let write = move || {
             print(&messages);
@@ -42,7 +44,7 @@ impl Printer {
         Self { sender: Some(sender), thread, done, lossy, dropped: 0 }
     }
 
-    /// From now on no caller waits for the terminal.
+    /// Makes the printer lossy: from now on no caller waits for the terminal.
     pub(crate) fn drop_rather_than_wait(&mut self) {
         self.lossy = true;
     }

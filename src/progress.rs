@@ -11,9 +11,9 @@ use crate::terminal;
 
 const AFTER: Duration = Duration::from_secs(2);
 const EVERY: Duration = Duration::from_millis(200);
-/// Number of calls between two reads of the clock.
+/// Number of calls of [`Progress::at`] between two reads of the clock.
 const CALLS: u32 = 1000;
-/// Share of the work from which the time left is shown.
+/// Share of the work, 0 to 1, after which the time left is shown.
 const TELLING: f64 = 0.01;
 
 /// Minimum interval between log messages on progress.
@@ -42,7 +42,7 @@ impl Progress {
 
     /// Shows progress if an update is due.
     ///
-    /// `state` is called only then. It returns the work done, as text and as a share.
+    /// `state` is called only if an update is due. It returns the work done, as text and as a share.
     pub(crate) fn at(&mut self, state: impl FnOnce() -> (String, Option<f64>)) {
         self.calls += 1;
         if !self.calls.is_multiple_of(CALLS) {
@@ -130,7 +130,8 @@ impl<W: Write> Write for Writing<W> {
     }
 }
 
-/// Seconds left of work with this share done; `None` if it is too early for an estimate, or the work is done.
+/// Seconds left if this share of the work is done; `None` if it is too early for an estimate, or if the work is
+/// finished.
 fn left_s(elapsed_s: f64, share: f64) -> Option<f64> {
     (TELLING..1.0).contains(&share).then(|| elapsed_s * (1.0 - share) / share)
 }

@@ -2,7 +2,7 @@
 
 use headrace_geometry::time::DurNs;
 
-/// Time since the last sync from which screens show it, and from which it is an alarm.
+/// Age of the last sync to disk from which screens show it, and from which it is an alarm.
 pub(crate) const SHOWN_FROM: DurNs = DurNs(2_000_000_000);
 pub(crate) const ALARM_FROM: DurNs = DurNs(5_000_000_000);
 
@@ -16,7 +16,7 @@ pub(crate) struct RecordingState {
 }
 
 impl RecordingState {
-    /// Text to show, and whether it is an alarm. `None` if all is well.
+    /// Text about failing or unsynced recordings, and whether it is an alarm. `None` if all is well.
     pub(crate) fn words(&self) -> Option<(String, bool)> {
         let unsafe_for = DurNs::from_secs_f64(self.unsafe_s as f64);
         match self.fails {

@@ -38,7 +38,7 @@ impl Recordings {
         Self { all: recorders.into_iter().map(one).collect(), is_live, unsafe_for: DurNs(0) }
     }
 
-    /// Takes the events since the last call. Call this function after every tick.
+    /// Takes the recordings' events since the last call. Call this function after every tick.
     pub(crate) fn news(&mut self) -> Vec<RecordingEvent> {
         let mut news = Vec::new();
         self.unsafe_for = DurNs(0);
@@ -56,7 +56,7 @@ impl Recordings {
         news
     }
 
-    /// State to show.
+    /// State of all recordings together, for the screens.
     pub(crate) fn state(&self) -> RecordingState {
         let fails = self.all.iter().filter_map(|one| one.fails).reduce(|one, other| one | other);
         RecordingState { fails, unsafe_s: self.unsafe_for.0.max(0).unsigned_abs() / 1_000_000_000 }
@@ -67,12 +67,12 @@ impl Recordings {
         self.all.iter().any(|one| one.is_late || one.fails == Some(true))
     }
 
-    /// Ports for traffic on devices' lines outside the loop.
+    /// Handles by which port threads record device traffic that doesn't pass through the loop.
     pub(crate) fn line_ports(&self) -> Vec<LinePort> {
         self.all.iter().map(|one| one.handle.line_port()).collect()
     }
 
-    /// Ports for recordings of voice notes.
+    /// Handles by which other threads add the audio of voice notes to each log.
     pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
         self.all.iter().map(|one| one.handle.voice_port()).collect()
     }
@@ -128,7 +128,7 @@ impl One {
     }
 }
 
-/// Texts on data missing in a recording, and on errors while it was recorded.
+/// Texts about data missing in a recording, and about errors while it was recorded.
 fn unrecorded(written: &Summary) -> Vec<String> {
     let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
     losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
@@ -142,20 +142,20 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses
 }
 
-/// Text on an error of the recording, with times.
+/// Text about an error of the recording, with times.
 fn fault(fault: &RecordingFault) -> String {
     let from = fault.from.map(|from| format!(", after {}", seconds(from)));
     let to = fault.to.map(|to| format!(", before {}", seconds(to)));
     [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
 }
 
-/// Text on data that the recorder has dropped, with times.
+/// Text about data that the recorder has dropped, with times.
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())
 }
 
-/// All recordings of a dive, for traffic on devices' lines that doesn't reach the loop.
+/// All recordings of a dive, as the destination of device traffic that doesn't pass through the loop.
 pub struct InRecordings(pub Vec<LinePort>);
 
 impl LineRecord for InRecordings {
@@ -168,7 +168,7 @@ impl LineRecord for InRecordings {
     }
 }
 
-/// Number of a sensor's source in the log.
+/// Number of a sensor's packet source in the log.
 fn source(sensor: usize) -> u16 {
     u16::try_from(sensor).unwrap_or(u16::MAX)
 }

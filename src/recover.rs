@@ -15,7 +15,7 @@ use crate::output::{deliver, say};
 use crate::outputs::{Claims, Kind};
 use crate::progress::Writing;
 
-/// `headrace recover`.
+/// Runs `headrace recover`.
 pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     // An error here occurs before the output is created.
     let files = files_of(&args.logs)?;
@@ -26,7 +26,7 @@ pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-/// Writes the new log atomically.
+/// Writes the recovered log atomically.
 fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let failed = |source| Failure::Write { path: output.to_owned(), source };
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();

@@ -1,4 +1,4 @@
-//! Report of a finished dive: its entry on the log, its output, and the exit code.
+//! Completes and writes the report of a finished dive, and gives the exit code.
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
         })
     };
     let sha256 = digest(files_digest(&paths));
-    // If the named file is the only one, there are no parts to list.
+    // A log of a single file has no parts to list.
     let named_alone = matches!(files, [(only, _)] if *only == named);
     let parts = files.iter().filter(|_| !named_alone).map(|(path, messages)| PartReport {
         path: path.display().to_string(),

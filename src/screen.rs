@@ -21,7 +21,7 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
-    /// Detects the capabilities of stdout.
+    /// Detects whether stdout can overwrite lines and show colours.
     pub(crate) fn of_stdout() -> Self {
         let Terminal { overwrites, colour } = terminal::of(&std::io::stdout());
         Self { overwrites, colours: colour }

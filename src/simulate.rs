@@ -24,7 +24,7 @@ use crate::outputs::{Claims, Kind, SIMULATED, TRUTH};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
-/// `headrace simulate`.
+/// Runs `headrace simulate`.
 pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let text = files::read(&args.scene)?;
     let name = args.scene.display().to_string();
@@ -140,7 +140,7 @@ impl Truth {
         Ok(())
     }
 
-    /// Moves the file into place. Returns its number of rows.
+    /// Moves the finished CSV file to its path, and returns its number of rows.
     fn finish(self) -> Result<u64, Failure> {
         let Self { path, file, rows, .. } = self;
         file.complete().map_err(|source| Failure::Write { path, source })?;
@@ -181,7 +181,7 @@ impl Truth {
         text
     }
 
-    /// Columns of a sounding's row.
+    /// Columns of the ground truth for a sounding.
     fn sounding(&self, sounding: &SoundingTruth) -> String {
         let mut text = format!(",{}", sounding.measured.angle_rad.to_degrees());
         match &sounding.wall {

@@ -1,7 +1,7 @@
 //! Summary of a report as text.
 
 use headrace_config::plain::one_line;
-use headrace_coverage::Unsure;
+use headrace_coverage::{Unsure, Verdict};
 use headrace_monitor::live_messages::UnsureStretch;
 use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, of_it_text, unsure_text};
@@ -12,12 +12,12 @@ use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport
 
 use crate::terminal;
 
-/// Duration of a sensor's silence from which it is reported, s.
+/// Shortest period without data from a sensor that is reported, s.
 const SILENT_S: f64 = 5.0;
-/// Maximum number of notes listed.
+/// Maximum number of notes that the summary lists.
 const MOST_NOTES: usize = 20;
 
-/// Summary as text. Its lines have at most `columns` columns, if given.
+/// Summary of a report as text. Its lines have at most `columns` columns, if given.
 pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
@@ -118,7 +118,7 @@ fn spacing(report: &Report) -> String {
     )
 }
 
-/// Text on a sensor's packets that were dropped before they were read.
+/// Text about a sensor's packets that were dropped before they were read.
 fn dropped(source: &SourceReport) -> Option<String> {
     let count = source.line.as_ref()?.dropped_packets;
     let line = format!(
@@ -128,7 +128,7 @@ fn dropped(source: &SourceReport) -> Option<String> {
     (count > 0).then_some(line)
 }
 
-/// Text on a sensor's silence, if it deserves a line.
+/// Text about a sensor's periods without data, if they deserve a line.
 ///
 /// If a dive has no position or no sonar, another line names the silent sensors.
 fn silence(source: &SourceReport) -> Option<String> {
@@ -143,7 +143,7 @@ fn silence(source: &SourceReport) -> Option<String> {
     }
 }
 
-/// Text on the reason for which a dive is no inspection.
+/// Text that explains why a dive is no inspection.
 fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     let lacking = why
         .missing
@@ -167,7 +167,8 @@ fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     }
 }
 
-/// Text on a dive that was never within the tunnel. It has the places of the heads, and settings to check.
+/// Text about a dive that was never within the tunnel. It states the positions of the heads, and the settings
+/// to check.
 fn outside_text(dive: &DiveReport) -> String {
     let place = match (dive.from_m, dive.to_m) {
         (Some(from_m), Some(to_m)) => format!(" from {} to {}", station(from_m), station(to_m)),
@@ -176,20 +177,20 @@ fn outside_text(dive: &DiveReport) -> String {
     format!("NO VERDICTS: the heads were outside the tunnel{place}: check the tether's zero and length_m")
 }
 
-/// Metres by verdict, as text.
+/// Metres of tunnel by verdict, as text.
 fn metres(judged: &OtherTargetReport) -> String {
     let OtherTargetReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
     metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 
-/// Lines on the missed and the unsure stretches, in the order of chainage: place, problem and action.
+/// Lines about the missed and the unsure stretches, in the order of chainage: place, problem and action.
 fn stretches(report: &Report) -> Vec<String> {
     let fails = |run: &&RunReport| {
         let mut within =
             report.sections.iter().filter(|section| (run.start_m..run.end_m).contains(&section.start_m));
-        within.any(|section| section.verdict == "fail")
+        within.any(|section| section.verdict == Verdict::Fail)
     };
-    // Sections that were passed again and have no verdict are listed as unsure.
+    // Missed sections that were passed again and then have no verdict are listed as unsure, not here.
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);
     let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
     all.extend(report.no_verdict.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
@@ -204,7 +205,7 @@ fn missed(run: &RunReport, report: &Report) -> String {
     let back = report.go_back.iter().find(|back| back.run == run.id);
     let action = back
         .map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps, heads)));
-    // The rest of the run passes, or no longer has a verdict.
+    // The remaining sections of the run pass, or no longer have a verdict.
     let of_it = of_it_text(run.failed_m, run.end_m - run.start_m);
     format!(
         "  {} to {}{of_it}  MISSED: {cause}, holes up to {:.2} m{}",
@@ -248,7 +249,7 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Lines on the effect of smoothing: metres by verdict, and a line per run of neighbouring sections with the
+/// Lines about the effect of smoothing: metres by verdict, and a line per run of neighbouring sections with the
 /// same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
@@ -278,7 +279,8 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
     lines
 }
 
-/// Whether a change continues the run that ends at `end_m`. If so, `end_m` is moved to the new end.
+/// Whether a section's change of verdict continues the run of changes that ends at `end_m`. If so, `end_m` is
+/// moved to the new end.
 fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
     let verdicts = |change: &ChangeReport| [change.before, change.after].map(verdict_text);
     let goes_on = (next.start_m - *end_m).abs() < 1e-6 && verdicts(first) == verdicts(next);

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Capabilities of an output stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Terminal {
-    /// Whether colours are shown: on a terminal with neither `NO_COLOR` nor `TERM=dumb`.
+    /// Whether colours are shown: true on a terminal, unless `NO_COLOR` or `TERM=dumb` is set.
     pub(crate) colour: bool,
-    /// Whether lines can overwrite themselves: on a terminal without `TERM=dumb`.
+    /// Whether a printed line can be overwritten: true on a terminal, unless `TERM=dumb` is set.
     pub(crate) overwrites: bool,
 }
 
@@ -39,7 +39,8 @@ pub(crate) fn has_unicode() -> bool {
     locale.contains("utf-8") || locale.contains("utf8")
 }
 
-/// Capabilities for these variables. An empty `NO_COLOR` doesn't count. Source: no-color.org.
+/// Capabilities of an output, from the values of `NO_COLOR` and `TERM`. An empty `NO_COLOR` doesn't count.
+/// Source: no-color.org.
 fn able(is_terminal: bool, no_color: Option<&str>, term: Option<&str>) -> Terminal {
     let overwrites = is_terminal && term != Some("dumb");
     Terminal { colour: overwrites && no_color.is_none_or(str::is_empty), overwrites }
@@ -50,7 +51,7 @@ pub(crate) fn be_quiet(quiet: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
 }
 
-/// Whether only results and errors are shown.
+/// Whether only results and errors are shown, as with `-q`.
 pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
@@ -60,16 +61,16 @@ pub(crate) fn be_verbose(verbose: bool) {
     VERBOSE.store(verbose, Ordering::Relaxed);
 }
 
-/// Whether the summary has the figures for engineers.
+/// Whether the summary has the figures for engineers, as with `-v`.
 pub(crate) fn is_verbose() -> bool {
     VERBOSE.load(Ordering::Relaxed)
 }
 
-/// Whether the last line is transient, such as progress or the dive's state. It has no line end, and a log message of
-/// any thread clears it first.
+/// Whether the terminal's last line is transient, such as progress or the dive's state. It has no line end,
+/// and a log message of any thread clears it first.
 static TRANSIENT: AtomicBool = AtomicBool::new(false);
 
-/// Sets the flag, after a transient line was written.
+/// Sets the flag that the last line is transient.
 pub(crate) fn note_transient() {
     TRANSIENT.store(true, Ordering::Relaxed);
 }

@@ -21,14 +21,14 @@ pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
 /// Vehicle file that an option names, if any, and the files that it was read from.
 #[derive(Default)]
 pub(crate) struct Given {
-    /// Text and vehicle.
+    /// Parsed vehicle, and the text of its file.
     vehicle: Option<(String, VehicleConfig)>,
     /// The vehicle file itself, and the files that it refers to.
     pub(crate) files: Vec<PathBuf>,
 }
 
 impl Given {
-    /// Reads the file.
+    /// Reads the vehicle file that an option names, if any.
     pub(crate) fn read(path: Option<&Path>) -> Result<Self, Failure> {
         let Some(path) = path else { return Ok(Self::default()) };
         let (text, vehicle) = read(path)?;
@@ -46,7 +46,7 @@ impl Given {
     }
 }
 
-/// Paths of a vehicle file and of the files that it refers to.
+/// Paths of a vehicle file and of the other files that it refers to.
 pub(crate) fn files(path: &Path, vehicle: &VehicleConfig) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let others = vehicle.attachments.iter().map(|(name, _)| folder.join(name));
@@ -68,7 +68,7 @@ pub(crate) fn attached(
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;
-    // The path is built as if the log were a folder.
+    // The path in messages is built as if the log were a folder with the attached file.
     let vehicle =
         parse(&format!("{}/{VEHICLE_FILE}", log.display()), &text, &files::attached(&info.attachments))?;
     Ok((text, vehicle))

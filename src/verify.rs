@@ -19,7 +19,7 @@ use crate::output::{deliver, say};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
-/// `headrace verify`.
+/// Runs `headrace verify`.
 pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let given = Given::read(args.vehicle.as_deref())?;
@@ -124,7 +124,7 @@ fn text(difference: &Difference, sources: &[SourceInfo]) -> String {
     }
 }
 
-/// A value as text. For a float, the text includes its bits.
+/// A result's value as text. For a float, the text includes its bits.
 fn value(word: WordKind, bits: u64) -> String {
     match word {
         WordKind::Integer => format!("{bits}"),

@@ -19,22 +19,22 @@ use crate::recording_state::RecordingState;
 use crate::screen::Screen;
 use crate::terminal;
 
-/// Interval of state lines if they can't be overwritten.
+/// Interval between state lines if they can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
-/// Interval of state lines that are overwritten, and of states in JSON.
+/// Interval between state lines that are overwritten, and between states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
 /// Minimum time after the last state line before a changed lamp colour gives a new line. It applies if lines
 /// can't be overwritten.
 const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
-/// Display of a dive.
+/// Kind of output during a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Show {
-    /// No display.
+    /// No output during the dive.
     Nothing,
-    /// Display only by followers, which use the terminal.
+    /// No lines, because a follower uses the terminal.
     Followers,
-    /// Lines for people.
+    /// Lines of text for people.
     Lines,
     /// JSON objects, one per line.
     JsonLines,
@@ -46,7 +46,7 @@ pub(crate) struct Watch {
     show: Show,
     screen: Screen,
     printer: Option<Printer>,
-    /// Source of the live messages, for the lines and all followers.
+    /// Generator of the live messages for lines and followers.
     teller: LiveMessages,
     /// Time and condition of the last state shown.
     shown: Option<(MonoNs, Condition)>,
@@ -54,7 +54,7 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Creates the output for a kind of display. With `-q` there is none.
+    /// Creates the output of this kind. With `-q` nothing is shown.
     pub(crate) fn new(show: Show) -> Self {
         let quiet = terminal::is_quiet() && show != Show::Followers;
         let show = if quiet { Show::Nothing } else { show };
@@ -74,7 +74,7 @@ impl Watch {
         Self::new(Show::Nothing)
     }
 
-    /// Adds a follower.
+    /// Adds a follower of the dive.
     #[must_use]
     pub(crate) fn followed_by(mut self, follower: Box<dyn Follower>) -> Self {
         self.followers.push(follower);
@@ -96,8 +96,8 @@ impl Watch {
         self.print(one_line(line).into_owned());
     }
 
-    /// Makes the output lossy, for a dive that can't wait. Lines for which the terminal has no room are
-    /// dropped.
+    /// Makes the output lossy, for a live dive, which can't wait. Lines for which the terminal has no room
+    /// are dropped.
     pub(crate) fn live(mut self) -> Self {
         if let Some(printer) = &mut self.printer {
             printer.drop_rather_than_wait();
@@ -105,7 +105,7 @@ impl Watch {
         self
     }
 
-    /// Shows a result of the loop.
+    /// Passes a result of the loop to followers, and writes its live messages.
     pub(crate) fn notice(&mut self, notice: &Notice, dive: &Loop) {
         if !self.has_readers() {
             return;
@@ -124,7 +124,7 @@ impl Watch {
         self.tell(at, &told, dive);
     }
 
-    /// Shows the state. Called after every tick, even without packets.
+    /// Shows the dive's state. Called after every tick, even without packets.
     pub(crate) fn tick(&mut self, dive: &Loop) {
         if !self.has_readers() {
             return;
@@ -202,7 +202,7 @@ impl Watch {
         self.followers.iter_mut().for_each(|follower| follower.recorded(state));
     }
 
-    /// Shows that a replay has paused, jumped or ended at `time` after its beginning.
+    /// Shows that a replay has paused, jumped or ended, `time` after the log's beginning.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         self.shown = None;
         self.teller.stopped(dive.now());
@@ -242,7 +242,7 @@ impl Watch {
         }
     }
 
-    /// Whether a line or a follower shows messages.
+    /// Whether live messages are shown, as lines or by a follower.
     fn has_readers(&self) -> bool {
         self.printer.is_some() || !self.followers.is_empty()
     }
@@ -290,7 +290,7 @@ impl Watch {
         }
     }
 
-    /// Writes messages, if there are lines.
+    /// Writes live messages as lines, unless the output has no lines.
     fn tell(&mut self, at: MonoNs, told: &[LiveMessage], dive: &Loop) {
         if self.printer.is_none() {
             return;
@@ -336,10 +336,10 @@ impl Watch {
     }
 }
 
-/// Time shown for a state. It is the time of the update, so that the same dive gives the same lines wherever
-/// ticks end.
+/// Time shown with a state of the dive. It is the time of the state's last update, so that the same dive
+/// gives the same lines wherever ticks end.
 ///
-/// If there are no updates, it is the time of the tick.
+/// If there are no updates, the time of the tick is shown.
 fn as_of(state: &LiveState) -> MonoNs {
     state.at.filter(|_| !state.is_old()).unwrap_or(state.now)
 }

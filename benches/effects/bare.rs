@@ -14,7 +14,7 @@ use headrace_tests::scenes;
 
 use crate::workload::{SPEED_MPS, best, text};
 
-/// The number of rounds is large, because the result is a small difference of two times.
+/// Number of timed rounds. It is large, because the result is a small difference of two times.
 const ROUNDS: usize = 40;
 const LENGTH_M: f64 = 80.0;
 const SECOND: DurNs = DurNs(1_000_000_000);
@@ -91,7 +91,7 @@ struct ByHand<'a> {
     heads: Vec<(Head, Mount)>,
     end: MonoNs,
     due: Vec<Sounding>,
-    /// For each message: time, source, and start and end of its bytes.
+    /// Messages that haven't been sent yet: time, source, and start and end in `bytes`.
     waiting: Vec<(MonoNs, usize, usize, usize)>,
     bytes: Vec<u8>,
 }
@@ -115,7 +115,7 @@ impl<'a> ByHand<'a> {
         }
     }
 
-    /// Casts every ray and sends its message.
+    /// Casts every ray and sends the message of its return.
     fn dive(&mut self) -> Said {
         let mut said = Said::default();
         let mut until = START;

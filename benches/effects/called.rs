@@ -7,12 +7,12 @@ use headrace_tests::scenes;
 
 use crate::workload::{EFFECTS, best, simulate};
 
-/// Shipped scenes with a duration of some minutes each.
+/// Shipped scenes on which the bench runs; each dive lasts some minutes.
 const SCENES: [&str; 6] = ["rehearsal", "steel", "collapse", "drop-outs", "leak-current", "small-pipe"];
-/// Effects for broken devices; no scene uses all of them.
+/// Effects that simulate broken devices. The bench never adds them to a scene.
 const FAULTS: [&str; 2] = ["stuck_range", "device_faults"];
 
-/// Prints a row for each scene.
+/// Prints a row of the table for each scene.
 pub(crate) fn called() {
     println!(
         "\n| scene | effects called | ms for a second of diving | all that it can have | ms | saved |\n|---|---|---|---|---|---|"
@@ -49,7 +49,7 @@ fn against_all(name: &str, text: &str, called: &Scene) {
         // supports.
         let keys: Vec<&str> = keys.lines().filter(|line| !line.starts_with("sensors")).collect();
         let with = format!("{all}\n[effects.{name}]\n{}\n", keys.join("\n"));
-        // Effects that are impossible in this scene are left out.
+        // The bench leaves out effects that are impossible in this scene.
         if Scene::parse(
             headrace_config::Document::new("scene.toml", &with),
             &headrace_devices::KINDS,

@@ -35,7 +35,7 @@ fn main() {
     }
 }
 
-/// VITA 2 with four heads over `length_m` metres.
+/// Scene in which VITA 2 with four heads moves over `length_m` metres.
 fn scene(length_m: f64, layout: &str, rest: &str) -> Scene {
     scenes::scene(&text(length_m, layout, rest))
 }
@@ -46,7 +46,7 @@ fn named(effects: &[(&str, &str)]) -> String {
     tables.concat()
 }
 
-/// Cost of each effect, alone and among all the others.
+/// Measures the CPU time of each simulator effect, alone and in addition to all other effects.
 fn cost() {
     const LENGTH_M: f64 = 12.0;
     let returns = 4.0 * 50.0 * LENGTH_M / SPEED_MPS;

@@ -7,7 +7,7 @@ pub(crate) const ROUNDS: usize = 9;
 
 pub(crate) const SPEED_MPS: f64 = 0.11;
 
-/// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
+/// Every simulator effect with some parameters. Heads sweep sectors, so that `sector_end_slowing` applies.
 pub(crate) const EFFECTS: [(&str, &str); 38] = [
     ("mount_error", "angles_sd_deg = 0.2"),
     ("start_phase_error", "max_deg = 20"),
@@ -56,13 +56,13 @@ pub(crate) fn text(length_m: f64, layout: &str, rest: &str) -> String {
     )
 }
 
-/// Time to simulate a scene, s.
+/// CPU time to simulate a scene, s.
 pub(crate) fn simulate(scene: &Scene) -> f64 {
     let mut simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
     timed(|| while simulation.advance() {}).1
 }
 
-/// Minimum time of each piece of work. Each round runs every piece once.
+/// Minimum time that each piece of work takes over all rounds, s. Each round runs every piece once.
 pub(crate) fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut least = [f64::INFINITY; N];
     for _ in 0..rounds {

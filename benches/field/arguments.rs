@@ -1,4 +1,4 @@
-//! Arguments of the bench.
+//! Command-line arguments of the bench.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use headrace_tests::field_table::PLACES;
 
 /// Number of dives of a cell, in a full run and with `--quick`. A full run takes a quarter of an hour on two cores.
 const SEEDS: [u64; 2] = [2, 1];
-/// Vehicles of a run with `--quick`. Such a run also leaves out the middle place.
+/// Vehicles that dive in a run with `--quick`. Such a run also leaves out the place in the middle of the tunnel.
 const QUICK_VEHICLES: [&str; 2] = ["vita1", "vita2-4"];
 
-/// Arguments of a run.
+/// Command-line arguments of a run.
 pub(crate) struct Arguments {
     /// Whether to run only a tenth of the dives.
     pub(crate) quick: bool,
@@ -17,19 +17,19 @@ pub(crate) struct Arguments {
     pub(crate) cell: Vec<String>,
     /// Number of dives of each cell.
     pub(crate) seeds: u64,
-    /// The first seed.
+    /// Seed of the first dive of each cell.
     pub(crate) from_seed: u64,
     /// Length of each dive, m; it overrides the vehicle's own length.
     pub(crate) metres: Option<f64>,
-    /// Output file of the figures.
+    /// JSON file to which the figures of all cells are written.
     pub(crate) json: PathBuf,
-    /// Output file of the table in which each row combines all places.
+    /// CSV file for the table in which each row combines all places; `None` writes no table.
     pub(crate) csv: Option<PathBuf>,
 }
 
 impl Arguments {
     pub(crate) fn of(words: impl Iterator<Item = String>) -> Self {
-        // Cargo adds `--bench`.
+        // Cargo adds the argument `--bench`, which is ignored.
         let mut words = words.filter(|word| word != "--bench");
         let mut seeds = None;
         let json = headrace_tests::root().join("target/field.json");
@@ -63,7 +63,7 @@ impl Arguments {
         all
     }
 
-    /// Whether a cell of this name is selected.
+    /// Whether the arguments select the cell with this name.
     pub(crate) fn wants(&self, name: &[&str]) -> bool {
         let named = |(part, wanted): (&&str, &String)| wanted == "*" || wanted == part;
         let skipped = self.quick && self.cell.is_empty() && {
@@ -73,7 +73,7 @@ impl Arguments {
         !skipped && name.iter().zip(&self.cell).all(named)
     }
 
-    /// Selected place, if the table doesn't contain it.
+    /// Place that the arguments select by its chainage, if the table doesn't contain it.
     pub(crate) fn own_place_m(&self) -> Option<(&str, f64)> {
         let place = self.cell.get(2).filter(|place| PLACES.iter().all(|(known, _)| known != place))?;
         Some((place, place.parse().ok()?))

@@ -1,4 +1,4 @@
-//! Goals for the figures of a cell.
+//! Goals for the figures of a cell of the field table.
 
 use headrace_tests::field_table::{Cell, Condition, Driven, Figures, KINDS_OF_SOURCES};
 
@@ -8,11 +8,11 @@ struct Bounds {
     false_fails: f64,
     cannot_say: f64,
     passed: f64,
-    /// Smallest ratio of advised speed to the speed of Eq. 16 with the vehicle's own occlusion.
+    /// Smallest ratio of the advised speed to the largest speed by the paper's Eq. 16 with the vehicle's own occlusion.
     advice: f64,
 }
 
-/// Goals that a cell misses.
+/// Goals that a cell of the field table misses.
 #[derive(Debug, Clone, Copy, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each goal")]
 pub(crate) struct Missed {
@@ -89,7 +89,7 @@ impl Missed {
     }
 }
 
-/// Ratio of the advised speed to the speed of Eq. 16.
+/// Ratio of the advised speed to the largest speed by the paper's Eq. 16.
 pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
     figures.advised_mps() / cell.vehicle.edge_mps
 }

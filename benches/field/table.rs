@@ -1,4 +1,4 @@
-//! Cells of the table, and their figures as CSV and JSON.
+//! Cells of the field table, and their figures as CSV and JSON.
 
 use headrace_tests::field_table::{
     CONDITIONS, Cell, Condition, DRIVEN, FalsePass, Figures, KINDS_OF_SOURCES, PLACES, Place, VEHICLES,
@@ -15,14 +15,14 @@ const LET_IN_M: f64 = 60.0;
 /// Largest chainage of a place near the portal, m. Such places have the same chainage in all tunnels.
 const NEAR_M: f64 = 100.0;
 
-/// A cell with its name.
+/// A cell of the field table with its name.
 pub(crate) struct NamedCell {
-    /// Vehicle, condition, place, speed.
+    /// Name of the cell: vehicle, condition, place and speed.
     pub(crate) name: [String; 4],
     pub(crate) cell: Cell,
 }
 
-/// The selected cells.
+/// The cells that the arguments select.
 pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
     let mut cells = Vec::new();
     for vehicle in VEHICLES {
@@ -46,8 +46,8 @@ pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
     cells
 }
 
-/// Whether the table contains a cell. Wrong settings and broken devices run at one place only, unless selected. A
-/// single vehicle drives from the launch to the far place.
+/// Whether the table contains a cell. Cells with wrong settings or broken devices run at one place only, unless
+/// they are selected. A single vehicle drives from the launch to the far place.
 fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, speed]: [&str; 2]) -> bool {
     if place == DRIVEN_THERE.0 {
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";
@@ -63,7 +63,7 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if !told_apart && arguments.cell.is_empty() {
         return false;
     }
-    // Results under these conditions don't depend on the place.
+    // Results under the conditions `Told` and `AsBuilt` don't depend on the place.
     if [Condition::Told, Condition::AsBuilt].contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);
     }

@@ -21,7 +21,7 @@ const INNOVATION: f64 = 1e-3;
 pub(crate) fn factors<const N: usize>() -> Factors<N> {
     let mut factors = Factors::independent([0.01; N]);
     for k in 0..N {
-        // Distinct directions: no two are parallel.
+        // The columns have distinct directions: no two are parallel.
         let a = core::array::from_fn(|i| ((3 * i + 5 * k + i * k) % 11) as f64 / 11.0 - 0.4);
         factors.add(0.001, a, N);
     }

@@ -86,7 +86,7 @@ impl Dive {
         Self { context, window: Window::default(), sources, running, readings }
     }
 
-    /// Runs one epoch: ten inertial samples, and six readings with eight measured numbers.
+    /// Runs one epoch of the filter: ten inertial samples, and six readings with eight measured numbers.
     pub(crate) fn epoch(&mut self) {
         let began = self.running.at;
         let mut at = began;
@@ -126,12 +126,12 @@ impl Dive {
         self.running.factors
     }
 
-    /// The clones, and the time of the last epoch, which bounds the time of the last clone.
+    /// The filter's clones of past poses, and the time of the last epoch, which bounds the time of the last clone.
     pub(crate) fn clones(&self) -> (ErrorClones, MonoNs) {
         (self.running.clones.clone(), self.running.at)
     }
 
-    /// The motion over an epoch.
+    /// Motion of the vehicle over one epoch of the filter.
     pub(crate) fn leg(&self) -> Leg {
         let (mut state, mut leg) = (self.running.state, Leg::default());
         for _ in 0..SAMPLES {

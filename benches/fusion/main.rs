@@ -62,7 +62,7 @@ fn cpu() -> String {
 /// Work to be timed; the argument is its number of repetitions.
 type Work<'a> = &'a mut dyn FnMut(u32);
 
-/// Best time of each piece of work for one run, ns.
+/// Shortest time that one run of each piece of work takes, ns.
 fn in_turns<const K: usize>(mut works: [Work<'_>; K]) -> [f64; K] {
     let mut best = [f64::INFINITY; K];
     for _ in 0..ROUNDS {
@@ -75,7 +75,7 @@ fn in_turns<const K: usize>(mut works: [Work<'_>; K]) -> [f64; K] {
     best
 }
 
-/// Runs `step` on a copy of `start`, which is renewed at intervals.
+/// Runs `step` repeatedly on a copy of `start`. After every [`RUNS_FROM_ONE_START`] runs, a new copy is made.
 fn from_a_start<T: Clone>(start: &T, runs: u32, mut step: impl FnMut(&mut T)) {
     for _ in 0..runs / RUNS_FROM_ONE_START {
         let mut value = start.clone();
@@ -90,7 +90,7 @@ fn row(what: &str, ns: f64, yardstick: &str, yardstick_ns: f64) {
     println!("| {what} | {ns:.0} ns | {yardstick}: {yardstick_ns:.0} ns | {:.2} |", ns / yardstick_ns);
 }
 
-/// Measures the prediction from one epoch to the next, without measurements.
+/// Measures the filter's prediction from one epoch to the next, without sensor readings.
 fn predict() {
     let dive = Dive::under_way();
     let settings = Settings::default();
@@ -117,7 +117,7 @@ fn predict() {
     row(what, ours, "`kfilter`, 20 states", kfilter);
 }
 
-/// Three measurement rows of an attitude, for factors of `N` states.
+/// The three measurement rows of an attitude reading, for a filter with `N` states.
 fn attitude_rows<const N: usize>() -> [([f64; N], f64, f64); 3] {
     let dive = Dive::under_way();
     let rows = measure::attitude(&dive.state(), dive.state().attitude, 0.03, 0.02);
@@ -136,7 +136,7 @@ fn three_rows<const N: usize>(factors: &mut Factors<N>, rows: &[([f64; N], f64, 
     black_box(errors);
 }
 
-/// Measures the update of estimate and covariance by three measured numbers.
+/// Measures the filter's update of estimate and covariance by three measured numbers.
 fn update() {
     let (rows20, rows18, rows15) = (attitude_rows::<20>(), attitude_rows::<18>(), attitude_rows::<15>());
     let (factors20, factors18, factors15) =
@@ -158,7 +158,7 @@ fn update() {
     row("3-row update, 20 states", ours20, "`kfilter`, 20 states, not Joseph's form", kfilter);
 }
 
-/// Measures an inertial sample of a turning vehicle.
+/// Measures the time to process an inertial sample of a turning vehicle.
 fn sample() {
     let state = Dive::under_way().state();
     let (rate, force) = ([0.02, -0.01, 0.03], [0.3, 0.2, 9.8]);
@@ -186,7 +186,7 @@ fn sample() {
     );
 }
 
-/// Measures a complete epoch of the filter.
+/// Measures the time of a complete epoch of the filter.
 fn epoch() {
     let mut dive = Dive::under_way();
     let ((mut clones, mut at), factors) = (dive.clones(), dive.factors());

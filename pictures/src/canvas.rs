@@ -9,7 +9,7 @@ use svg::{Document, Node};
 use super::look::{BLACK, Colour, DIM, Look, Marker, WHITE};
 use super::polyline::{self, Px};
 
-/// Default width and height of a sheet, pixels.
+/// Default width and height of a drawing sheet, pixels.
 pub const SIZE_PX: [u32; 2] = [900, 560];
 /// Mean letter width of plain and of bold text, as a share of the font size. Both are slightly too large for common
 /// fonts.
@@ -67,7 +67,7 @@ fn fitting(text: &str, room_px: f64, letters: Letters) -> String {
     text.chars().take(usize::try_from(most).unwrap_or(0)).chain(['…']).collect()
 }
 
-/// Formats pixels to a tenth, which is finer than the eye resolves.
+/// Formats a number of pixels to a tenth, which is finer than the eye resolves.
 fn number(px: f64) -> String {
     let text = format!("{:.1}", px + 0.0);
     let text = text.strip_suffix(".0").unwrap_or(&text);

@@ -8,7 +8,7 @@ use super::polyline::{Frame, Px};
 
 /// Minimum ratio of end to start for logarithmic ticks. An axis with a smaller ratio gets linear ticks.
 const SHORT: f64 = 4.0;
-/// Length of a tick mark, pixels.
+/// Length of an axis's tick mark, pixels.
 const TICK_PX: f64 = 4.0;
 const NUMBER: Letters = Letters { colour: BLACK, ..SMALL };
 
@@ -154,7 +154,7 @@ pub struct Chart<'c> {
 }
 
 impl<'c> Chart<'c> {
-    /// Draws the grid and both axes.
+    /// Draws the chart's grid and both axes.
     pub fn new(canvas: &'c Canvas, frame: Frame, x: &Axis, y: &Axis) -> Self {
         let chart = Self { canvas, frame, x: x.scale, y: y.scale };
         let Frame { left, top, right, bottom } = frame;
@@ -190,7 +190,7 @@ impl<'c> Chart<'c> {
         chart
     }
 
-    /// Position of a point on the sheet.
+    /// Position on the sheet of a point given in the chart's values.
     pub fn px(&self, [x, y]: [f64; 2]) -> Px {
         let Frame { left, top, right, bottom } = self.frame;
         [left + self.x.share(x) * (right - left), bottom - self.y.share(y) * (bottom - top)]
@@ -206,19 +206,19 @@ impl<'c> Chart<'c> {
         pieces
     }
 
-    /// Draws a horizontal line.
+    /// Draws a horizontal line across the chart at a value of y.
     pub fn across(&self, y: f64, look: &Look) {
         self.line(&[[self.x.from, y], [self.x.to, y]], look);
     }
 
-    /// Draws a vertical line.
+    /// Draws a vertical line across the chart at a value of x.
     pub fn upright(&self, x: f64, look: &Look) {
         self.line(&[[x, self.y.from], [x, self.y.to]], look);
     }
 
     /// Draws an ellipse about a position on the sheet, clipped to the frame.
     pub fn ellipse(&self, centre: Px, radii: Px, ground: Colour, look: &Look) {
-        /// Number of corners of the approximating polygon.
+        /// Number of corners of the polygon that approximates the ellipse.
         const CORNERS: u32 = 72;
         let Frame { left, top, right, bottom } = self.frame;
         let corner = |k: u32| {

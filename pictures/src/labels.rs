@@ -17,7 +17,7 @@ pub struct Label {
     pub place: Px,
     /// Text of the label, line by line.
     pub lines: Vec<String>,
-    /// Look of the curve, which gives the label its colour.
+    /// Look of the curve, whose colour the label has.
     pub look: Look,
     /// Whether the label is bold.
     pub bold: bool,

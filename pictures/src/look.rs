@@ -8,7 +8,7 @@ pub struct Colour(pub u8, pub u8, pub u8);
 pub const BLACK: Colour = Colour(0, 0, 0);
 /// Colour of small text, axes and targets.
 pub const DIM: Colour = Colour(85, 85, 85);
-/// Colour of label leaders and hidden parts.
+/// Colour of lines that connect labels with curves, and of parts that the vehicle occludes.
 pub const PALE: Colour = Colour(150, 150, 150);
 /// Colour of the sheet.
 pub const WHITE: Colour = Colour(255, 255, 255);
@@ -92,7 +92,7 @@ pub const T_Y: Look = look(VERMILION, &[3.0, 3.0], Marker::Triangle);
 pub const TARGET: Look = Look { width_px: 1.6, ..look(DIM, &[6.0, 5.0], Marker::Circle) };
 /// Look of the value that the user requested.
 pub const ASKED: Look = Look { width_px: 1.4, ..look(DIM, &[2.0, 4.0], Marker::Circle) };
-/// Look of parts that the vehicle occludes.
+/// Look of parts of a curve that the vehicle occludes.
 pub const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker::Circle) };
 /// Look of grid lines.
 pub const GRID: Look = Look { width_px: 0.8, ..look(Colour(228, 228, 228), &[], Marker::Circle) };

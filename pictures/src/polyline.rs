@@ -22,7 +22,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Returns the pieces of a line that lie within the frame.
+    /// Returns the pieces of a polyline that lie within the frame.
     pub fn cut(&self, line: &[Px]) -> Vec<Vec<Px>> {
         let mut pieces: Vec<Vec<Px>> = Vec::new();
         for pair in line.windows(2) {

@@ -11,21 +11,21 @@ use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
 use headrace_sensor::device::SensorInfo;
 
-/// Longest part of a log held in memory, s.
+/// Longest part of a log of which the readings are held in memory, s.
 const MOST_S: f64 = 1200.0;
 
 /// Time window of the readings, in seconds from the log's first message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Window {
-    /// Start.
+    /// Start of the window.
     pub(crate) from_s: f64,
-    /// End; `None` for the longest window that can be held.
+    /// End of the window; `None` for the longest window whose readings fit into memory.
     pub(crate) to_s: Option<f64>,
-    /// Beginning and end of the vehicle's time at the surface.
+    /// Beginning and end of the time that the vehicle spent at the water's surface.
     pub(crate) at_surface_s: Option<[f64; 2]>,
 }
 
-/// Reason for which readings can't be collected.
+/// Reason why readings can't be collected.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum CollectError {
@@ -37,7 +37,7 @@ pub(crate) enum CollectError {
         /// End of the window, s.
         to_s: f64,
     },
-    /// The window is too long to be held.
+    /// The window is too long for its readings to be held in memory.
     #[error("calibrating from {from_s} to {to_s} s: at most {MOST_S} s are allowed; give a shorter window")]
     TooLong {
         /// Beginning of the window, s.
@@ -48,7 +48,7 @@ pub(crate) enum CollectError {
     /// The log can't be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The loop can't be driven.
+    /// The replay loop that decodes the log can't be run.
     #[error(transparent)]
     Drive(#[from] DriveError),
 }
@@ -62,9 +62,9 @@ pub(crate) struct Collected {
     pub(crate) from: MonoNs,
     /// End of the requested part.
     pub(crate) to: MonoNs,
-    /// Beginning and end of the vehicle's time at the surface.
+    /// Beginning and end of the time that the vehicle spent at the water's surface.
     pub(crate) at_surface: Option<[MonoNs; 2]>,
-    /// Sensors of the vehicle file, by source.
+    /// Sensors of the vehicle file, by number of their packet source.
     pub(crate) sensors: Vec<SensorInfo>,
     /// Readings of the requested part and of the time at the surface, in order.
     pub(crate) events: Vec<Event>,
@@ -76,13 +76,13 @@ impl Collected {
         self.events.iter().filter(|event| event.received >= self.from && event.received < self.to)
     }
 
-    /// Time in seconds from the log's first message.
+    /// Converts a time on the log's clock to seconds from the log's first message.
     pub(crate) fn seconds(&self, at: MonoNs) -> f64 {
         at.since(self.first).as_secs_f64()
     }
 }
 
-/// A packet source truncated at `end`.
+/// A packet source that ends at the time `end`.
 struct Until<'a> {
     feed: &'a mut dyn PacketSource,
     end: MonoNs,
@@ -139,20 +139,20 @@ pub(crate) fn collect(
 /// Readings of a log, with the sensors and settings that the vehicle file describes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Material<'a> {
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub(crate) profile: &'a Profile,
     /// Water and location, from the vehicle file.
     pub(crate) site: Site,
-    /// Noise settings of the sensors.
+    /// Measurement noise of the sensors.
     pub(crate) settings: Settings,
-    /// The sensors of the vehicle file, by source.
+    /// The sensors of the vehicle file, by number of their packet source.
     pub(crate) sensors: &'a [SensorInfo],
     /// All readings, in the order in which the loop processed them.
     pub(crate) events: &'a [Event],
 }
 
 impl<'a> Material<'a> {
-    /// Readings received from `from` until before `to`, each with its sensor.
+    /// Readings received from `from` (inclusive) to `to` (exclusive), each with its sensor.
     pub(crate) fn during(
         &self,
         from: MonoNs,

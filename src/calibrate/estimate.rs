@@ -3,9 +3,9 @@
 /// An estimated value, in the unit of its quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Estimate {
-    /// Value.
+    /// Estimated value.
     pub(crate) value: f64,
-    /// Standard deviation.
+    /// Standard deviation of the estimated value.
     pub(crate) sd: f64,
 }
 
@@ -18,14 +18,14 @@ impl Estimate {
     }
 }
 
-/// Reason for which a quantity can't be estimated from this log.
+/// Reason why a quantity can't be estimated from this log.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum NotEstimated {
     /// There are no readings of a required kind.
     #[error("the log has no readings of {what}")]
     Missing {
-        /// The missing kind.
+        /// Kind of readings that the log lacks.
         what: &'static str,
     },
     /// The vehicle never stood still for long enough.
@@ -34,15 +34,15 @@ pub(crate) enum NotEstimated {
          as stationary); it was never stationary for {least_s} s"
     )]
     Moved {
-        /// Quantity that varied.
+        /// Quantity that varied most while the vehicle should have been at rest.
         what: &'static str,
-        /// Variation of the quantity.
+        /// Largest minus smallest value of the quantity.
         span: f64,
-        /// Unit of the quantity.
+        /// Unit of the variation and of its limit.
         unit: &'static str,
-        /// Largest variation that counts as still.
+        /// Largest variation of the quantity at which the vehicle counts as stationary.
         limit: f64,
-        /// Required duration at rest, s.
+        /// Minimum time for which the vehicle must stand still, s.
         least_s: usize,
     },
     /// A head has seen too little of the wall.
@@ -53,7 +53,7 @@ pub(crate) enum NotEstimated {
     LittleWall {
         /// Sector that the head has seen, degrees.
         seen_deg: f64,
-        /// Sector required, degrees.
+        /// Minimum sector that the head must have seen, degrees.
         least_deg: f64,
     },
     /// The cross-section looks the same at every angle of the head about its axis.
@@ -62,7 +62,7 @@ pub(crate) enum NotEstimated {
          roll): the angle would have a standard deviation of {sd_deg:.1} degrees"
     )]
     Round {
-        /// Standard deviation that would remain, degrees.
+        /// Standard deviation that an estimate of the head's angle would have, degrees.
         sd_deg: f64,
     },
     /// The offset of a single head can't be distinguished from the vehicle's position.
@@ -71,47 +71,48 @@ pub(crate) enum NotEstimated {
          are needed"
     )]
     OneHead,
-    /// An offset has the same effect as another unknown.
+    /// A head's offset can't be distinguished from a change of the vehicle's position or heading.
     #[error(
         "an offset can't be distinguished from another position or heading of the vehicle: it would have a \
          standard deviation of {sd_m:.3} m"
     )]
     LikePlace {
-        /// Standard deviation that would remain, m.
+        /// Standard deviation that an estimate of the head's offset would have, m.
         sd_m: f64,
     },
-    /// The opposite sense of rotation fits nearly as well.
+    /// The head's returns fit the opposite sense of rotation nearly as well.
     #[error(
         "the opposite sense of rotation fits nearly as well (difference {margin:.0}, needed {needed:.0}): the \
          section is symmetric; put the vehicle well to one side of the centre, within range of the \
          echosounders"
     )]
     Mirror {
-        /// Difference in cost of the opposite sense, in squared standard deviations.
+        /// Cost of the fit with the opposite sense minus the cost of the best fit, in squared standard
+        /// deviations.
         margin: f64,
-        /// Difference required for a decision.
+        /// Minimum difference in cost at which the sense of rotation is decided.
         needed: f64,
     },
-    /// The wall doesn't match the profile.
+    /// The heads' ranges to the wall contradict the design profile.
     #[error(
         "the returns contradict the profile: half of them deviate by more than {median_m:.2} m; at most \
          {most_m} m is allowed"
     )]
     Contradicted {
-        /// Median of the absolute residuals, m.
+        /// Median of the absolute range residuals, m.
         median_m: f64,
-        /// Largest median allowed, m.
+        /// Largest allowed median of the absolute range residuals, m.
         most_m: f64,
     },
-    /// The pressure varied too much for one level.
+    /// The depth sensor's pressure varied too much for a vehicle that stays at the surface.
     #[error(
         "the vehicle wasn't at the surface all the time: the pressure varied by {span_pa:.0} Pa; at most \
          {most_pa} is allowed"
     )]
     NotAtSurface {
-        /// Variation of the pressure, Pa.
+        /// Largest minus smallest pressure, Pa.
         span_pa: f64,
-        /// Largest variation allowed, Pa.
+        /// Largest allowed variation of the pressure, Pa.
         most_pa: f64,
     },
     /// The pressure is too high for air: the sensor was under water.
@@ -120,17 +121,17 @@ pub(crate) enum NotEstimated {
          to {most_pa}"
     )]
     UnderWater {
-        /// The pressure, Pa.
+        /// Mean pressure measured, Pa.
         mean_pa: f64,
-        /// Lowest air pressure, Pa.
+        /// Lowest plausible air pressure, Pa.
         least_pa: f64,
-        /// Highest air pressure, Pa.
+        /// Highest plausible air pressure, Pa.
         most_pa: f64,
     },
     /// The chainage of the vehicle is unknown.
     #[error("the vehicle's chainage is unknown; give --chainage METRES, counted from the portal")]
     NoChainage,
-    /// The time at the surface is unknown.
+    /// The times between which the vehicle was at the surface are unknown.
     #[error("the time at the surface is unknown; give --at-surface FROM..TO")]
     NoSurface,
     /// The likelihood doesn't depend on a shift of the source's timestamps.
@@ -138,13 +139,13 @@ pub(crate) enum NotEstimated {
         "the vehicle hardly turned or moved: the latency would have a standard deviation of {sd_ms:.0} ms"
     )]
     Flat {
-        /// Standard deviation that would remain, ms.
+        /// Standard deviation that an estimate of the latency would have, ms.
         sd_ms: f64,
     },
     /// The likelihood has no maximum within the search range.
     #[error("no best fit was found within {reach_ms:.0} ms of the file's latency")]
     NoBest {
-        /// Search range to either side, ms.
+        /// Largest shift tried, earlier or later than the file's latency, ms.
         reach_ms: f64,
     },
     /// The likelihood still increases at the late end of the search range.
@@ -153,9 +154,9 @@ pub(crate) enum NotEstimated {
          calibrate again"
     )]
     Later {
-        /// Search range to either side, ms.
+        /// Largest shift tried, earlier or later than the file's latency, ms.
         reach_ms: f64,
-        /// Latency at the end of the range, ms.
+        /// Latency at the late end of the search range, ms.
         then_ms: f64,
     },
     /// The device must answer each request before the next one, so it can't be as late as the best fit.
@@ -169,29 +170,29 @@ pub(crate) enum NotEstimated {
         /// Time between the device's answers, ms.
         every_ms: f64,
     },
-    /// Ranges don't fit the size of the design profile.
+    /// All ranges together are too long or too short for the size of the design profile.
     #[error(
         "ranges differ from this profile by {long_pct:+.1} %: set sound_speed_mps = {sound_mps:.0} \
          in the vehicle file, or correct the profile there; other values can be estimated only afterwards"
     )]
     Scaled {
-        /// Relative excess of the ranges, %.
+        /// Relative excess of the ranges over those expected from the profile, %.
         long_pct: f64,
         /// Speed of sound at which the ranges have no excess, m/s.
         sound_mps: f64,
     },
-    /// The filter disagrees with the measurements.
+    /// The navigation filter rejects too many measurements.
     #[error(
         "the filter rejects {gated:.0} % of all measurements; at most {most:.0} % are allowed: \
          mounts, beams or the profile of the vehicle file are wrong, or the vehicle turned too fast"
     )]
     Disagrees {
-        /// Share of measurements that the filter gates, %.
+        /// Share of measurements that the navigation filter rejects at its gate, %.
         gated: f64,
-        /// Largest share allowed, %.
+        /// Largest allowed share of rejected measurements, %.
         most: f64,
     },
-    /// The filter never had an estimate.
+    /// The navigation filter never had an estimate of the vehicle's position.
     #[error(
         "the filter couldn't follow the vehicle; it needs an inertial unit's attitude and ranges to the wall"
     )]

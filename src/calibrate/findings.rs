@@ -12,7 +12,7 @@ use crate::calibrate::still::longest;
 use crate::calibrate::timing::{Lag, lags};
 use crate::calibrate::zero::{self, Zero};
 
-/// Result of each estimator, or the reason for which it has none.
+/// Result of each estimator, or the reason why it could estimate nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Findings {
     /// Mounts of the heads.
@@ -23,7 +23,7 @@ pub(crate) struct Findings {
     pub(crate) level: Result<Zero, NotEstimated>,
     /// Chainage at which each cable counter reads zero, m, and the vehicle file's value.
     pub(crate) tethers: Result<Vec<(Zero, f64)>, NotEstimated>,
-    /// Time offsets.
+    /// Latency error of each sensor's timestamps.
     pub(crate) lags: Result<Vec<Lag>, NotEstimated>,
 }
 

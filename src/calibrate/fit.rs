@@ -27,16 +27,16 @@ pub(crate) const OWN: usize = 3;
 
 /// Standard deviation of the prior of the vehicle's position, m: the vehicle may be anywhere in the section.
 const PLACE_SD_M: f64 = 10.0;
-/// Standard deviation of the roll and pitch errors of a unit at rest, radians.
+/// Standard deviation of the roll and pitch errors of an inertial unit at rest, radians.
 ///
 /// Source: data sheets of MEMS units, static accuracy 0.2 degrees.
 const TILT_SD_RAD: f64 = 0.2 * DEGREE;
-/// Relative standard deviation of a speed of sound from tables. It corresponds to 1 degree of water
-/// temperature.
+/// Relative standard deviation of a speed of sound from tables. It corresponds to an error of 1 degree in the
+/// water temperature.
 const SCALE_SD: f64 = 0.003;
 /// Standard deviation of the angle of a mount in a vehicle file, radians.
 ///
-/// It and [`OFFSET_SD_M`] allow for a tape measure on a round hull, and for the bracket of a head.
+/// This value and [`OFFSET_SD_M`] allow for a tape measure on a round hull, and for the bracket of a head.
 pub(crate) const ANGLE_SD_RAD: f64 = 10.0 * DEGREE;
 /// Standard deviation of the position of a mount in a vehicle file, m. See [`ANGLE_SD_RAD`].
 pub(crate) const OFFSET_SD_M: f64 = 0.05;
@@ -44,48 +44,48 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
 /// Minimum standard deviation assumed for returns, m. Walls are at least this rough.
 const LEAST_SCALE_M: f64 = 0.01;
-/// Residuals are weighted less beyond `HUBER` scales, and rejected beyond `TUKEY` scales. Source: the usual
-/// constants of Huber and Tukey.
+/// Residuals beyond `HUBER` robust standard deviations get less weight. Residuals beyond `TUKEY` robust
+/// standard deviations are rejected. Source: the usual constants of Huber and Tukey.
 const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
-/// Number of rounds with Huber's weights. Tukey's weights need a good start.
+/// Number of rounds with Huber's weights before those with Tukey's, which need a good start.
 const HUBER_ROUNDS: usize = 3;
-/// Largest cost of one piece of wall, in squared standard deviations. The second value is the cost of a piece
-/// that the beam grazes or misses.
+/// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. The second
+/// value is the cost of a piece that the beam grazes or misses.
 const MOST_COST: f64 = 9.0;
 const MISSED_COST: f64 = 4.5;
-/// Largest cost of an echosounder's range, in squared standard deviations.
+/// Upper limit of the cost that an echosounder's range adds to the fit, in squared standard deviations.
 ///
-/// It is high, because there are few echosounders and they distinguish the sides.
+/// The limit is high, because echosounders are few and only they distinguish left from right.
 const MOST_ECHO_COST: f64 = 100.0;
-/// Largest rotation of a head in one round, radians.
+/// Largest change of a head's angle in one round of the fit, radians.
 const MOST_STEP_RAD: f64 = 0.2;
 
-/// Input of a fit.
+/// Input of a fit of the vehicle's position and the heads' mounts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Problem<'a> {
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub(crate) profile: &'a Profile,
-    /// Noise settings of the sonars.
+    /// Measurement noise of the sonars.
     pub(crate) settings: &'a Settings,
-    /// The heads. Their number is limited by the number of unknowns.
+    /// Returns of each head. The number of heads is limited by the number of unknowns.
     pub(crate) heads: &'a [HeadScan],
-    /// Echosounders.
+    /// Ranges of each echosounder.
     pub(crate) echoes: &'a [EchoScan],
     /// Attitude of the vehicle at the time of the fit.
     pub(crate) attitude: Rot<Tunnel, Body>,
-    /// Whether each head turns the opposite way to the file.
+    /// Whether each head is taken to turn opposite to the sense in the vehicle file.
     pub(crate) mirrored: &'a [bool],
-    /// Every `stride`-th return is used.
+    /// Only every `stride`-th return is used.
     pub(crate) stride: usize,
 }
 
 /// Result of a fit. The unknowns are [`COMMON`], followed by [`OWN`] for each head.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fit<const N: usize> {
-    /// Unknowns.
+    /// Values of the unknowns.
     pub(crate) x: [f64; N],
-    /// Covariance of the unknowns.
+    /// Covariance of the unknowns, as factors.
     pub(crate) factors: Factors<N>,
     /// Sum of the misfits of returns, echoes and prior, in squared standard deviations.
     pub(crate) cost: f64,
@@ -93,15 +93,15 @@ pub(crate) struct Fit<const N: usize> {
     pub(crate) scale_m: f64,
 }
 
-/// Residual of a return.
+/// Range residual of a head's return.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual<const N: usize> {
-    /// Number of the return's head.
+    /// Index of the head that received the return.
     pub(crate) head: usize,
     /// Weight of the return within its piece of wall.
     pub(crate) share: f64,
-    /// Derivatives, and the measured minus the expected range, m; `None` if the beam grazes or misses the
-    /// wall.
+    /// Derivatives of the expected range, and the measured minus the expected range, m; `None` if the beam
+    /// grazes or misses the wall.
     pub(crate) row: Option<([f64; N], f64)>,
 }
 
@@ -120,7 +120,7 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
     }
 }
 
-/// Mount of a head after a change of its angle about its axis and of its position. It may also turn the
+/// Mount of a head after a change of its angle about its axis and of its position. The head may also turn the
 /// opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
@@ -137,7 +137,7 @@ fn about_x(angle_rad: f64) -> Rot<Sensor, Sensor> {
 }
 
 impl Problem<'_> {
-    /// Standard deviations of the prior.
+    /// Standard deviations of the prior of all unknowns.
     fn known<const N: usize>(&self) -> [f64; N] {
         let yaw = self.settings.heading.reach;
         let common = [PLACE_SD_M, PLACE_SD_M, TILT_SD_RAD, TILT_SD_RAD, yaw, SCALE_SD];
@@ -146,11 +146,12 @@ impl Problem<'_> {
         core::array::from_fn(|_| all.next().unwrap_or(1.0))
     }
 
-    /// Fits from `start`, in at most `rounds` rounds.
+    /// Fits the unknowns, beginning with `start`, in at most `rounds` rounds.
     pub(crate) fn fit<const N: usize>(&self, start: [f64; N], rounds: usize) -> Fit<N> {
         let known = self.known::<N>();
         let mut prior = start;
-        // The prior of the position is the start of the fit. All other priors are the file's values.
+        // The prior of the position is centred on the start of the fit. All other priors are centred on the
+        // file's values.
         prior.iter_mut().skip(2).for_each(|slot| *slot = 0.0);
         let mut x = start;
         let mut factors = Factors::independent(known.map(|sd| sd * sd));
@@ -203,7 +204,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Residuals of all returns.
+    /// Range residuals of all heads' returns.
     pub(crate) fn residuals<const N: usize>(&self, x: &[f64; N]) -> Vec<Residual<N>> {
         let mut all = Vec::new();
         for (head, scan) in self.heads.iter().enumerate() {
@@ -248,7 +249,8 @@ impl Problem<'_> {
         Some((h, row.residual))
     }
 
-    /// Range update as in the navigation filter, with derivatives by the unknowns common to all sonars.
+    /// Range update as in the navigation filter, with its derivatives with respect to the unknowns common to
+    /// all sonars.
     fn common_row<const N: usize>(
         &self,
         x: &[f64; N],
@@ -329,7 +331,7 @@ fn weight(off: f64, is_near: bool) -> f64 {
     }
 }
 
-/// Whether a residual of this size, m, is an outlier at this scale, m.
+/// Whether a residual of this size, m, is an outlier if the robust standard deviation is `scale_m`.
 pub(crate) fn is_outlier(off_m: f64, scale_m: f64) -> bool {
     off_m.abs() > TUKEY * scale_m
 }

@@ -13,12 +13,12 @@ use headrace_sampling::head::MAX_HEADS;
 
 /// Minimum sector that a head must have seen to be calibrated, degrees.
 const LEAST_SEEN_DEG: f64 = 120.0;
-/// Largest median residual, m. With a larger one the wall doesn't match the profile.
+/// Largest allowed median of the absolute range residuals, m. Above it, the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
-/// An unknown counts as estimated if at most this share of the file's uncertainty remains.
+/// An estimate is reported only if its standard deviation is at most this share of that of the file's value.
 const TOLD: f64 = 0.3;
-/// Cost difference at which the sense of rotation is clear, in squared standard deviations. Chance exceeds it
-/// once in 10,000 times.
+/// Minimum cost difference between the two senses of rotation for a decision, in squared standard deviations.
+/// Chance alone exceeds it once in 10,000 times.
 const CLEAR: f64 = 15.0;
 /// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The
 /// last value is the number of rounds of every other fit.
@@ -30,19 +30,19 @@ const ROUNDS: usize = 12;
 /// Estimates for one head, compared with the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Head {
-    /// Number of the head's source.
+    /// Number of the head's packet source.
     pub(crate) source: usize,
-    /// Mount in the vehicle file.
+    /// Mount of the head in the vehicle file.
     pub(crate) filed: Mount,
     /// Estimated mount; the file's mount if there is no estimate.
     pub(crate) found: Mount,
     /// Sector from which the head received returns, degrees.
     pub(crate) seen_deg: f64,
-    /// Number of returns used.
+    /// Number of the head's returns used in the fit.
     pub(crate) used: usize,
     /// Number of returns rejected as outliers, or because they grazed the wall.
     pub(crate) rejected: usize,
-    /// Root mean square residual of the returns used, m.
+    /// Root mean square of the range residuals of the returns used, m.
     pub(crate) rms_m: f64,
     /// Angle to be added to the head's angle about its axis, radians, in the estimated sense of rotation.
     pub(crate) angle_rad: Result<Estimate, NotEstimated>,
@@ -55,24 +55,24 @@ pub(crate) struct Head {
     pub(crate) is_mirrored: Result<bool, NotEstimated>,
 }
 
-/// All heads, and the vehicle's position.
+/// Estimates for all heads, and the vehicle's position.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Heads {
-    /// Time at rest.
+    /// Period in which the vehicle stood still.
     pub(crate) still: Still,
     /// y and z of the vehicle body's origin, m.
     pub(crate) place_m: [Estimate; 2],
     /// Relative excess of the ranges over those expected from the profile.
     pub(crate) scale: Estimate,
-    /// Median of the absolute residuals, m.
+    /// Median of the absolute range residuals, m.
     pub(crate) median_m: f64,
-    /// The heads, by source.
+    /// The heads' estimates, by number of packet source.
     pub(crate) heads: Vec<Head>,
 }
 
 /// Calibrates the heads from the longest time at rest.
 ///
-/// Errors: there is no such time, or the wall doesn't match the profile.
+/// Errors: the vehicle never stands still for long enough, or the wall doesn't match the profile.
 pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
     let still = longest(material)?;
     let scan = gather(material, &still)?;
@@ -245,7 +245,7 @@ fn joint<const N: usize>(
     problem(material, scan, &scan.heads, mirrored, 1).fit(start, ROUNDS)
 }
 
-/// Heads that turn the opposite way to the file, and how much worse the alternatives fit.
+/// Heads that turn the opposite way to the file, and the extra cost of each head's other sense of rotation.
 struct Senses {
     mirrored: Vec<bool>,
     margins: Vec<f64>,
@@ -256,7 +256,7 @@ impl Senses {
     /// file's.
     ///
     /// In a symmetric section, there is a second solution: the vehicle is on the other side, and all heads
-    /// turn the opposite way. It is tried, too.
+    /// turn the opposite way. This second solution is tried, too.
     fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
         let count = scan.heads.len();
         let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;

@@ -15,7 +15,7 @@ use headrace_sensor::reading::Reading;
 
 /// Angle of one piece of wall, radians.
 ///
-/// All returns from it share the same roughness, so together they count as one.
+/// All returns from one piece share the same roughness, so together they count as one return.
 pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
 const SECTORS: usize = 120;
 /// Maximum number of returns used per piece of wall. Further returns add no information.
@@ -34,27 +34,27 @@ pub(crate) struct Return {
     pub(crate) share: f64,
 }
 
-/// All returns of a head.
+/// All returns of a head while the vehicle stands still.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct HeadScan {
-    /// Number of the head's source.
+    /// Number of the head's packet source.
     pub(crate) source: usize,
-    /// Mount in the vehicle file.
+    /// Mount of the head in the vehicle file.
     pub(crate) mount: Mount,
     /// Returns of the head.
     pub(crate) returns: Vec<Return>,
 }
 
-/// Range of an echosounder.
+/// Range of an echosounder while the vehicle stands still.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EchoScan {
-    /// Mount in the vehicle file.
+    /// Mount of the echosounder in the vehicle file.
     pub(crate) mount: Mount,
     /// Median of the echosounder's ranges, at the site's speed of sound, m.
     pub(crate) range_m: f64,
 }
 
-/// Ranges at rest; see the module's description.
+/// Ranges of all sonars while the vehicle stands still.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scan {
     /// Attitude of the vehicle in the middle of the time at rest.
@@ -66,7 +66,7 @@ pub(crate) struct Scan {
 }
 
 impl HeadScan {
-    /// Sector of the head's turn in which it has seen wall, radians.
+    /// Total angle of the sectors in which the head has seen wall, radians.
     pub(crate) fn seen_rad(&self) -> f64 {
         let mut seen = [false; SECTORS];
         for one in &self.returns {
@@ -77,7 +77,7 @@ impl HeadScan {
         seen.iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
     }
 
-    /// Drops redundant returns, and weights the rest.
+    /// Drops returns beyond the limit per piece of wall, and weights the rest.
     fn thin(&mut self) {
         let mut counts = [0_usize; SECTORS];
         for one in &self.returns {
@@ -125,7 +125,7 @@ pub(crate) fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Not
     Ok(Scan { attitude, heads, echoes: echoes(material, still) })
 }
 
-/// Attitudes of the vehicle, by time.
+/// Attitudes of the vehicle with their times, in order of time.
 fn attitudes(material: &Material<'_>, still: &Still) -> Vec<(MonoNs, Rot<Tunnel, Body>)> {
     let attitude = |(event, sensor): (&Event, &SensorInfo)| match (sensor.kind, event.reading) {
         (SensorKind::Imu, Reading::Attitude(level)) => {

@@ -1,4 +1,4 @@
-//! Finds the time for which the vehicle stood still, second by second.
+//! Finds the longest period in which the vehicle stood still, in steps of one second.
 //!
 //! Attitude, cable, depth and echosounders show whether it moved.
 
@@ -13,14 +13,15 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Level, Reading};
 
-/// Length of a bin. Each bin gives one median, so noise and outliers don't count as motion.
+/// Length of a time bin. A source's readings in a bin give one median, so noise and outliers don't count as
+/// motion.
 const BIN: DurNs = DurNs(1_000_000_000);
 /// Minimum length of a time at rest, and the longest part of it that is used, in bins. A longer part adds no
 /// information.
 const LEAST: usize = 3;
 const MOST: usize = 120;
 
-/// Quantity that shows motion.
+/// Measured quantity by which motion of the vehicle is detected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sign {
     Cable,
@@ -52,16 +53,16 @@ impl Sign {
 /// A part of a log in which the vehicle stood still and its heads detected the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Still {
-    /// First receive time.
+    /// Receive time at which the period begins.
     pub(crate) from: MonoNs,
-    /// Time before which the last reading was received.
+    /// End of the period, exclusive. All readings were received before this time.
     pub(crate) to: MonoNs,
 }
 
-/// Values of one source, by bin.
+/// Values of one source, by time bin.
 type Raw = (Sign, Vec<Vec<f64>>);
 
-/// Medians of these values.
+/// Medians of one source's values, by time bin.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,
@@ -109,7 +110,7 @@ fn bins_long(bins: usize) -> DurNs {
     DurNs(BIN.0.saturating_mul(i64::try_from(bins).unwrap_or(i64::MAX)))
 }
 
-/// Number of bins, from this one on, in which nothing moves and the wall is detected.
+/// Number of consecutive bins, beginning with bin `from`, in which nothing moves and the wall is detected.
 fn length_from(from: usize, channels: &[Channel], heard: &[bool]) -> usize {
     let mut spans: Vec<Option<(f64, f64)>> = vec![None; channels.len()];
     let mut length = 0;

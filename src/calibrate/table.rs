@@ -13,21 +13,21 @@ use crate::calibrate::zero::Zero;
 /// It is three times the error of tabulated speeds of sound.
 const MOST_SCALE: f64 = 0.01;
 
-/// A value in the unit of its row.
+/// Value of a quantity in the vehicle file and as estimated, in the quantity's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Value {
-    /// A number.
+    /// A quantity that is a number.
     Number {
-        /// Value in the file.
+        /// Value in the vehicle file.
         file: f64,
-        /// Estimate.
+        /// Estimated value.
         found: Estimate,
     },
     /// Direction in which a head faces.
     Facing {
-        /// Value in the file.
+        /// Direction in the vehicle file.
         file: &'static str,
-        /// Estimate.
+        /// Estimated direction.
         found: &'static str,
     },
 }
@@ -37,13 +37,13 @@ pub(crate) enum Value {
 pub(crate) struct Found {
     /// Id of the sensor, or table of the vehicle file.
     pub(crate) of: String,
-    /// Quantity.
+    /// Name of the quantity.
     pub(crate) what: &'static str,
-    /// Unit; empty if there is none.
+    /// Unit of the quantity; empty if it has none.
     pub(crate) unit: &'static str,
     /// Number of decimals to print.
     pub(crate) decimals: usize,
-    /// Value in the file, and estimate.
+    /// Value in the vehicle file, and the estimate.
     pub(crate) value: Value,
 }
 
@@ -52,9 +52,9 @@ pub(crate) struct Found {
 pub(crate) struct Open {
     /// Id of the sensor, or table of the vehicle file.
     pub(crate) of: String,
-    /// Quantity.
+    /// Name of the quantity.
     pub(crate) what: &'static str,
-    /// Reason.
+    /// Reason why the log doesn't determine the quantity.
     pub(crate) why: NotEstimated,
 }
 
@@ -70,7 +70,7 @@ pub(crate) struct Table {
 }
 
 impl Found {
-    /// Whether the vehicle file should be changed.
+    /// Whether the estimate differs so much that the vehicle file should be changed.
     pub(crate) fn differs(&self) -> bool {
         match self.value {
             Value::Number { file, found } => found.differs_from(file),
@@ -122,7 +122,8 @@ impl Table {
         self.open.push(Open { of: of.to_owned(), what, why });
     }
 
-    /// Adds a number, or the reason for which there is none. Returns whether the file should be changed.
+    /// Adds a row with an estimated number, or the reason why there is none. Returns whether the file should
+    /// be changed.
     fn number(
         &mut self,
         of: &str,

@@ -12,21 +12,21 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorKind;
 
-/// Search range of time offsets to either side, and the step of the search, s.
+/// Largest time offset tried in either direction, and the step of the coarse search, s.
 const REACH_S: f64 = 0.2;
 const COARSE_S: f64 = 0.1;
-/// Allowed steps around the best offset, s.
+/// Limits of the step between the offsets tried around the best one, s.
 ///
-/// A step is at most two standard deviations, unless the curve is nearly flat or rough.
+/// Within these limits, the step is two standard deviations of the best offset.
 const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
 /// Gain in likelihood above which a source is corrected before the others are examined. It corresponds to
 /// five standard deviations.
 const CLEAR: f64 = 25.0;
-/// Largest standard deviation of an offset to be reported, s.
+/// Largest standard deviation at which a time offset is reported, s.
 const TOLD_S: f64 = 0.03;
-/// Tolerance for a latency that seems negative, s.
+/// Amount by which a latency may seem negative before it counts as an inconsistency, s.
 const EARLY_S: f64 = 0.01;
-/// Largest share of gated measurements at which the filter still follows the vehicle.
+/// Largest share of measurements rejected at the gate at which the filter still follows the vehicle.
 const MOST_GATED: f64 = 0.2;
 /// Minimum number of readings of a source, and the longest part of a log that is used. The beginning of a log
 /// is enough.
@@ -36,9 +36,9 @@ const MOST: DurNs = DurNs(600_000_000_000);
 /// Delay of a source's values beyond the latency in the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lag {
-    /// Source.
+    /// Number of the packet source.
     pub(crate) source: usize,
-    /// Offset to be added to the latency, s.
+    /// Offset to be added to the latency in the vehicle file, s.
     pub(crate) offset_s: Result<Estimate, NotEstimated>,
 }
 
@@ -104,8 +104,8 @@ pub(crate) fn lags(
 
 /// Widens all standard deviations if a source seems early by several of its standard deviations.
 ///
-/// No source is early. The cause is then something other than a time offset, such as a beam narrower than
-/// assumed, or a mount.
+/// No source can really be early. The cause is then something other than a time offset, such as a beam narrower
+/// than assumed, or a mount.
 fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
     let early = |lag: &Lag| {
         let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
@@ -122,7 +122,7 @@ fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
 struct Curve {
     /// Most likely shift, s.
     best_s: f64,
-    /// Standard deviation, s.
+    /// Standard deviation of the most likely shift, s.
     sd_s: f64,
     /// Gain in likelihood at the best shift, in the unit of
     /// [`headrace_fusion::filter::sources::Consistency::surprise`].
@@ -134,9 +134,9 @@ struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
-    /// Whether the likelihood of each source was clearly best at the late end of the search range.
+    /// Whether each source's likelihood was clearly largest at the late end of the search range.
     later: Vec<bool>,
-    /// Share of measurements gated in the last run.
+    /// Share of measurements that the filter rejected at its gate in the last run.
     gated: f64,
     progress: &'b mut dyn FnMut(),
 }
@@ -175,7 +175,8 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.later.get(source).copied().unwrap_or(false)
     }
 
-    /// The offset, unless the device would then answer after its next request.
+    /// Returns the time offset. It is an error if with this offset the device would answer a request only
+    /// after the next one.
     fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, NotEstimated> {
         let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));

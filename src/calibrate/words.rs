@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use crate::cli::Calibrate;
 use crate::output::append;
 
-/// The results as text.
+/// The results of a calibration as text.
 pub(super) fn text(
     args: &Calibrate,
     vehicle: &VehicleConfig,
@@ -99,7 +99,7 @@ fn toml(table: &Table) -> String {
     text
 }
 
-/// The results as JSON.
+/// The results of a calibration as JSON.
 pub(super) fn json(
     args: &Calibrate,
     vehicle: &VehicleConfig,

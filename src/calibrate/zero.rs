@@ -16,18 +16,19 @@ use headrace_sensor::reading::Reading;
 /// Largest variation of pressure at the surface: 5 cm of water.
 const MOST_SPAN_PA: f64 = 500.0;
 
-/// Estimated zero of one source.
+/// Estimated zero of one depth sensor or cable counter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Zero {
-    /// Source.
+    /// Number of the packet source.
     pub(crate) source: usize,
-    /// Estimated value.
+    /// Estimated zero, in the unit of the quantity.
     pub(crate) found: Estimate,
-    /// Number of readings used.
+    /// Number of readings used for the estimate.
     pub(crate) readings: usize,
 }
 
-/// Pressure at the surface, Pa: mean of the first depth sensor from `from` until before `to`.
+/// Pressure at the surface, Pa: mean of the first depth sensor's readings from `from` (inclusive) to `to`
+/// (exclusive).
 ///
 /// The standard deviation is that of one reading, since waves and drift don't average out.
 ///

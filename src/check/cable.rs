@@ -8,22 +8,23 @@ use serde_json::{Value, json};
 
 /// Accuracy of the cable's chainage, for a vehicle with a counter and the filter.
 pub(super) struct Cable {
-    /// Smallest change of the chainage, m; `None` if each reading has its own step.
+    /// Step of the counter, m; `None` if each reading states its own step.
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],
-    /// Speed, m/s, standard deviation of a hole at this speed, and largest hole that passes, m.
+    /// A speed, m/s, followed by the standard deviation of a hole's diameter and the largest measured hole
+    /// that passes at this speed, m.
     ///
-    /// The speed is the planned one, or else the largest one.
+    /// The speed is the planned one, or without a plan the largest that meets the target.
     at_speed: Option<[f64; 3]>,
-    /// Keys that the vehicle file doesn't have.
+    /// Keys about the cable that the vehicle file doesn't set.
     missing: Vec<String>,
 }
 
 impl Cable {
-    /// Cable accuracy. `v_max_mps` is the largest speed, m/s.
+    /// Computes the cable's accuracy. `v_max_mps` is the largest speed that meets the target, m/s.
     ///
-    /// `None` without a counter or without the filter.
+    /// Returns `None` for a vehicle without a cable counter or without the navigation filter.
     pub(super) fn of(
         vehicle: &VehicleConfig,
         text: &str,
@@ -35,14 +36,14 @@ impl Cable {
         let planned_mps = Some(vehicle.planned_speed_mps).filter(|planned| *planned > 0.0);
         let at_speed = errors.zip(planned_mps.or(v_max_mps)).map(|(errors, speed_mps)| {
             // Time between the passes on either side of a hole of the target's size.
-            let sd_m = errors.pass_error_m(vehicle.target_m / speed_mps);
-            [speed_mps, sd_m, (vehicle.target_m - errors.confidence_sd * sd_m).max(0.0)]
+            let sd_m = errors.pass_error_m(vehicle.target.max_hole_m / speed_mps);
+            [speed_mps, sd_m, (vehicle.target.max_hole_m - vehicle.target.error_m(sd_m)).max(0.0)]
         });
         let slack = [settings.slack.reach, settings.slack.time_s];
         Some(Self { step_m, slack, at_speed, missing: missing(vehicle, text) })
     }
 
-    /// Text for the summary.
+    /// Text about the cable's accuracy for the summary.
     pub(super) fn line(&self) -> String {
         let step = self.step_m.map_or("step size stated in each reading".to_owned(), |step_m| {
             format!("steps of {} mm", (step_m * 1e4).round() / 10.0)
@@ -60,7 +61,7 @@ impl Cable {
         parts.join("; ")
     }
 
-    /// JSON for programs.
+    /// The cable's accuracy as JSON.
     pub(super) fn json(&self) -> Value {
         let [slack_m, time_s] = self.slack;
         let [speed_mps, sd_m, most_m] = [0, 1, 2].map(|k| self.at_speed.and_then(|at| at.get(k).copied()));
@@ -71,7 +72,7 @@ impl Cable {
     }
 }
 
-/// Cable keys that the file doesn't have. Their defaults apply.
+/// Keys about the cable that the vehicle file doesn't set. Their defaults apply.
 fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
     let Ok(root) = Document::new("", text).root() else { return Vec::new() };
     let navigation = root.section("navigation").ok().flatten();

@@ -19,7 +19,7 @@ use crate::vehicle_file;
 use cable::Cable;
 use outlook::Outlook;
 
-/// A finding, with its file and line.
+/// An error or warning, with its file and line.
 struct Found {
     grade: Grade,
     file: String,
@@ -37,7 +37,7 @@ struct Readable {
     cable: Option<Cable>,
 }
 
-/// `headrace check`.
+/// Runs `headrace check`.
 pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     let (name, text) = (args.file.display().to_string(), files::read(&args.file)?);
     let mut found = Vec::new();
@@ -67,7 +67,7 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     Ok(if count(Grade::Error) > 0 { failure::USAGE } else { failure::OK })
 }
 
-/// Whether a text is a scene: it names a vehicle file or has a trajectory.
+/// Whether a text is a scene: true if it names a vehicle file or has a trajectory.
 fn is_scene(text: &str) -> bool {
     let keys = |key: &&str| ["vehicle", "trajectory"].contains(key);
     Document::new("", text).root().is_ok_and(|root| root.keys().iter().any(keys))
@@ -116,7 +116,7 @@ fn all(errors: &ConfigErrors) -> Vec<Found> {
 }
 
 impl Readable {
-    /// Checks a vehicle, and adds the findings on it. `name` and `text` are those of its file.
+    /// Checks a vehicle, and adds the findings about it. `name` and `text` are those of its file.
     fn new(vehicle: VehicleConfig, (name, text): (&str, &str), found: &mut Vec<Found>) -> Self {
         // The files that the vehicle file names have been read already.
         let named = |file: &str| vehicle.attachments.iter().find(|(attached, _)| attached == file);
@@ -138,7 +138,7 @@ impl Readable {
         vehicle_file::log(name, &vehicle);
         let mut findings = vehicle.findings();
         findings.extend(too_many(&vehicle));
-        // If the vehicle has errors, findings on its plan would only repeat them.
+        // If the vehicle has errors, findings about its plan would only repeat them.
         if findings.iter().all(|finding| finding.grade != Grade::Error) {
             findings.extend(outlook.iter().flat_map(|outlook| outlook.findings(&vehicle)));
         }
@@ -155,7 +155,7 @@ impl Readable {
         lines.extend(self.scene.as_ref().map(|(name, duration_s)| format!("{name}: {duration_s:.0} s")));
         lines.push(format!(
             "{}: target {} m, sections of {} m",
-            vehicle.name, vehicle.target_m, vehicle.section_m
+            vehicle.name, vehicle.target.max_hole_m, vehicle.section_m
         ));
         lines.push(format!(
             "tunnel {}: perimeter {:.2} m, length {} m",
@@ -208,7 +208,7 @@ fn json(readable: Option<&Readable>, found: &[Found]) -> Value {
             |s: &headrace_sensor::SensorConfig| json!({"id": s.id, "plugin": s.plugin, "connect": s.connect});
         let entries = [
             ("vehicle", json!(vehicle.name)),
-            ("target_m", json!(vehicle.target_m)),
+            ("target_m", json!(vehicle.target.max_hole_m)),
             ("section_m", json!(vehicle.section_m)),
             ("tunnel", json!(vehicle.tunnel.name)),
             ("perimeter_m", json!(vehicle.tunnel.profile.perimeter_m())),

@@ -1,4 +1,5 @@
-//! Outlook: largest speed, hours and hidden wall, as planned from a vehicle file.
+//! Results of planning with a vehicle file: the largest speed, the hours of a dive, and the wall that the
+//! vehicle hides.
 
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
@@ -7,13 +8,13 @@ use headrace_sampling::plan::{Answer, HELD_SHARE, Inspection, Planner, Question,
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
-/// Plan for a file as it is. The vehicle is on the tunnel's axis.
+/// Plan for the vehicle as its file describes it. The vehicle is assumed to be on the tunnel's axis.
 pub(super) struct Outlook {
-    /// Answer for the mode that all heads have; `None` if their modes differ.
+    /// The planner's answer for the mode that all heads have; `None` if their modes differ.
     own: Option<Answer>,
-    /// Answer with the largest speed.
+    /// The planner's answer for the mode with the largest speed.
     best: Option<Answer>,
-    /// Largest speed, m/s, if the heads are set in phase for the planned speed.
+    /// Largest speed, m/s, if the heads' start angles are those for the planned speed.
     ///
     /// `None` if no speed is planned, or if the heads' modes differ.
     as_started_mps: Option<f64>,
@@ -26,14 +27,14 @@ pub(super) struct Outlook {
     length_m: f64,
 }
 
-/// Relative difference below which two speeds are reported as one. It is the advice's margin for measuring
-/// the speed.
+/// Relative difference below which two speeds are reported as one. It equals the margin that the advice keeps
+/// for errors of the measured speed.
 const TOLD_APART: f64 = 0.02;
 /// Relative difference below which two turn periods are equal.
 const SAME: f64 = 1e-6;
 
 impl Outlook {
-    /// Outlook for the vehicle's heads, with the position errors between passes that its sensors leave.
+    /// Plans for the vehicle's heads, with the expected position errors between passes.
     ///
     /// `None` without heads.
     ///
@@ -46,7 +47,7 @@ impl Outlook {
         let (mut heads, mut ids) = (Vec::new(), Vec::new());
         for (sensor, config) in sensors {
             let Some(spec) = sensor.head() else { continue };
-            // With its configured range setting, a head has all of its modes.
+            // Each head offers all of its modes, at its configured range setting.
             heads.push((spec, sensor.modes(None).unwrap_or_default()));
             ids.push(config.id.clone());
         }
@@ -67,14 +68,14 @@ impl Outlook {
             sound_speed_mps: vehicle.site.sound_speed_mps,
         })?
         .with_errors(errors);
-        let question = Question { target_m: Some(vehicle.target_m), speed_mps: None, time_s: None };
+        let question = Question { target_m: Some(vehicle.target.max_hole_m), speed_mps: None, time_s: None };
         let answers = planner.answers(&question, None)?;
         let mode = planner.modes().iter().position(|planned| Some(planned.mode.name) == own);
         let briefing = planner.briefing(mode.unwrap_or(0), ANY_SPEED_MPS)?;
         let planned_mps = vehicle.planned_speed_mps;
         let as_started_mps = mode
             .filter(|_| planned_mps > 0.0)
-            .and_then(|mode| planner.as_started_mps(mode, vehicle.target_m, planned_mps).ok());
+            .and_then(|mode| planner.as_started_mps(mode, vehicle.target.max_hole_m, planned_mps).ok());
         let best = answers.iter().find(|answer| answer.best && answer.v_max_mps.is_some()).cloned();
         Ok(Some(Self {
             own: answers.into_iter().find(|answer| Some(answer.mode) == own),
@@ -88,7 +89,7 @@ impl Outlook {
         }))
     }
 
-    /// Largest speed in the heads' own mode, m/s.
+    /// Largest speed in the mode to which all heads are set, m/s.
     pub(super) fn v_max_mps(&self) -> Option<f64> {
         self.own.as_ref().and_then(|own| own.v_max_mps)
     }
@@ -119,7 +120,7 @@ impl Outlook {
         found
     }
 
-    /// Text for the summary.
+    /// Text about the plan for the summary.
     pub(super) fn lines(&self) -> Vec<String> {
         let speed = |answer: &Answer| match (answer.v_max_mps, answer.needed_h, &answer.refused) {
             (Some(v_max_mps), Some(hours), _) => {
@@ -152,7 +153,7 @@ impl Outlook {
         lines
     }
 
-    /// Text on the wall that the vehicle hides from some or all heads.
+    /// Text about the wall that the vehicle hides from some or all heads.
     fn hidden_line(&self) -> String {
         if self.hidden.is_empty() {
             return "every head sees all of the wall".to_owned();
@@ -180,7 +181,7 @@ impl Outlook {
         }
     }
 
-    /// JSON for programs.
+    /// The plan as JSON.
     pub(super) fn json(&self) -> Value {
         let answer = |answer: &Answer| {
             json!({
@@ -203,7 +204,7 @@ impl Outlook {
     }
 }
 
-/// Speed for computing results that don't depend on the speed, m/s.
+/// Arbitrary speed for results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 /// A speed rounded down to 1 mm/s. The printed speed thus meets the target, too.

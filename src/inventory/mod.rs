@@ -60,12 +60,12 @@ fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Senso
     sensors.collect()
 }
 
-/// All probes, in the order in which they are used.
+/// The probes of all device kinds, in the order in which a port is probed.
 fn all_probes() -> Vec<Box<dyn Probe>> {
     KINDS.iter().filter_map(|kind| kind.probe()).collect()
 }
 
-/// Probe of a device kind by its name in vehicle files; `None` if the kind has no probe.
+/// Probe of the device kind with this name in vehicle files; `None` if the kind has no probe.
 fn probe_of(name: &str) -> Option<Box<dyn Probe>> {
     KINDS.iter().find(|kind| kind.name() == name)?.probe()
 }
@@ -79,7 +79,7 @@ fn probe_port(found: &Found) -> Option<Probed> {
     Some(probe_address(&connect))
 }
 
-/// Probes an address.
+/// Probes the device at a network address.
 fn probe_address(connect: &Connect) -> Probed {
     headrace_ports::probe(connect, &mut all_probes())
 }

@@ -9,18 +9,18 @@ use crate::failure;
 /// Result of probing a port or an address.
 pub(super) type Probed = Result<Answer, OpenError>;
 
-/// All results.
+/// All results of `headrace devices`.
 #[derive(Debug, Default)]
 pub(super) struct Inventory {
     /// Attached devices, each with the probe's result if it was probed.
     pub(super) found: Vec<(Found, Option<Probed>)>,
-    /// Addresses given with `--address`.
+    /// Addresses given with `--address`, each with the probe's result.
     pub(super) addresses: Vec<(Connect, Probed)>,
-    /// Sensors of the vehicle file; `None` without a vehicle file.
+    /// Sensors of the vehicle file, each with the state of its port; `None` without a vehicle file.
     pub(super) sensors: Option<Vec<Sensor>>,
 }
 
-/// A sensor of the vehicle file.
+/// A sensor of the vehicle file, and the state of its port.
 #[derive(Debug)]
 pub(super) struct Sensor {
     pub(super) id: String,
@@ -28,7 +28,7 @@ pub(super) struct Sensor {
     pub(super) state: Result<State, OpenError>,
 }
 
-/// State of a sensor's port that has no error.
+/// State of a sensor's port if no error was found.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum State {
     /// The port is present under this name and may be opened.

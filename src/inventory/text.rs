@@ -17,7 +17,7 @@ const CARRIERS: [(Carrier, &str); 4] = [
     (Carrier::I2c, "I2C buses"),
 ];
 
-/// The whole text.
+/// The whole text that `headrace devices` prints.
 pub(super) fn text(inventory: &Inventory) -> String {
     let mut text = String::new();
     for (carrier, title) in CARRIERS {

@@ -10,7 +10,6 @@ use headrace_geometry::time::DurNs;
 use headrace_sampling::head::{HeadMode, HeadSpec};
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::margin::ExpectedErrors;
-use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::{Answer, Briefing, InLine, Inspection, Planner, Question};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::Device;
@@ -22,9 +21,9 @@ use crate::failure::Failure;
 use crate::files;
 use crate::vehicle_file;
 
-/// Kind of the heads if there is no vehicle file.
+/// Plugin of the heads that are assumed without a vehicle file.
 const USUAL_HEAD: &str = "imagenex881";
-/// Range setting of these heads, m. Source: the maker's table of modes.
+/// Range setting of the heads that are assumed without a vehicle file, m. Source: the maker's table of modes.
 const USUAL_RANGE_M: f64 = 10.0;
 
 /// An inspection to be planned, with the names of its parts.
@@ -36,7 +35,7 @@ pub(super) struct Case {
     pub(super) question: Question,
     /// Expected position errors; `None` without a vehicle file.
     pub(super) errors: Option<ExpectedErrors>,
-    /// Files that the inspection was read from.
+    /// Files from which the inspection was read.
     pub(super) inputs: Vec<PathBuf>,
 }
 
@@ -45,70 +44,35 @@ type Head = (HeadSpec, Vec<HeadMode>);
 impl Case {
     /// Creates the case from the options, which override the vehicle file.
     pub(super) fn of(args: &Plan) -> Result<Self, Failure> {
-        let question = Question {
-            target_m: args.target,
-            speed_mps: args.speed,
-            time_s: args.hours.map(|hours| hours * 3600.0),
-        };
         let tunnel = args.tunnel.as_deref().map(tunnel).transpose()?;
         match (&args.vehicle, tunnel) {
-            (Some(path), tunnel) => Self::of_vehicle(path, tunnel, question, args),
-            (None, Some(tunnel)) => {
-                let layout = args.layout.unwrap_or(HeadLayout::PhaseShift);
-                Ok(Self::new(
-                    tunnel,
-                    ideal_heads(args)?,
-                    Vec::new(),
-                    layout,
-                    Site::default().sound_speed_mps,
-                    question,
-                    args,
-                ))
-            }
+            (Some(path), tunnel) => Self::of_vehicle(path, tunnel, args),
+            (None, Some(tunnel)) => Ok(Self::new(tunnel, ideal_heads(args)?, args)),
             (None, None) => Err(Failure::Usage("plan: needs --tunnel or --vehicle".to_owned())),
         }
     }
 
-    fn of_vehicle(
-        path: &Path,
-        tunnel: Option<TunnelConfig>,
-        question: Question,
-        args: &Plan,
-    ) -> Result<Self, Failure> {
+    fn of_vehicle(path: &Path, tunnel: Option<TunnelConfig>, args: &Plan) -> Result<Self, Failure> {
         let (_, vehicle) = vehicle_file::read(path)?;
-        let question = Question { target_m: question.target_m.or(Some(vehicle.target_m)), ..question };
         let configs = vehicle.sensors.iter().zip(&vehicle.sensor_configs);
         let ids = configs.filter(|(sensor, _)| sensor.head().is_some()).map(|(_, config)| config.id.clone());
         let heads = ids.zip(heads_of(path, &vehicle.sensors, args.range)?).collect();
-        let layout = args.layout.unwrap_or(vehicle.layout);
-        let sound_speed_mps = vehicle.site.sound_speed_mps;
         let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         let errors =
             position_error_model::expected_errors(&vehicle, &name, &KINDS, &files::bytes_beside(path));
         let errors = errors.map_err(|why| Failure::Usage(format!("plan: {why}")))?;
         let mut inputs = vehicle_file::files(path, &vehicle);
-        let case = Self::new(
-            tunnel.unwrap_or(vehicle.tunnel),
-            heads,
-            vehicle.hull,
-            layout,
-            sound_speed_mps,
-            question,
-            args,
-        );
+        let mut case = Self::new(tunnel.unwrap_or(vehicle.tunnel), heads, args);
+        case.question.target_m = case.question.target_m.or(Some(vehicle.target.max_hole_m));
+        case.inspection.hull = vehicle.hull;
+        case.inspection.layout = args.layout.unwrap_or(vehicle.layout);
+        case.inspection.sound_speed_mps = vehicle.site.sound_speed_mps;
         inputs.extend_from_slice(&case.inputs);
         Ok(Self { errors, inputs, ..case })
     }
 
-    fn new(
-        tunnel: TunnelConfig,
-        heads: Vec<(String, Head)>,
-        hull: Vec<Obstacle>,
-        layout: HeadLayout,
-        sound_speed_mps: f64,
-        question: Question,
-        args: &Plan,
-    ) -> Self {
+    /// Creates the case of heads without a hull, in water of the default site.
+    fn new(tunnel: TunnelConfig, heads: Vec<(String, Head)>, args: &Plan) -> Self {
         let (ids, heads): (Vec<String>, Vec<Head>) = heads.into_iter().unzip();
         let range_m = heads.iter().map(|(spec, _)| spec.range_m[1]).fold(0.0, f64::max);
         let inspection = Inspection {
@@ -116,12 +80,17 @@ impl Case {
             place: args.at.unwrap_or(tunnel.profile.reference()),
             profile: tunnel.profile,
             heads,
-            hull,
-            layout,
+            hull: Vec::new(),
+            layout: args.layout.unwrap_or(HeadLayout::PhaseShift),
             drift_m: args.drift,
             yaw_rad: args.yaw.to_radians(),
             yaw_rate_radps: args.yaw_rate.to_radians(),
-            sound_speed_mps,
+            sound_speed_mps: Site::default().sound_speed_mps,
+        };
+        let question = Question {
+            target_m: args.target,
+            speed_mps: args.speed,
+            time_s: args.hours.map(|hours| hours * 3600.0),
         };
         Self {
             inspection,
@@ -168,7 +137,7 @@ fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
     Ok(TunnelConfig::from_section(&root, load)?)
 }
 
-/// Heads of a vehicle, with the range setting `range_m`, if given.
+/// Heads of a vehicle, each with its modes. `range_m` overrides the range setting.
 fn heads_of(path: &Path, sensors: &[Box<dyn Device>], range_m: Option<f64>) -> Result<Vec<Head>, Failure> {
     let mut heads = Vec::new();
     for sensor in sensors {
@@ -197,7 +166,7 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             latency: DurNs::ZERO,
         };
-        // The plan covers all modes, so any mode will do here.
+        // The plan covers all modes of the head, so the mode set here has no effect.
         let own = Document::new("plan", "mode = \"slow\"").root()?;
         let device = kind.configure(&config, &own)?;
         let mut heads = heads_of(Path::new("plan"), &[device], Some(range_m))?;
@@ -206,22 +175,23 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
     (0..args.heads).map(head).collect()
 }
 
-/// Results of one planning run, with its input.
+/// Results of one run of `headrace plan`, with its input.
 pub(super) struct Findings {
     pub(super) planner: Planner,
     /// Ids of the heads.
     pub(super) heads: Vec<String>,
     pub(super) tunnel: String,
-    /// Range setting, m.
+    /// Range setting of the heads, m.
     pub(super) range_m: f64,
-    /// Shortest and longest part of the perimeter that a beam covers, m.
+    /// Shortest and longest footprint of a beam along the perimeter, m.
     pub(super) footprints_m: [f64; 2],
     pub(super) question: Question,
     pub(super) answers: Vec<Answer>,
-    /// Mode for the briefing and the charts, with its speed, m/s; `None` if no mode gives a speed.
+    /// Index of the mode shown in the briefing and the charts, and its speed, m/s; `None` if no mode gives a
+    /// speed.
     pub(super) shown: Option<(usize, f64)>,
     pub(super) briefing: Briefing,
-    /// Gain in speed with heads in line, if it is worth reporting.
+    /// Gain in speed if the heads were in one line along the hull; `None` if the gain isn't worth reporting.
     pub(super) in_line: Option<InLine>,
 }
 

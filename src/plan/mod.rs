@@ -19,7 +19,7 @@ use crate::outputs::{self, Claims, Kind, PICTURE};
 use case::{Case, Findings, printed_mps};
 use pictures::Shown;
 
-/// `headrace plan`.
+/// Runs `headrace plan`.
 pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
     let case = Case::of(args)?;
     if let Some(folder) = &args.svg {
@@ -84,7 +84,8 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
     })
 }
 
-/// Gain in speed with heads in line, if the plan is to find a speed and the gain exceeds a twentieth.
+/// Gain in speed with the heads in one line along the hull. `None` unless the plan is to find a speed and the
+/// gain exceeds 5 %.
 fn in_line(planner: &Planner, question: &Question) -> Result<Option<InLine>, SamplingError> {
     let asks_for_speed = question.speed_mps.is_none() && question.time_s.is_none();
     let Some(target_m) = question.target_m.filter(|_| asks_for_speed) else { return Ok(None) };
@@ -92,13 +93,13 @@ fn in_line(planner: &Planner, question: &Question) -> Result<Option<InLine>, Sam
     Ok(planner.in_line(target_m)?.filter(gains))
 }
 
-/// Whether a mode meets the request.
+/// Whether any mode meets the requested target, speed and hours.
 fn is_met(answer: &Answer) -> bool {
     answer.meets_target.unwrap_or(answer.refused.is_none())
         && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())
 }
 
-/// Speed for computing results that don't depend on the speed, m/s.
+/// Arbitrary speed for results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;

@@ -28,7 +28,7 @@ pub(super) fn table(findings: &Findings) -> String {
     lines.iter().map(|line| line.trim_end()).collect::<Vec<_>>().join("\n")
 }
 
-/// Number and layout of the heads.
+/// Text with the number and layout of the heads.
 pub(super) fn heads(findings: &Findings) -> String {
     let layout = match findings.planner.inspection().layout {
         HeadLayout::PhaseShift => "phase shift",
@@ -123,7 +123,7 @@ fn question_line(findings: &Findings) -> String {
     asked.join(", ")
 }
 
-/// Warning if the wall is out of range.
+/// Warning if parts of the wall are beyond the heads' range setting.
 fn range_warning(findings: &Findings) -> Option<String> {
     let ((here_m, allowed_m), reach_m) = (findings.planner.farthest_m(), findings.planner.reach_m());
     (allowed_m > reach_m).then(|| {
@@ -140,7 +140,7 @@ const HEADINGS: [&str; 2] = [
 fn row(answer: &Answer) -> String {
     let mark = if answer.best { '*' } else { ' ' };
     let estimated = if answer.turn_basis == Basis::Estimated.as_str() { '~' } else { ' ' };
-    // If no head sees the wall, there is no spacing.
+    // If no head sees the wall, there is no sample spacing to print.
     let worst = if answer.t_y2_m > 0.0 { format!("{:.3}", answer.t_y2_m) } else { "-".to_owned() };
     let known = format!(
         "{mark} {:<8} {:>4.1} {estimated}{:>6.2} {:>8.2}  {:>5.3}  {:>5.3}  {worst:>5}",
@@ -182,7 +182,7 @@ fn spacing_columns(spacing: &Spacing, speed_mps: f64) -> String {
 
 fn notes(findings: &Findings) -> Vec<String> {
     let mut notes = Vec::new();
-    // Several modes often have the same reason.
+    // Several modes often miss the request for the same reason, which is printed once.
     let mut reasons: Vec<(&String, Vec<&str>)> = Vec::new();
     for answer in &findings.answers {
         let Some(why) = &answer.refused else { continue };
@@ -224,7 +224,7 @@ fn best_words(best: &Answer) -> String {
     }
 }
 
-/// Text on the speed that each margin costs.
+/// Text about how much speed each safety margin costs.
 fn margin_words(mode: &str, margins: &Margins) -> String {
     /// Cost of a margin, m/s, below which it isn't printed, because the rounded speeds would not show it.
     const NOTHING_MPS: f64 = 5e-4;
@@ -238,7 +238,7 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
             Margin::Position => {
                 format!("with passes known to +-{:.1} cm", 100.0 * margins.pass_error_m)
             }
-            // A plan assumes no lost returns.
+            // The plan assumes that no returns are lost.
             Margin::Geometry | Margin::Losses => continue,
         };
         if price_mps >= NOTHING_MPS {
@@ -248,7 +248,7 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
     words.join(", ")
 }
 
-/// Text on the gain in speed with heads in line.
+/// Text about the gain in speed if the heads were in one line along the hull.
 fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
     let InLine { positions_m, mode, v_max_mps, .. } = in_line;
     let hours = findings.planner.inspection().length_m / v_max_mps / 3600.0;
@@ -261,7 +261,7 @@ fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
     )
 }
 
-/// Text on occlusion by the vehicle, and on strips of wall with fewer passes.
+/// Text about occlusion by the vehicle, and about strips of wall with fewer passes.
 fn hidden_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let hidden = briefing.hidden.iter().map(|hidden| {
@@ -282,8 +282,8 @@ fn names(findings: &Findings, heads: &[usize]) -> String {
     heads.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// Text on start angles, on interference between heads, and on distances along the hull that allow equal
-/// start angles.
+/// Text about start angles, interference between heads, and distances along the hull that allow equal start
+/// angles.
 fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let mut lines = Vec::new();

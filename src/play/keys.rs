@@ -13,16 +13,16 @@ use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios, tc
 use crate::cli::KEYS;
 use crate::output::aside;
 
-/// Length of a jump by an arrow key: to the left or right, and up or down.
+/// Length of a jump in time: by the left or right arrow key, and by the up or down arrow key.
 const STEP: DurNs = DurNs::from_millis(10_000);
 const FAR: DurNs = DurNs::from_millis(60_000);
 /// Slowest and fastest speed of playback, relative to real time. Beyond the fastest, playback is unlimited.
 const SLOWEST: f64 = 0.125;
 const FASTEST: f64 = 1024.0;
-/// Longest wait for a key. After it, the end of playback is noticed.
+/// Longest wait for a key, so that the end of playback is noticed.
 const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 
-/// A key of playback.
+/// A key that controls playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Key {
     Space,
@@ -92,7 +92,7 @@ impl Drop for Keyboard {
     }
 }
 
-/// Reads typed bytes. Returns none after a time without any.
+/// Reads typed bytes. Returns no bytes after a time without input.
 ///
 /// Errors: standard input is closed.
 fn read(bytes: &mut [u8]) -> io::Result<usize> {
@@ -108,11 +108,11 @@ fn read(bytes: &mut [u8]) -> io::Result<usize> {
     }
 }
 
-/// Speed and pause as set by the keys.
+/// Playback speed and pause as set by the keys.
 pub(crate) struct Hand {
     speed: Option<f64>,
     paused: bool,
-    /// Shows the answer to a key.
+    /// Function that shows the answer to a key.
     say: fn(&str),
 }
 

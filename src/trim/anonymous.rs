@@ -20,9 +20,9 @@ const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
 /// Header without identifying data.
 pub(crate) struct Anonymous {
     vehicle_toml: String,
-    /// Old and new names of attachments.
+    /// Old and new name of each attached file.
     names: Vec<(String, String)>,
-    /// Text on items that couldn't be removed.
+    /// Messages that list the items that couldn't be removed.
     pub(crate) left: Vec<String>,
 }
 
@@ -64,7 +64,7 @@ impl Anonymous {
     }
 }
 
-/// Texts on items that can't be removed.
+/// Messages that list the items that can't be removed.
 fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     let info = log.header();
     let ids = |sources: &[SourceInfo]| {
@@ -91,7 +91,8 @@ fn ending(name: &str) -> &str {
     name.rfind('.').and_then(|dot| name.get(dot..)).unwrap_or_default()
 }
 
-/// A `connect` with the same carrier, but without identifying parts. `number` makes the results distinct.
+/// A value of `connect` with the same carrier, but without identifying parts. `number` makes the results
+/// distinct.
 fn connect(text: &str, number: usize) -> String {
     // Addresses reserved for documentation. Source: RFC 5737.
     let host = |address: &str| {
@@ -156,7 +157,7 @@ fn string_len(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// Key whose value follows `text`. The names of the tables before it are left out.
+/// TOML key whose value follows `text`, without the names of its tables.
 fn key_before(text: &str) -> &str {
     let line = text.rsplit(['\n', ',', '{', '[']).next().unwrap_or_default();
     let key = line.split_once('=').map_or("", |(key, _)| key);
@@ -247,7 +248,7 @@ inner."name" = "name 6"
             };
             let (before, after) = (read(&text), read(&clean));
             let told = |vehicle: &VehicleConfig| format!("{:?} {:?}", vehicle.tunnel, vehicle.site);
-            assert_eq!((told(&after), after.target_m), (told(&before), before.target_m));
+            assert_eq!((told(&after), after.target), (told(&before), before.target));
             let sensors = |vehicle: &VehicleConfig| {
                 let sensors = vehicle.sensor_configs.iter();
                 sensors.map(|s| format!("{} {} {:?}", s.id, s.plugin, s.mount)).collect::<Vec<_>>()

@@ -31,11 +31,11 @@ use anonymous::Anonymous;
 
 /// Tick length of the replay that finds the vehicle's chainage over time.
 const TICK: DurNs = DurNs::from_millis(20);
-/// Longest gap that is kept in the log. During a gap the vehicle is outside the range of chainage, or has no
-/// fix.
+/// Longest gap that the trimmed log keeps. During a gap the vehicle is outside the range of chainage, or has
+/// no fix.
 const BRIDGED: DurNs = DurNs::from_millis(2000);
 
-/// `headrace trim`.
+/// Runs `headrace trim`.
 pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let given = Given::read(args.vehicle.as_deref().filter(|_| needs_vehicle(args)))?;
@@ -56,12 +56,12 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     Ok(if trimmed.losses > 0 { failure::DATA_LOST } else { failure::OK })
 }
 
-/// Whether the options need the vehicle.
+/// Whether the options need a vehicle file.
 fn needs_vehicle(args: &Trim) -> bool {
     args.chainage.is_some() || args.drop_echoes || args.anonymise
 }
 
-/// The vehicle; `None` if the options don't need it.
+/// The vehicle given or attached to the log; `None` if the options don't need it.
 fn vehicle(
     args: &Trim,
     given: Given,
@@ -132,7 +132,7 @@ fn when_within(
     Ok(spans)
 }
 
-/// Text on the changes to the log.
+/// Text about the changes to the log.
 fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> Result<Vec<String>, Failure> {
     let mut said = Vec::new();
     if args.anonymise {
@@ -155,7 +155,7 @@ fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> R
     Ok(said)
 }
 
-/// Writes the new log atomically.
+/// Writes the trimmed log atomically.
 fn write(
     args: &Trim,
     files: &[PathBuf],

@@ -6,7 +6,7 @@ use headrace_monitor::live_state::Lamp;
 use headrace_monitor::run::Loop;
 use headrace_monitor::words::priority_word;
 
-/// Author of the commands from this screen.
+/// Author named in acknowledgements and notes from this screen.
 const BY: &str = "terminal";
 
 /// An alert on the screen.
@@ -23,7 +23,7 @@ pub(super) struct AlertRow {
     pub(super) advice: String,
 }
 
-/// Live alerts, most urgent first, and the number of those left out.
+/// Rows of the live alerts, most urgent first, and the number of alerts left out.
 pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
     let around = dive.view().surroundings();
     let (shown, hidden) = dive.view().alert_list().shown();
@@ -51,7 +51,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
 pub(super) struct Desk(Option<ConsolePort>);
 
 impl Desk {
-    /// Creates the desk. A recorded dive has no console.
+    /// Creates the handle for the operator's commands. A recorded dive has no console.
     pub(super) fn new(console: Option<ConsolePort>) -> Self {
         Self(console)
     }
@@ -67,7 +67,7 @@ impl Desk {
         self.send(&Command::Silence { by: Who::cut(BY) }, "alerts silenced for 30 s".to_owned())
     }
 
-    /// Adds a note at the present place. Returns the answer to show.
+    /// Adds a note at the vehicle's present chainage. Returns the answer to show.
     pub(super) fn note(&self, text: &str) -> String {
         self.send(&Command::Note { text: NoteText::cut(text), by: Who::cut(BY) }, format!("noted: {text}"))
     }
@@ -80,7 +80,7 @@ impl Desk {
         }
     }
 
-    /// Whether commands are possible.
+    /// Whether the dive accepts an operator's commands.
     pub(super) fn is_open(&self) -> bool {
         self.0.is_some()
     }

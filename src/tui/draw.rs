@@ -20,17 +20,17 @@ use super::screen_buffer::{Palette, Rows};
 use super::wall::{Extent, Wall};
 use crate::cli::KEYS;
 
-/// Maximum number of message lines kept.
+/// Maximum number of message lines that the screen keeps.
 const MOST_TOLD: usize = 100;
-/// Minimum size of the screen.
+/// Minimum size of the screen, columns and rows.
 const LEAST: (u16, u16) = (40, 10);
 /// Minimum size of the screen at which the allowed speed is also shown in large digits.
 const LARGE: (u16, u16) = (90, 34);
 
-/// State of a replay's playback.
+/// Playback state of a replay.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Playing {
-    /// Speed; `None` if unlimited.
+    /// Playback speed relative to real time; `None` if unlimited.
     pub(super) speed: Option<f64>,
     pub(super) paused: bool,
 }
@@ -45,7 +45,7 @@ pub(super) struct Page {
     /// Time for which the loop has been stalled; `None` if it isn't.
     pub(super) late: Option<DurNs>,
     pub(super) playing: Option<Playing>,
-    /// A note that is being written.
+    /// Text of the note that the operator is writing.
     pub(super) note: Option<String>,
     pub(super) help: bool,
     pub(super) extent: Extent,
@@ -69,7 +69,7 @@ impl Page {
         }
     }
 
-    /// Updates the page with a frame.
+    /// Updates the screen's content with a frame.
     pub(super) fn take(&mut self, mut shot: ScreenFrame) {
         self.wall.take(&shot.wall);
         for line in shot.told.drain(..) {
@@ -99,7 +99,7 @@ impl Page {
         self.said = None;
     }
 
-    /// Draws the whole page.
+    /// Draws the whole screen.
     pub(super) fn draw(&self, to: &mut Buffer) {
         let area = to.area;
         if area.width < LEAST.0 || area.height < LEAST.1 {
@@ -128,8 +128,8 @@ impl Page {
 
     /// Draws the panels within the available room.
     fn panels(&self, shot: &ScreenFrame, rows: &mut Rows<'_>) {
-        // Alerts and messages have at least two rows, and the wall has two strips. Each panel except the last
-        // has a title.
+        // Room is reserved: alerts and messages have at least two rows, and the wall has two strips. Each
+        // panel except the last has a title.
         let left = usize::from(rows.left()).saturating_sub(3 + 3 + 1 + 2);
         let well = shot.sensors.iter().filter(|sensor| sensor.state == SensorState::Ok).count();
         let wanted = shot.sensors.len() - well + panels::sensor_rows(well, usize::from(rows.width()));
@@ -151,7 +151,7 @@ impl Page {
         let width = usize::from(rows.width());
         let (vehicle, target) = match &self.shot {
             Some(shot) => {
-                (one_line(&shot.vehicle).into_owned(), format!(", target {} m", shot.state.target_m))
+                (one_line(&shot.vehicle).into_owned(), format!(", target {} m", shot.state.target.max_hole_m))
             }
             None => (String::new(), String::new()),
         };
@@ -179,7 +179,8 @@ impl Page {
         ]));
     }
 
-    /// Draws the condition across the whole width, with the allowed speed in large digits if there is room.
+    /// Draws the banner with the dive's condition, and with the allowed speed in large digits if there is
+    /// room.
     fn banner(&self, shot: &ScreenFrame, area: Rect, rows: &mut Rows<'_>) {
         let condition = shot.state.condition();
         let lamp = if self.late.is_some() { Lamp::Red } else { condition.lamp() };
@@ -326,7 +327,7 @@ impl Page {
     }
 }
 
-/// Replaces the non-ASCII characters of external text. A plus-minus sign becomes a tilde.
+/// Replaces the non-ASCII characters of text from outside the program. A plus-minus sign becomes a tilde.
 fn in_ascii(cell: &mut Cell) {
     if !cell.symbol().is_ascii() {
         let plain = if cell.symbol() == "±" { "~" } else { "?" };

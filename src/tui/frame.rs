@@ -21,36 +21,36 @@ use super::alerts::{self, AlertRow};
 use super::mode::Stop;
 use super::wall::{Cell, Clock, WallNews};
 
-/// Averaging window for a sensor's rate, in data time.
+/// Averaging window for a sensor's rate of readings, in the time of the data.
 const RATE_OVER: DurNs = DurNs(2_000_000_000);
 /// Maximum number of messages kept between two frames.
 const MOST_TOLD: usize = 64;
 /// Number of sections on either side of the vehicle that every frame includes.
 const NEAR: i64 = 8;
 
-/// A frame.
+/// A frame of the screen.
 pub(super) struct ScreenFrame {
     pub(super) vehicle: String,
     pub(super) state: LiveState,
     /// Time since the dive's first packet.
     pub(super) time: DurNs,
     pub(super) stopped: Option<Stop>,
-    /// Place, speed, condition and action.
+    /// Status line: place, speed, condition and action.
     pub(super) status: PilotLine,
-    /// Limiting factor of the speed.
+    /// Text about the factor that limits the speed.
     pub(super) reason: String,
     pub(super) sensors: Vec<SensorRow>,
     pub(super) alerts: Vec<AlertRow>,
-    /// Number of alerts left out.
+    /// Number of alerts that aren't in the list.
     pub(super) alerts_hidden: usize,
-    /// Text on the recordings, and whether it is an alarm.
+    /// Text about the recordings, and whether it is an alarm.
     pub(super) recording: Option<(String, bool)>,
     pub(super) wall: WallNews,
     /// Messages since the last frame, oldest first.
     pub(super) told: Vec<PilotLine>,
 }
 
-/// A sensor on the screen.
+/// A sensor's row on the screen.
 pub(super) struct SensorRow {
     pub(super) id: String,
     pub(super) state: SensorState,
@@ -60,7 +60,7 @@ pub(super) struct SensorRow {
     pub(super) why: String,
 }
 
-/// State kept between frames.
+/// Builds the frames, and keeps the state that is needed between them.
 pub(super) struct FrameBuilder {
     vehicle: String,
     told: VecDeque<PilotLine>,
@@ -206,7 +206,7 @@ impl FrameBuilder {
     }
 }
 
-/// Text on the reason that limits the speed, unless the condition states it already.
+/// Text about the reason that limits the speed, unless the condition states it already.
 fn reason_text(
     advice: &Advice,
     state: &LiveState,

@@ -2,10 +2,10 @@
 
 use crate::play::Key as Playing;
 
-/// Ctrl-C.
+/// Character that a terminal sends for Ctrl-C.
 pub(super) const INTERRUPT: char = '\x03';
 
-/// A key.
+/// A key of the terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Key {
     Character(char),

@@ -13,7 +13,7 @@ use super::message::Message;
 use super::terminal_guard;
 use crate::interrupt::{self, Requests};
 
-/// Longest wait for a key. After it, the end of the dive is noticed.
+/// Longest wait for a key, so that the end of the dive is noticed.
 const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
 
 /// Sends keys until the returned flag is set.

@@ -7,7 +7,7 @@ use super::keys::Key;
 pub(super) enum Message {
     ScreenFrame(Box<ScreenFrame>),
     Key(Key),
-    /// Ctrl-C.
+    /// Ctrl-C was pressed.
     Interrupted,
     End,
 }

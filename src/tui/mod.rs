@@ -52,7 +52,7 @@ const ENDS_WITHIN: Duration = Duration::from_secs(2);
 pub(crate) struct Start<'a> {
     /// Name of the vehicle.
     pub(crate) vehicle: &'a str,
-    /// First message.
+    /// First line among the screen's messages.
     pub(crate) first: Option<String>,
     pub(crate) mode: Mode,
     /// Flag that Ctrl-C sets.

@@ -7,7 +7,7 @@ use headrace_replay::playback::PlaybackCommand;
 pub(crate) enum Mode {
     /// A dive on ports. No thread may wait.
     Live,
-    /// A simulated dive.
+    /// The simulated dive of `headrace demo`.
     Demo,
     /// A dive from a log, at the playback's speed.
     Source,
@@ -15,7 +15,7 @@ pub(crate) enum Mode {
     Replay(Sender<PlaybackCommand>, Option<f64>),
 }
 
-/// Reason for which a replay is stopped.
+/// Reason why a replay is stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stop {
     Paused,

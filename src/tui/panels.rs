@@ -1,4 +1,4 @@
-//! Panels of the screen.
+//! Draws the panels of the screen.
 
 use headrace_config::plain::one_line;
 use headrace_coverage::Verdict;
@@ -17,11 +17,11 @@ use super::screen_buffer::{Palette, Rows};
 use super::wall::{Cell, Extent, HOURS, Known, Strip, Wall};
 use crate::output::append;
 
-/// Number of rows of the clock strips.
+/// Number of rows of the strips that show coverage by clock hour.
 pub(super) const CLOCK_ROWS: usize = HOURS;
-/// Columns of a sensor's lamp with the age of its data, and without it.
+/// Width of a sensor's entry with and without the age of its data, columns.
 const LAMP_COLUMNS: [usize; 2] = [24, 19];
-/// Width of the strips' labels.
+/// Width of the labels before the wall's strips, columns.
 const LABEL: usize = 6;
 
 /// Draws the speed relative to v_max as a bar, with the reason below.
@@ -56,11 +56,11 @@ pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     }
     rows.line(Line::from(spans));
     let mut parts: Vec<&str> = Vec::new();
-    // The status line already has the share of lost returns.
+    // If returns are lost, the status line states their share, so the reason is left out.
     if is_known && !shot.reason.is_empty() && state.lost_share().is_none() {
         parts.push(&shot.reason);
     }
-    // The banner already has the first parts of the status.
+    // The banner already shows the first parts of the status line.
     let shown = if shot.status.action.is_empty() { 2 } else { 1 };
     parts.extend(shot.status.what.iter().skip(shown).map(String::as_str));
     rows.text(&one_line(&format!("WHY    {}", fitted(&parts, columns_after_label(rows)))), Style::default());
@@ -70,7 +70,7 @@ fn columns_after_label(rows: &Rows<'_>) -> usize {
     usize::from(rows.width()).saturating_sub(LABEL + 1)
 }
 
-/// Joins the parts, from the first on, as long as they fit in full.
+/// Joins texts, from the first on, as long as they fit in full.
 fn fitted(parts: &[&str], columns: usize) -> String {
     let mut text = String::new();
     for part in parts {
@@ -83,12 +83,12 @@ fn fitted(parts: &[&str], columns: usize) -> String {
     text
 }
 
-/// Whether the state is up to date.
+/// Whether the frame's state of the dive is up to date.
 pub(super) fn is_now(shot: &ScreenFrame) -> bool {
     !matches!(shot.state.condition(), Condition::Old(_) | Condition::NoData)
 }
 
-/// Draws the position, its error, and the metres by verdict.
+/// Draws the vehicle's position with its error, and the metres of wall by verdict.
 pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let has_position = !matches!(state.position, PositionState::None(_));
@@ -124,7 +124,8 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
-/// Metres by verdict, with those that haven't passed first. Dots stand for omitted ones.
+/// Text with the metres by verdict: failed, unsure and uninspected metres first. Dots stand for omitted
+/// figures.
 fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let missed = verdict_words(Verdict::Fail).to_uppercase();
@@ -138,7 +139,7 @@ fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
         let part = format!(" {part_m:.2} {what},");
-        // Room for the dots is kept.
+        // Room for the dots that stand for omitted figures is kept.
         if text.len() + part.len() + 3 > columns {
             text += " ..";
             break;
@@ -189,7 +190,7 @@ pub(super) fn alert_rows(shot: &ScreenFrame, ink: Palette, columns: usize) -> us
     shot.alerts.iter().map(|alert| alert_lines(alert, ink, columns).len()).sum()
 }
 
-/// Draws the alerts in `room` rows below a title that counts them.
+/// Draws the alerts in `room` rows below a title with their number.
 pub(super) fn alerts(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut Rows<'_>) {
     let columns = usize::from(rows.width());
     let (mut lines, mut shown) = (Vec::new(), 0);
@@ -224,7 +225,7 @@ pub(super) fn alerts(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut R
     }
 }
 
-/// Number of rows needed for this many sensors.
+/// Number of rows needed for the entries of this many healthy sensors.
 pub(super) fn sensor_rows(sensors: usize, columns: usize) -> usize {
     sensors.div_ceil((columns / LAMP_COLUMNS[0]).max(1))
 }
@@ -352,7 +353,8 @@ fn known_style(known: Known, ink: Palette) -> Style {
     }
 }
 
-/// Mark for a hole. Its height is in eighths, and half of it is the target.
+/// Bar for the diameter of a section's largest hole. Half of the full height stands for the target, and the
+/// full bar has eight steps.
 fn hole_mark(cell: Cell, ink: Palette) -> (char, Style) {
     let Some(share) = cell.share else {
         return (if cell.known == Known::Unseen { '·' } else { ' ' }, Palette::dim()).ascii(ink);
@@ -406,7 +408,7 @@ impl Ascii for (char, Style) {
     }
 }
 
-/// Text with stations, each at its column below a strip.
+/// Text of the ruler: chainages, each at its column below a strip.
 fn ruler_text(strip: &Strip) -> String {
     let mut text = " ".repeat(LABEL);
     let mut column = 0;
@@ -418,7 +420,7 @@ fn ruler_text(strip: &Strip) -> String {
     text
 }
 
-/// Digits of five rows. The three bits of a row are its columns, from the most significant bit.
+/// Large digits, each of five rows. The three bits of a row are its columns, from the most significant bit.
 const DIGITS: [[u8; 5]; 10] = [
     [7, 5, 5, 5, 7],
     [2, 6, 2, 2, 7],

@@ -23,9 +23,10 @@ use super::terminal_guard::{self, TerminalGuard};
 use crate::logging;
 use crate::play::{Hand, Key as PlaybackKey};
 
-/// Interval between two draws.
+/// Minimum interval between two draws of the screen.
 const EVERY: Duration = Duration::from_millis(100);
-/// Delay after which a live dive's frame is shown as stale. It equals `OLD_AFTER` of the live state.
+/// Time without a new frame after which a live dive's screen is shown as stale. It equals `OLD_AFTER` of the
+/// live state.
 const OLD_AFTER: Duration = Duration::from_secs(2);
 
 /// Draws frames and handles keys.
@@ -39,7 +40,7 @@ pub(super) struct Renderer {
     is_live: bool,
     wanted: Arc<AtomicBool>,
     keys_end: Arc<AtomicBool>,
-    /// Time at which the last frame came.
+    /// Time at which the last frame arrived.
     came: Option<Instant>,
 }
 
@@ -75,7 +76,7 @@ impl Renderer {
             let waiting = drawn.map_or(Duration::ZERO, |drawn| EVERY.saturating_sub(drawn.elapsed()));
             match messages.recv_timeout(waiting) {
                 Ok(Message::End) | Err(RecvTimeoutError::Disconnected) => break,
-                // A key is handled and drawn at once, so that its answer isn't delayed.
+                // A key is handled and its effect drawn at once, so that the operator sees it without delay.
                 Ok(Message::Key(key)) => {
                     self.key(key);
                     drawn = None;

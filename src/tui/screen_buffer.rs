@@ -19,7 +19,7 @@ impl Palette {
         Self { colour: terminal::of(&std::io::stdout()).colour, unicode: terminal::has_unicode() }
     }
 
-    /// Shape of a lamp. Lamps can be told apart by shape without colour.
+    /// Symbol of a status lamp. Its shape shows the state even without colour.
     pub(super) fn shape(self, lamp: Lamp) -> &'static str {
         match (lamp, self.unicode) {
             (Lamp::Green, true) => "●",
@@ -42,7 +42,7 @@ impl Palette {
         }
     }
 
-    /// Style of a whole area.
+    /// Style of a whole area in the colour of a status lamp.
     pub(super) fn banner(self, lamp: Lamp) -> Style {
         let style = Style::default().add_modifier(Modifier::BOLD);
         match (lamp, self.colour) {
@@ -59,7 +59,7 @@ impl Palette {
     }
 }
 
-/// Rows of the screen that are filled from the top down.
+/// Area of the screen whose rows are filled from the top down.
 pub(super) struct Rows<'a> {
     pub(super) to: &'a mut Buffer,
     pub(super) top: u16,

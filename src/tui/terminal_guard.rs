@@ -17,11 +17,11 @@ use crate::logging;
 
 /// Name of the renderer's thread.
 pub(super) const ARTIST: &str = "screen";
-/// Switches to the alternate screen and hides the cursor.
+/// Codes that switch to the alternate screen and hide the cursor.
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
-/// Restores the main screen.
+/// Codes that restore the main screen and show the cursor.
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
-/// Interval at which another thread checks whether the renderer has released the terminal.
+/// Interval and number of another thread's checks whether the renderer has released the terminal.
 const STEP: Duration = Duration::from_millis(25);
 const STEPS: u32 = 20;
 
@@ -29,7 +29,7 @@ const STEPS: u32 = 20;
 static BEFORE: OnceLock<Termios> = OnceLock::new();
 /// Whether the terminal is taken over.
 static TAKEN: AtomicBool = AtomicBool::new(false);
-/// Whether the terminal has to be released.
+/// Whether the renderer's thread is asked to release the terminal.
 static LEAVING: AtomicBool = AtomicBool::new(false);
 
 /// The terminal, for drawing. Writing bypasses the lock of stdout, so an unread terminal blocks no other
@@ -71,7 +71,7 @@ impl TerminalGuard {
         self.0.try_clone()
     }
 
-    /// Number of columns and rows.
+    /// Number of columns and rows of the terminal.
     pub(super) fn size(&self) -> (u16, u16) {
         match tcgetwinsize(&self.0) {
             Ok(size) if size.ws_col > 0 && size.ws_row > 0 => (size.ws_col, size.ws_row),
@@ -91,12 +91,12 @@ pub(super) fn leave() {
     LEAVING.store(true, Ordering::Relaxed);
 }
 
-/// Whether the terminal has to be released.
+/// Whether the renderer's thread is asked to release the terminal.
 pub(super) fn is_leaving() -> bool {
     LEAVING.load(Ordering::Relaxed)
 }
 
-/// Restores the settings. This takes no time, whatever the terminal does.
+/// Restores the terminal's settings. The call never blocks, even if the terminal reads nothing.
 pub(super) fn restore_settings() {
     if let Some(before) = BEFORE.get()
         && let Err(error) = tcsetattr(io::stdin(), OptionalActions::Now, before)

@@ -1,19 +1,19 @@
-//! The wall by section: its data in a frame, and the strips that are drawn from the data.
+//! The tunnel wall by section: the data in a frame, and the strips drawn from these data.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
-use headrace_geometry::tunnel::Profile;
+use headrace_geometry::tunnel::{Profile, WallPoint};
 use headrace_monitor::run::Loop;
 
 /// Number of parts into which the perimeter is divided for clock positions.
 const PARTS: usize = 96;
-/// Number of hours of the clock.
+/// Number of clock hours by which positions on the perimeter are named.
 pub(super) const HOURS: usize = 12;
 
-/// Clock positions by arc length.
+/// Converts an arc length to a clock hour.
 pub(super) struct Clock {
     part_m: f64,
-    /// Bit of the clock hour of each part.
+    /// Bit mask of the clock hour of each part of the perimeter.
     bits: [u16; PARTS],
 }
 
@@ -33,12 +33,12 @@ impl Clock {
     }
 }
 
-/// State of a section on the screen.
+/// State of a section, as the screen shows it.
 ///
 /// If a column shows several sections, the variant that comes last in this list wins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(super) enum Known {
-    /// No sample.
+    /// The section has no sample.
     #[default]
     Unseen,
     Pass,
@@ -50,18 +50,18 @@ pub(super) enum Known {
     Missed,
 }
 
-/// A section on the screen.
+/// A section's data for the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Cell {
     pub(super) known: Known,
-    /// Hole as a share of the target.
+    /// Diameter of the largest hole relative to the target.
     pub(super) share: Option<f64>,
     /// Clock hours that have samples within half the target. Bit 0 is 12 o'clock.
     pub(super) seen: u16,
 }
 
 impl Cell {
-    /// Section with this index; `None` if there is no such section.
+    /// Data of the section with this index; `None` if there is no such section.
     pub(super) fn of(index: i64, dive: &Loop, clock: &Clock) -> Option<Self> {
         let coverage = dive.view().coverage();
         let sections = &coverage.sections;
@@ -80,8 +80,9 @@ impl Cell {
             // A passing hole is at most as wide as the target, so wall within half the target of a sample
             // counts as covered.
             let (from_m, to_m) = sections.bounds_m(index);
-            let (from_m, to_m) = (from_m - sections.target_m() / 2.0, to_m + sections.target_m() / 2.0);
-            coverage.store.each_between(from_m, to_m, |x_m, arc_m, _| {
+            let half_m = sections.target().max_hole_m / 2.0;
+            let (from_m, to_m) = (from_m - half_m, to_m + half_m);
+            coverage.store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
                 if (from_m..to_m).contains(&x_m) {
                     seen |= clock.bit(arc_m);
                 }
@@ -91,7 +92,7 @@ impl Cell {
         if let Some(hole) = section.hole.filter(|_| matches!(known, Known::Missed | Known::CannotSay)) {
             seen &= !clock.bit(hole.arc_m);
         }
-        let share = section.hole.map(|hole| hole.diameter_m / sections.target_m());
+        let share = section.hole.map(|hole| hole.diameter_m / sections.target().max_hole_m);
         Some(Self { known, share: share.filter(|_| section.verdict != Verdict::Open), seen })
     }
 
@@ -104,13 +105,13 @@ impl Cell {
     }
 }
 
-/// Data on the wall within a frame.
+/// Data about the wall within a frame.
 pub(super) struct WallNews {
     pub(super) section_m: f64,
     pub(super) count: usize,
-    /// Place of the vehicle, m; `None` without a position.
+    /// Chainage of the vehicle, m; `None` without a position.
     pub(super) at_m: Option<f64>,
-    /// Whether the vehicle moves inwards.
+    /// Whether the vehicle moves into the tunnel, so that chainage increases.
     pub(super) inwards: bool,
     pub(super) cells: Vec<(i64, Cell)>,
 }
@@ -121,7 +122,7 @@ pub(super) enum Extent {
     /// One section per column, near the vehicle.
     #[default]
     Near,
-    /// The whole coverage extent.
+    /// The whole stretch that has samples.
     Way,
     Tunnel,
 }
@@ -144,25 +145,25 @@ impl Extent {
     }
 }
 
-/// The wall, with all sections known so far.
+/// The wall on the screen, with all sections received so far.
 #[derive(Default)]
 pub(super) struct Wall {
     section_m: f64,
     at_m: Option<f64>,
-    /// Last place of the vehicle, m. The wall is shown around this place.
+    /// Last known chainage of the vehicle, m. The wall is shown around it.
     middle_m: f64,
     inwards: bool,
     cells: Vec<Cell>,
 }
 
-/// Columns of a strip.
+/// A strip of the wall along the tunnel, in columns of the screen.
 pub(super) struct Strip {
-    /// Columns; `None` for those beyond the tunnel.
+    /// The columns, each with the worst of its sections; `None` beyond the tunnel's end.
     pub(super) columns: Vec<Option<Cell>>,
     /// Chainage at which the first column begins, and length of a column, m.
     pub(super) from_m: f64,
     pub(super) column_m: f64,
-    /// Column of the vehicle, and whether the vehicle moves to the right.
+    /// Column at which the vehicle is, and whether it moves to the right.
     pub(super) vehicle: Option<(usize, bool)>,
 }
 
@@ -178,7 +179,7 @@ impl Wall {
         }
     }
 
-    /// Strip of `columns` columns.
+    /// Strip of this extent with `columns` columns.
     pub(super) fn strip(&self, extent: Extent, columns: usize) -> Strip {
         let columns = columns.max(1);
         let section_of = |x_m: f64| math::floor_to_i64(x_m / self.section_m.max(1e-9));
@@ -210,9 +211,9 @@ impl Wall {
         }
     }
 
-    /// First section of a strip around the vehicle.
+    /// Index of the first section of a strip around the vehicle.
     ///
-    /// The strip moves by quarters of its width, so the picture is stationary in between.
+    /// The strip moves in steps of a quarter of its width, so the picture is stationary between steps.
     fn near(&self, here: i64, columns: usize) -> i64 {
         let step = (columns as i64 / 4).max(1);
         let from = here.div_euclid(step) * step - 2 * step + if self.inwards { 0 } else { step };
@@ -245,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn column_shows_its_worst_section_and_hours_covered_in_all_its_sections() {
+    fn wall_column_shows_its_worst_section_and_the_clock_hours_that_all_its_sections_cover() {
         let strip = wall(100, 2.0).strip(Extent::Tunnel, 50);
         assert_eq!((strip.columns.len(), strip.column_m), (50, 1.0));
         let first = strip.columns[0].unwrap();
@@ -256,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn strip_contains_the_vehicle_and_has_no_columns_beyond_the_tunnel() {
+    fn wall_strip_contains_the_vehicle_and_has_no_columns_beyond_the_tunnel() {
         for (at_m, count) in [(0.0, 400), (47.3, 400), (199.9, 400), (3.0, 20)] {
             let strip = wall(count, at_m).strip(Extent::Near, 60);
             let (column, _) = strip.vehicle.unwrap();

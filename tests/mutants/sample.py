@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Runs a sample of cargo-mutants' mutants, in the copy of the sources made by tests/mutants/run.
 
-sample.py N SEED MINUTES [PART]: cargo-mutants lists and words the mutants; N of those whose name matches PART are drawn. `switch` puts all of
-them behind a switch, so that they are built once. Each is then judged by its crate's own tests, and where these pass by tests of dives
-(tests/tests), the quick ones first, up to the first that fails. No golden file, digest or snapshot of results is among them. Two run at a
-time. Exit code 0.
+    sample.py N SEED MINUTES [PART]
+
+cargo-mutants lists the mutants and describes them. N of those whose name matches PART are drawn at random. `switch`
+puts them all behind a switch, so that they are built only once. For each mutant, the tests of its crate run first. If
+these pass, tests of dives (tests/tests) run, quick ones first, until one fails. Tests with golden files, digests or
+snapshots of results are left out. Two mutants are tested at a time. The exit code is 0.
 """
 import concurrent.futures
 import json
@@ -23,9 +25,10 @@ import time
 CRATES = ["geometry", "sampling", "fusion", "coverage", "monitor"]
 DIVES = ["coverage", "sampling", "navigation"]
 AT_A_TIME = 2
-# A set of tests gets this multiple of its usual time plus some seconds. A set that takes longer counts as endless.
+# Time limit of a set of tests: a multiple of its usual time, plus some seconds. A set that takes longer counts as
+# endless.
 PATIENCE, PATIENCE_S = 4, 60
-# Dive tests run in sets of about this many seconds, from quick to slow tests. Tests slower than a limit aren't run.
+# Dive tests run in sets of about this many seconds, from quick to slow tests. Tests slower than SLOWEST_S aren't run.
 SETS_S = [10, 40, 100_000]
 SLOWEST_S = 6.0
 SWITCH = """use std::sync::LazyLock;
@@ -43,7 +46,7 @@ def drawn(count, seed, part):
     """The sampled mutants, each with a number from 1, and the number of all mutants."""
     listing = ["cargo", "mutants", "--workspace", "--config", "tests/mutants/mutants.toml", "--list", "--json"]
     listed = json.loads(subprocess.run(listing, stdout=subprocess.PIPE, check=True).stdout)
-    # Fields left to their defaults mostly belong to values built in tests.
+    # Mutants that delete a field mostly change values that are built in tests.
     mutants = [mutant for mutant in listed if "delete field" not in mutant["name"] and re.search(part, mutant["name"])]
     chosen = random.Random(seed).sample(mutants, min(count, len(mutants)))
     for number, mutant in enumerate(chosen, 1):
@@ -77,7 +80,7 @@ def switched(mutants):
 
 
 def uncompiled():
-    """Mutants with compiler errors: each is the last one named before its error."""
+    """Mutants with compiler errors. An error belongs to the last mutant named before it."""
     packages = [word for crate in CRATES for word in ("-p", f"headrace_{crate}")]
     check = ["cargo", "check", "--quiet", "--keep-going", *packages, "--lib", "--message-format", "json"]
     told = subprocess.run(check, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
@@ -202,7 +205,7 @@ def judge(mutant, programs, own_s, dives):
 
 
 def all_judged(mutants, judge_one, end):
-    """Results by number, of as many mutants as time allows, AT_A_TIME in parallel."""
+    """Results of as many mutants as time allows, by mutant number. AT_A_TIME mutants run in parallel."""
     waiting, results, printing = queue.SimpleQueue(), {}, threading.Lock()
     for mutant in mutants:
         waiting.put(mutant)

@@ -1,16 +1,17 @@
-# Reference values for the factored covariance, at 100 digits: python3 tests/oracles/fusion.py > tests/oracles/fusion.csv
+# Reference values for the factored covariance, at 100 digits:
+#   python3 tests/oracles/fusion.py > tests/oracles/fusion.csv
 #
-# Each case is a sequence of steps on a covariance P of n errors, computed by the textbook's formulas without factors. They lose
-# up to 60 digits, so 50 would be too few. A run with 200 digits must give the same 20.
+# Each case is a sequence of steps on a covariance P of n errors, computed by the textbook's formulas without factors.
+# These formulas lose up to 60 digits, so 50 would be too few. A run with 200 digits must give the same 20.
 #   start     n variances                  P = diag
 #   measure   noise, h (n)                 P - P h h^T P / s,  s = h^T P h + noise
 #   add       variance, a (n)              P + variance a a^T
-#   shear     n (n - 1) / 2 above the diagonal of F, by rows; 1 on it       F P F^T
+#   shear     the n (n - 1) / 2 values above the diagonal of F (1 on it), by rows       F P F^T
 #   scale     number of the error, factor  the same with a diagonal F
 # and the expected results:
 #   gain      s and P h / s (n) of the last measurement, with P as before it
 #   distance  e (n), and e^T P^-1 e
-#   is        n (n + 1) / 2 of P, by rows from the diagonal on
+#   is        the n (n + 1) / 2 values of P, by rows from the diagonal on
 # Needs mpmath. Inputs are doubles and count as exact; values are rounded to 20 digits.
 
 import random
@@ -89,7 +90,7 @@ def unknown_then_known(n, prior, noise):
 
 
 def nearly_parallel(n, prior, noise, apart):
-    """Rows of which only the difference separates the errors."""
+    """Measurements that separate the errors only by the difference of two rows."""
     steps = [("start", *[prior] * n), ("measure", noise, *[1.0] * n), ("is",)]
     for i in range(n):
         h = [1.0 + (apart if k == i else 0.0) for k in range(n)]

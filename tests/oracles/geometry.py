@@ -3,11 +3,9 @@
 # case, shape, dimensions (3, m), origin y and z, direction y and z, ray parameter at the wall, arc length there (m)
 #
 # Shapes by their definition (y left, z up, arc length from the floor's centre counter-clockwise with y to the right): rectangle
-# (width, height), circle (radius), arch (width, height, radius of the vault), trimmed_circle (radius, base). Every line and
-# circle is
-# intersected by the plain formula, and the nearest intersection ahead is used. Needs mpmath. Inputs are doubles and count as
-# exact;
-# values are rounded to 25 digits.
+# (width, height), circle (radius), arch (width, height, radius of the vault), trimmed_circle (radius, base). The ray is
+# intersected with every line and circle by the plain formula, and the nearest intersection ahead is used. Needs mpmath.
+# Inputs are doubles and count as exact; values are rounded to 25 digits.
 
 from math import inf, nextafter
 
@@ -132,14 +130,15 @@ for shape in SHAPES:
             ray = (out[0] * cos(turn) - out[1] * sin(turn), out[0] * sin(turn) + out[1] * cos(turn))
             tell("grazing" if "89" in degrees else "millimetre", shape, off, ray)
 
-# Through a corner, and with the direction's first component larger or smaller by an ulp.
+# Rays through a corner, and rays whose first direction component is larger or smaller by an ulp.
 for corner in ((2.0, 0.0), (2.0, 3.0), (-2.0, 3.0), (-2.0, 0.0)):
     for origin in ((0.0, 1.5), (0.25, 1.0), (-1.75, 2.875)):
         ray = tuple(c - o for c, o in zip(corner, origin))
         for first in (ray[0], nextafter(ray[0], inf), nextafter(ray[0], -inf)):
             tell("corner", SHAPES[0], origin, (first, ray[1]))
 
-# Up along a wall that merges into the vault without a corner: the discriminant is 0, or slightly above. Half a width is exact.
+# Rays up along a wall that merges into the vault without a corner. The discriminant is 0, or slightly above. Half the
+# width is exact.
 for shape in (("arch", 6.0, 5.0, 3.0), ("arch", 2.2, 2.3, 1.1)):
     half = shape[1] / 2
     for ulps in (0, 1, 2, 7, 100, 10**6, 10**9):

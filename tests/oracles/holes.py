@@ -1,13 +1,11 @@
 # D of sections from true wall samples, by Voronoi vertices and edges of scipy: python3 tests/oracles/holes.py
 #
-# Reads tests/oracles/holes_truth.csv (chainage and arc length of samples, m; the first line has the wall's perimeter). Prints
-# the
-# table stored as tests/oracles/holes.csv: bounds and D of each section, m.
-# D of a section is twice the largest distance to the nearest sample, over centres in the section; arc length is cyclic. The
-# maximum
-# lies at a vertex of the Voronoi diagram, or at the crossing of one of its edges with an end of the section. With --trim
-# TRUTH.csv PERIMETER
-# it prints the samples of a file written by `headrace simulate --truth` instead. Needs numpy and scipy.
+# Reads tests/oracles/holes_truth.csv: chainage and arc length of samples, m. The first line has the wall's perimeter.
+# Prints the table stored as tests/oracles/holes.csv: start, end and D of each section, m.
+# D of a section is twice the largest distance to the nearest sample, over all centres in the section. Arc length is
+# cyclic. The maximum lies at a vertex of the Voronoi diagram, or where one of its edges crosses an end of the section.
+# With --trim TRUTH.csv PERIMETER, it prints the samples of a file written by `headrace simulate --truth` instead.
+# Needs numpy and scipy.
 
 import csv
 import sys
@@ -35,7 +33,7 @@ def places():
 
 
 def sections(found):
-    """Bounds of the sections with samples on both sides, well away from the ends."""
+    """Starts and ends of the sections with samples on both sides, well away from the ends of the dive."""
     xs = [x for x, _ in found]
     first, last = int((min(xs) + 1) / SECTION) + 1, int((max(xs) - 1) / SECTION)
     return [(k * SECTION, (k + 1) * SECTION) for k in range(first, last)]

@@ -2,9 +2,9 @@
 #
 # Source: Jorge et al., Sensors 2021, 21, 1900, equations as printed, on the definitions of frames and of the unrolled
 # wall (x ahead, y left, z up; alpha 0 down, growing to the left; sigma from the floor's centre via the left wall).
-# Needs mpmath. Angles in radians, lengths in metres. Inputs are doubles and count as exact, so a value's only error is its
-# rounding to
-# 25 digits, or 1e-45 near 0. Formulas are the plain ones, because 50 digits survive the cancellations.
+# Needs mpmath. Angles are in radians, lengths in metres. Inputs are doubles and count as exact, so a value's only error
+# is its rounding to 25 digits, or 1e-45 near 0. Plain formulas suffice, because 50 digits leave enough after
+# cancellation.
 
 import random
 from itertools import product
@@ -17,7 +17,7 @@ TURN = 2 * pi
 INPUTS = 8  # columns; Algorithm 1 needs the most
 rng = random.Random(20210309)
 
-# Table 2: step in degrees, steps a turn, seconds a turn.
+# Table 2: step in degrees, steps per turn, seconds per turn.
 MODES = [(0.3, 1200, 21.6), (0.6, 600, 10.8), (0.9, 400, 8.0), (1.2, 300, 6.6), (2.4, 150, 4.8)]
 
 
@@ -35,7 +35,7 @@ def eq6(h, theta, m):
 
 
 def eq8(h, theta, m):
-    # The sum itself, not its closed form h tan(m theta) / m.
+    # This computes the sum itself, not its closed form h tan(m theta) / m.
     return sum(eq6(h, theta, mpf(k)) for k in range(1, int(m) + 1)) / m
 
 
@@ -215,7 +215,7 @@ def phase_inputs():
         yield float(TURN * rng.randrange(s) / s), float(TURN / rng.choice(LAPS)), x, v
     for s, lap in zip((2, 3, 4, 5, 6), LAPS):
         omega = float(TURN / lap)
-        # Heads a whole turn's travel apart, and so far apart that rounding absorbs the shift.
+        # Heads that are apart by the travel of a whole turn, and by so much that rounding absorbs the shift.
         yield float(TURN / s), omega, 0.197 * lap, 0.197
         yield float(TURN / s), omega, 0.197 * lap / s, 0.197
         yield float(TURN / s), -omega, 1.102, 0.197
@@ -254,7 +254,7 @@ def algorithm1_inputs():
         yield 1, s, 8.0, 0.0, 0.197, 0.0, -1, 0
         yield s - 1, s, 8.0, 0.0, 0.197, end, 1, 0
         yield s - 1, s, 8.0, 0.0, 0.197, end, -1, 1
-        # A delay slightly beyond the start: t is just below 0, and Ts when rounded.
+        # A delay slightly beyond the start: t is just below 0, and rounds to Ts.
         yield s - 1, s, 10.8, 1e-18, 1.0, 0.0, 1, 0
 
 
@@ -268,7 +268,7 @@ def off_wall(shape, angle, gap):
 
 
 def towards(head, yaw, pitch, point):
-    """The alpha whose beam passes through a point of the section: dy / dz of `direction` solved for it."""
+    """The alpha whose beam passes through a point of the section, from dy / dz of `direction`."""
     ahead, up = mpf(point[0]) - head[0], mpf(point[1]) - head[1]
     across = ahead * cos(pitch) - up * sin(pitch) * sin(yaw)
     return atan2(across, -up * cos(yaw))
@@ -300,7 +300,8 @@ def rays():
         yield shape, *head, 0.0, 0.0, angle
         yield shape, *head, 0.2, -0.1, angle + float(pi / 2)
     yield TRIMMED, 5.198, 0.001, 0.1, 0.1, rad(269.9)
-    # 89.99 degrees and more off the normal of the wall that is hit: in a section this small, only with the head even nearer.
+    # Beams 89.99 degrees and more off the normal of the wall that they hit. In such a small section, the head must be
+    # even nearer to the wall.
     yield RECTANGLE, 0.2, 1e-4, 0.0, 0.0, rad(89.99)
     yield RECTANGLE, 1.9999, 1.0, 0.0, 0.0, rad(0.01)
     yield RECTANGLE, -1.9999, 1.0, 0.3, 0.0, rad(180.01)

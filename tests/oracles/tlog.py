@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Content of a MAVLink telemetry log, for tests/tests/import/recordings.rs: python3 tests/oracles/tlog.py FILE
 
-Written from MAVLink's definitions, without any code of ours: frames, and of the autopilot's ATTITUDE, RAW_IMU,
-SCALED_PRESSURE and SCALED_PRESSURE2 the counts and ranges, in the units and senses of the wire.
+Written from MAVLink's definitions, without code of headrace. Prints the number of frames, and counts and ranges of the
+autopilot's ATTITUDE, RAW_IMU, SCALED_PRESSURE and SCALED_PRESSURE2 messages, in the messages' own units and signs.
 """
 
 import collections
@@ -47,7 +47,7 @@ def main():
     with open(sys.argv[1], "rb") as file:
         found = list(frames(file.read()))
     print(f"frames {len(found)}")
-    # Definitions may be missing: then one extra byte must match all frames of the message number.
+    # If a message's definition is missing, one extra byte must match all frames with its number.
     fits = collections.defaultdict(list)
     for _, component, number, _, content, crc in found:
         before = checksum(content)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Trims recordings made by others to the fixtures in this folder: python3 tests/recordings/make.py FOLDER
 
-FOLDER holds the recordings at full length with their licences, each in a folder named as here; the README there says
-where they are from. The Ping360 frames are made up by this script.
+FOLDER has the recordings at full length with their licences, each in a folder with the same name as here. Its README
+states their sources. The Ping360 frames are made up by this script.
 """
 
 import gzip

@@ -1,12 +1,12 @@
-"""Recordings of ROS and the same values as tables, for tests/tests/import/ros_import.rs.
+"""Makes ROS recordings, and tables with the same values, for tests/tests/import/ros_import.rs.
 
-Written by rosbags, which shares nothing with the reader that they test. To repeat:
+The recordings are written by rosbags, which shares no code with the reader under test. To make them again:
 
     pip install rosbags==0.11.9
     python3 tests/ros/make.py
 
-The files come out the same, byte for byte, with the same version. `values.csv` and `heads.csv` say the same by another way: they are
-imported as tables, and must give the same messages.
+With the same version of rosbags, the files are the same, byte for byte. `values.csv` and `heads.csv` contain the same
+values. They are imported as tables and must give the same messages.
 """
 
 import math
@@ -40,7 +40,7 @@ def values():
         if i % 2 == 0:
             yield at + 7 * MS, "depth", (151_325.0 + 50 * i,)
             yield at + 9 * MS, "tether", (3 + 0.01 * i,)
-        # Every fifth has no return.
+        # Every fifth ping has no return.
         yield at + 11 * MS, "ping_left", (None if i % 5 == 4 else single(2.5 + 0.01 * i),)
 
 
@@ -128,7 +128,7 @@ def messages(store, ros1, stamped=lambda ns: ns):
             ranges=numpy.array(ranges, dtype=numpy.float32), intensities=numpy.zeros(0, dtype=numpy.float32),
         )
         found.append((rows[-1][2], "/sonar/scan", kind, message))
-        # The same as a cloud in the head's own frame; beams without a return have no point.
+        # The same values as a point cloud in the head's own frame. Beams without a return have no point.
         kind = "sensor_msgs/msg/PointCloud2"
         field = types["sensor_msgs/msg/PointField"]
         points = b"".join(
@@ -159,7 +159,7 @@ def bag(path, compression=None, **further):
     if compression:
         writer.set_compression(compression)
     with writer:
-        # Small chunks, to get several.
+        # Chunks are small, so that the file has several.
         writer.chunk_threshold = 8192
         connections = {}
         for at, topic, kind, message in messages(store, True, **further):
@@ -207,6 +207,6 @@ if __name__ == "__main__":
         bag(HERE / f"{name}.bag", compression)
     recording(HERE / "humble.mcap", Stores.ROS2_HUMBLE)
     recording(HERE / "jazzy.mcap", Stores.ROS2_JAZZY)
-    # Its computer's clock starts when it was switched on, 20 s before.
+    # The sender's clock started when its computer was switched on, 20 s before.
     recording(HERE / "boot_time.mcap", Stores.ROS2_HUMBLE, stamped=lambda ns: ns - FIRST_NS + 20 * 10**9)
     tables()

@@ -11,7 +11,7 @@ use headrace_sensor::device::Direction;
 use headrace_sensor::reading::SourceId;
 use headrace_simulator::{Scene, Simulation};
 
-/// A simulated dive in which one source may stay silent.
+/// Feed of a simulated dive in which one source may stay silent.
 struct Partly {
     simulation: Simulation,
     dumb: Option<usize>,
@@ -39,13 +39,13 @@ impl PacketSource for Partly {
     }
 }
 
-/// Advice at each update, with the results of the dive.
+/// Advice at each update of a dive, with the dive's report and digest.
 pub struct Advised {
-    /// Advice at each update.
+    /// Advice at each update of the dive.
     pub beats: Vec<AdviceEntry>,
     /// Report of the dive.
     pub report: Report,
-    /// Digest of the dive.
+    /// Digest of the dive's results.
     pub digest: u64,
 }
 
@@ -69,12 +69,12 @@ pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
 }
 
 impl Advised {
-    /// Updates in the second half of the dive.
+    /// Advice updates in the second half of the dive.
     pub fn settled(&self) -> &[AdviceEntry] {
         &self.beats[self.beats.len() / 2..]
     }
 
-    /// Median of a value over the second half of the dive.
+    /// Median of a value over the advice updates in the second half of the dive.
     pub fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
         let mut values: Vec<f64> = self.settled().iter().map(of).collect();
         values.sort_by(f64::total_cmp);

@@ -19,7 +19,7 @@ const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const WAIT_NS: u32 = 1_000_000;
 const BAUD: u32 = 115_200;
 
-/// A fault of a line, which changes the data on that line.
+/// A fault of a line between device and host, which changes the data on that line.
 pub trait Fault: Send {
     /// Sends frame `number` of the device to the host.
     fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
@@ -27,18 +27,18 @@ pub trait Fault: Send {
         line.whole(frame);
     }
 
-    /// Takes bytes from the host and returns the bytes that reach the device.
+    /// Takes bytes that the host sent, and returns the bytes that reach the device.
     fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
         bytes
     }
 
-    /// Runs in every cycle between frames.
+    /// Hook that runs in every cycle between the device's frames.
     fn meanwhile(&mut self, line: &mut Wire) {
         let _ = line;
     }
 }
 
-/// No fault.
+/// A line without faults.
 pub struct Healthy;
 
 impl Fault for Healthy {}
@@ -54,7 +54,7 @@ pub struct End {
 }
 
 impl End {
-    /// A serial port with a stable name in `folder`, like udev's links by identity.
+    /// Creates the end of a serial port with a stable name in `folder`, like udev's links by identity.
     pub fn serial(folder: &std::path::Path, name: &str) -> Self {
         let link = folder.join(name);
         let port = SerialPort::Path(link.display().to_string());
@@ -68,12 +68,12 @@ impl End {
         end
     }
 
-    /// A TCP port on this machine.
+    /// Creates the end of a TCP port on this machine.
     pub fn tcp() -> Self {
         Self::of_network(Carrier::Tcp)
     }
 
-    /// A UDP port on this machine.
+    /// Creates the end of a UDP port on this machine.
     pub fn udp() -> Self {
         Self::of_network(Carrier::Udp)
     }
@@ -83,7 +83,7 @@ impl End {
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
-    /// An end on the line of the previous sensor, which has the end `other`.
+    /// A device's end that shares the line of the previous sensor; `other` is that sensor's end.
     pub fn beside(other: &Self) -> Self {
         Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
     }
@@ -93,19 +93,19 @@ impl End {
         self.beside
     }
 
-    /// Whether the end is a serial port.
+    /// Whether the line is a serial port.
     pub fn is_pseudoterminal(&self) -> bool {
         self.link.is_some()
     }
 
-    /// Returns the same end, not plugged in yet.
+    /// Returns the same end of the line, with the device not plugged in yet.
     #[must_use]
     pub fn absent(mut self) -> Self {
         self.unplug();
         self
     }
 
-    /// Address that the host opens.
+    /// Address that the host opens to reach the device.
     pub fn connect(&self) -> &Connect {
         &self.connect
     }
@@ -129,12 +129,12 @@ impl End {
     }
 }
 
-/// Controls and counters of a device under test.
+/// Controls and counters of an emulated device in a test.
 #[derive(Default)]
 pub struct Control {
     unplugged: AtomicBool,
     silent: AtomicBool,
-    /// Whether the device is silent.
+    /// Whether the device sends nothing.
     quiet: AtomicBool,
     gone: AtomicBool,
     healed: AtomicBool,
@@ -152,7 +152,7 @@ impl Control {
         self.unplugged.store(false, Ordering::SeqCst);
     }
 
-    /// Makes the device silent from now on.
+    /// Makes the device send nothing from now on.
     pub fn fall_silent(&self) {
         self.silent.store(true, Ordering::SeqCst);
         while !self.quiet.load(Ordering::SeqCst) {
@@ -160,7 +160,7 @@ impl Control {
         }
     }
 
-    /// Ends the silence.
+    /// Ends the device's silence.
     pub fn speak(&self) {
         self.quiet.store(false, Ordering::SeqCst);
         self.silent.store(false, Ordering::SeqCst);
@@ -171,34 +171,34 @@ impl Control {
         self.healed.store(true, Ordering::SeqCst);
     }
 
-    /// Number of frames sent whole.
+    /// Number of frames that the device has sent whole.
     pub fn whole(&self) -> u64 {
         self.whole.load(Ordering::SeqCst)
     }
 }
 
-/// The device's end of the line, as faults see it.
+/// The device's end of the line, with the operations that faults may use.
 pub struct Wire {
     end: End,
     control: Arc<Control>,
 }
 
 impl Wire {
-    /// Sends a whole frame.
+    /// Sends a whole frame to the host and counts it.
     pub fn whole(&mut self, frame: &[u8]) {
         self.part(frame);
         let called = self.end.stand.as_ref().is_some_and(EmulatedPort::is_called);
         self.control.whole.fetch_add(u64::from(called), Ordering::SeqCst);
     }
 
-    /// Sends bytes that aren't a whole frame.
+    /// Sends bytes to the host that aren't a whole frame, so they aren't counted.
     pub fn part(&mut self, bytes: &[u8]) {
         if let Some(stand) = &mut self.end.stand {
             stand.write(bytes).unwrap();
         }
     }
 
-    /// Adds frames that were sent whole in another way to the count.
+    /// Adds to the count of whole frames those that were sent by other means than [`Wire::whole`].
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }
@@ -226,7 +226,7 @@ impl Faulty {
         Self { control, thread: Some(thread) }
     }
 
-    /// Controls of this line.
+    /// Controls and counters of the devices on this line.
     pub fn control(&self) -> &Control {
         &self.control
     }

@@ -1,4 +1,4 @@
-//! The field scene with settings that suit it, and the errors of the estimated trajectory.
+//! The scene `vita1-field` with settings that suit it, and the errors of the estimated trajectory.
 
 use headrace_fusion::Fix;
 use headrace_geometry::frames::{Tunnel, Vec3};
@@ -13,28 +13,28 @@ use crate::tracking::{self, Track};
 /// Time of a head's turn in mode SLOW, s.
 pub const TURN_S: f64 = 21.6;
 
-/// Root mean squares of a dive's errors.
+/// Root mean squares of the navigation errors in a dive.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Figures {
-    /// Across the tunnel, m.
+    /// Position error across the tunnel, m.
     pub across_m: f64,
-    /// Vertical, m.
+    /// Vertical position error, m.
     pub up_m: f64,
-    /// Chainage, m.
+    /// Chainage error, m.
     pub along_m: f64,
-    /// Displacement during one turn of a head, m.
+    /// Error of the vehicle's displacement during one turn of a head, m.
     pub turn_m: f64,
-    /// Reported standard deviation of that displacement, m.
+    /// Reported standard deviation of the displacement during one turn of a head, m.
     pub turn_arc_m: f64,
-    /// Heading, degrees.
+    /// Heading error, degrees.
     pub yaw_deg: f64,
-    /// Roll and pitch together, degrees.
+    /// Errors of roll and pitch together, degrees.
     pub tilt_deg: f64,
-    /// Share of pings with a fix, 0 to 1.
+    /// Fraction of pings with a position fix, 0 to 1.
     pub fixed: f64,
 }
 
-/// Root mean square; 0 without values.
+/// Root mean square of the values; 0 without values.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut n, mut sum) = (0.0, 0.0);
     for value in values {
@@ -44,7 +44,7 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     math::sqrt(sum / f64::max(n, 1.0))
 }
 
-/// Errors of a dive's fixes against the truth.
+/// Errors of a dive's position fixes against the truth.
 pub fn figures(track: &Track) -> Figures {
     let known: Vec<_> = track.fixes.iter().filter_map(|t| Some((t.at, t.fix.ok()?, t.truth))).collect();
     let off: Vec<Vec3<Tunnel>> =
@@ -65,7 +65,7 @@ pub fn figures(track: &Track) -> Figures {
     }
 }
 
-/// Errors of the displacement during one turn, with their reported standard deviations.
+/// Errors of the vehicle's displacement during one turn of a head, with their reported standard deviations.
 pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
     let mut before = 0;
     let mut turns = Vec::new();
@@ -111,7 +111,7 @@ pub fn field(seed: u64, length_m: f64) -> Scene {
     field_with(seed, length_m, SETTINGS, "")
 }
 
-/// The field scene with other settings, and without the line `without`.
+/// The field scene with the `[navigation]` settings `settings`, and without the text `without`.
 pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Scene {
     let scene = include_str!("../../deploy/scenes/vita1-field.toml");
     let length = format!("distance_m = {length_m}");
@@ -130,7 +130,7 @@ pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Sc
     scenes::seeded(&shorter, &load, Some(seed))
 }
 
-/// Degrees of freedom of a pose.
+/// Indices of the pose's six degrees of freedom in the filter's error state.
 pub const POSE: [usize; 6] = [0, 1, 2, 6, 7, 8];
 
 /// Normalised estimation error squared (NEES) of the pose.

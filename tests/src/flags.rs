@@ -11,31 +11,31 @@ use std::ops::Range;
 use headrace_geometry::frames::{Pose, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::report::SectionReport;
+use headrace_monitor::section_row::SectionRow;
 
 use crate::instrumented::{Dive, Ping};
 use headrace_oracle::wall::Wall;
 
-/// Interval at which poses are evaluated.
+/// Interval at which the vehicle's poses are evaluated.
 pub const EVERY: DurNs = DurNs(100_000_000);
-/// Number of rays round a head.
+/// Number of rays cast in all directions round a head.
 const RAYS: u32 = 48;
 /// Number of parts into which a section is divided for the search for its earliest fail.
 pub const PARTS: u32 = 16;
-/// Tolerance of the chainage that all heads have passed, m. The program updates this chainage five times a second,
-/// and takes the farthest wall as the reach of a tilted head.
+/// Tolerance of the chainage from which all heads have passed the wall, m. The program updates this chainage five times
+/// a second, and takes the farthest wall as the reach of a tilted head.
 pub const NEAR_M: f64 = 0.12;
-/// A shorter backward motion counts as sway, m.
+/// Distance below which a backward motion of the vehicle counts as sway, m.
 const WAY_BACK_M: f64 = 0.05;
 
-/// Reach of the heads at a moment.
+/// Range of chainages at which the heads can hit the wall at a moment.
 #[derive(Debug, Clone, Copy)]
 pub struct Reached {
-    /// Time.
+    /// Time at which the heads have this reach.
     pub at: MonoNs,
-    /// Smallest chainage at which a head can lay a sample, m.
+    /// Smallest chainage at which any head can sample the wall, m.
     pub rear_m: f64,
-    /// Largest chainage at which a head can lay a sample, m.
+    /// Largest chainage at which any head can sample the wall, m.
     pub front_m: f64,
 }
 
@@ -99,7 +99,7 @@ pub fn left_behind(reached: &[Reached], chainage_m: f64) -> Option<MonoNs> {
     reached.iter().find(|reached| reached.rear_m >= chainage_m).map(|reached| reached.at)
 }
 
-/// The wall with all samples up to a moment.
+/// The wall with all samples of a dive up to a moment.
 pub fn wall_until(dive: &Dive, until: MonoNs) -> Wall {
     let before = |ping: &&Ping| ping.received <= until;
     let samples = dive.pings.iter().filter(before).filter_map(|ping| ping.sample);
@@ -113,7 +113,7 @@ pub struct Flag {
     pub start_m: f64,
     /// First moment after which forward motion can't undo the fail, seconds.
     pub due_s: Option<f64>,
-    /// Earliest value of `due_s` within the resolution of the parts, seconds.
+    /// Earliest possible value of `due_s`, given the resolution of one part of a section, seconds.
     pub may_s: Option<f64>,
     /// End of the dive, seconds.
     pub end_s: f64,
@@ -121,9 +121,9 @@ pub struct Flag {
     pub raised_s: Option<f64>,
     /// Time at which the loop cleared the flag, seconds.
     pub cleared_s: Option<f64>,
-    /// Distance that the reach moved between the due moment and the raising of the flag, m.
+    /// Distance that the heads' reach moved between the due moment and the raising of the flag, m.
     pub late_m: Option<f64>,
-    /// Whether the section fails with all samples of the dive.
+    /// Whether the section fails in the end, with all samples of the dive.
     pub fails: bool,
 }
 
@@ -145,14 +145,14 @@ pub struct Journey {
     /// Indices of the longest backward motion in `reached`; an empty range at the end if the vehicle never turned
     /// back.
     back: Range<usize>,
-    /// The wall at the end of the dive. `turned` is the wall when the vehicle turned back.
+    /// Samples on the wall at the end of the dive. `turned` has the samples at the moment when the vehicle turned back.
     whole: Wall,
     turned: Option<Wall>,
     end_s: f64,
 }
 
 impl Journey {
-    /// Extracts reach and samples of a dive.
+    /// Computes the heads' reach over a dive, and collects the dive's samples.
     pub fn of(dive: &Dive) -> Self {
         let reached = reached(dive);
         let (mut most, mut back, mut longest_m) = (0, reached.len()..reached.len(), WAY_BACK_M);
@@ -188,7 +188,7 @@ impl Journey {
         let section = report.sections.iter().find(|section| section.start_m >= flag.start_m);
         let Some((section, raised_s)) = section.zip(flag.raised_s) else { return false };
         let raised = MonoNs(math::round_to_i64(raised_s * 1e9).unsigned_abs());
-        // The maximum over several pings is used, because places and attitudes have navigation noise.
+        // The maximum reach over several pings is used, because estimated positions and attitudes are noisy.
         let near = |ping: &&Ping| raised.since(ping.received).0.abs() <= EVERY.0;
         let poses = dive.pings.iter().filter(near).filter_map(|ping| ping.pose);
         let rear_m = poses.map(|pose| ends_m(dive, &pose)[0]).fold(f64::MIN, f64::max);
@@ -200,17 +200,18 @@ impl Journey {
         first_m.is_some_and(|first_m| first_m + radius_m - line_m <= rear_m)
     }
 
-    /// The flags of a dive. A section fails if its hole exceeds the target by `sd` standard deviations.
+    /// Due and actual flags of all sections of a dive. A section fails if its hole exceeds the target by `sd` standard
+    /// deviations.
     pub fn flags(&self, dive: &Dive, sd: f64) -> Vec<Flag> {
         let target_m = dive.report.target_m;
         dive.report.sections.iter().map(|section| self.flag(target_m, section, sd)).collect()
     }
 
-    fn flag(&self, target_m: f64, section: &SectionReport, sd: f64) -> Flag {
+    fn flag(&self, target_m: f64, section: &SectionRow, sd: f64) -> Flag {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due_m = |wall: &Wall, early_m: f64| {
-            // The tolerance has the opposite sign in the search for the earliest due moment.
+            // In the search for the earliest due moment, the tolerance `NEAR_M` has the opposite sign.
             let near_m = if early_m > 0.0 { -NEAR_M } else { NEAR_M };
             let passed_m = all_passed_from_m(&self.reached) + near_m;
             Some(first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)

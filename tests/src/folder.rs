@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::short_dive::{SCENE, VEHICLE};
 
-/// Longest wait for the expected report of a dive, s.
+/// Longest duration of a live dive that a test repeats until the report is as expected, s.
 const LONG_S: u32 = 100;
 
 /// The program under test, ready for arguments.
@@ -28,7 +28,7 @@ fn built() -> PathBuf {
 /// bare file names.
 pub struct Folder(PathBuf);
 
-/// Result of a command.
+/// Result of a run of the program.
 pub struct Answer {
     /// Exit code; `None` if a signal ended the program.
     pub code: Option<i32>,
@@ -67,7 +67,7 @@ impl Folder {
         std::fs::write(self.path(name), content).unwrap();
     }
 
-    /// Content of a file in this folder.
+    /// Reads a file in this folder.
     pub fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.path(name)).unwrap()
     }
@@ -104,7 +104,7 @@ impl Folder {
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     }
 
-    /// Records a replay of the log of `vehicle.toml` as a live dive, as fast as possible. Returns the answer.
+    /// Runs the log `from` as a live dive of `vehicle.toml`, as fast as possible, and records it to the log `to`.
     #[track_caller]
     pub fn record(&self, from: &str, to: &str, further: &[&str]) -> Answer {
         let arguments = ["run", "vehicle.toml", "--source", from, "--record", to, "--speed", "max"];
@@ -124,7 +124,7 @@ impl Folder {
         assert!(!self.path("dive.mcap").exists(), "a refused scene leaves no log");
     }
 
-    /// Exit code and report of `replay LOG --json` with further arguments.
+    /// Runs `replay LOG --json` with further arguments; returns exit code and report.
     pub fn replay(&self, log: &str, further: &[&str]) -> (Option<i32>, Value) {
         let answer = self.headrace(&[&["replay", log, "--json"], further].concat());
         let report = serde_json::from_str(&answer.stdout)
@@ -132,7 +132,7 @@ impl Folder {
         (answer.code, report)
     }
 
-    /// Digest of a replay without findings.
+    /// Digest of the results of a log's replay, which must report no loss or other finding.
     pub fn digest(&self, log: &str, further: &[&str]) -> String {
         let (code, report) = self.replay(log, further);
         assert_eq!(code, Some(0), "{log} {further:?}: {:?}", report["log"]["losses"]);

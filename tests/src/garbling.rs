@@ -1,4 +1,4 @@
-//! Deterministic damage to bytes on bad lines.
+//! Line faults that damage bytes, drawn from a fixed seed.
 
 use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
 use headrace_ping1d::codec::PingCodec;
@@ -7,15 +7,15 @@ use headrace_sensor::codec::Codec;
 use crate::faulty::{Fault, Wire};
 use crate::random::Random;
 
-/// Counts the good frames that a codec finds in some bytes.
+/// Function that counts the good frames that a codec finds in some bytes.
 pub type Count = fn(&[u8]) -> u64;
 
-/// Number of good frames of an echosounder.
+/// Number of good echosounder frames in some bytes.
 pub fn of_ping(bytes: &[u8]) -> u64 {
     counted(&mut PingCodec::default(), bytes)
 }
 
-/// Number of good frames of a profiling head.
+/// Number of good frames of a profiling head in some bytes.
 pub fn of_head(bytes: &[u8]) -> u64 {
     counted(&mut ReturnCodec::new(Returns { model: Some(Model::Head881) }), bytes)
 }
@@ -34,7 +34,7 @@ pub struct Garbled {
 }
 
 impl Garbled {
-    /// Passes all bytes through `change`. `count` counts the frames that stay good.
+    /// Passes all bytes through `change`. `count` counts the frames that are still good after the change.
     pub fn new(seed: u64, count: Count, change: fn(&mut Random, &[u8]) -> Vec<u8>) -> Self {
         Self { random: Random(seed), change, count }
     }
@@ -67,7 +67,7 @@ pub fn thinned(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     bytes.iter().copied().filter(|_| !random.one_in(100)).collect()
 }
 
-/// A fault made of a function, which is called with the number and the bytes of each frame.
+/// A line fault made from a function, which is called with the number and the bytes of each frame.
 pub struct EachFrame<F>(pub F);
 
 impl<F: FnMut(u64, &[u8], &mut Wire) + Send> Fault for EachFrame<F> {

@@ -18,12 +18,12 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::scenes;
 
-/// A return with its place on the wall.
+/// A sonar return with its place on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Chainage and arc length, m.
+    /// Place of the return on the unrolled wall: chainage and arc length, m.
     pub place: [f64; 2],
-    /// The same place in the tunnel's frame, m.
+    /// Place of the return in the tunnel's frame, m.
     pub point: [f64; 3],
 }
 
@@ -38,11 +38,11 @@ pub struct Ping {
     pub new_sweep: bool,
     /// Whether the head has moved by exactly one step since the previous ping.
     pub single_step: bool,
-    /// Pose of the vehicle, if known.
+    /// Estimated pose of the vehicle at the ping, if known.
     pub pose: Option<Pose>,
-    /// The return, if it was accepted as wall and placed.
+    /// The ping's return, if the loop accepted it as wall and placed it.
     pub sample: Option<Sample>,
-    /// The return, if it was not accepted as wall.
+    /// The ping's return, if the loop did not accept it as wall.
     pub doubtful: Option<Sample>,
 }
 
@@ -52,9 +52,9 @@ pub struct Dive {
     pub pings: Vec<Ping>,
     /// Report of the dive.
     pub report: Report,
-    /// Cross-section in the loop's configuration.
+    /// Cross-section of the tunnel in the loop's configuration.
     pub profile: Profile,
-    /// Mounts of the heads, by number.
+    /// Mount of each head, by number of the head.
     pub mounts: Vec<Mount>,
     /// Range of each head at the site's speed of sound, m.
     pub ranges_m: Vec<f64>,
@@ -63,12 +63,12 @@ pub struct Dive {
 }
 
 impl Dive {
-    /// All samples, in order.
+    /// All samples of the dive, in order.
     pub fn samples(&self) -> impl Iterator<Item = &Sample> {
         self.pings.iter().filter_map(|ping| ping.sample.as_ref())
     }
 
-    /// Samples of some heads: chainage and arc length, m.
+    /// Samples of the selected heads: chainage and arc length, m.
     pub fn samples_of(&self, is_one: impl Fn(usize) -> bool) -> impl Iterator<Item = [f64; 2]> {
         self.pings.iter().filter(move |ping| is_one(ping.head)).filter_map(|ping| Some(ping.sample?.place))
     }
@@ -77,9 +77,9 @@ impl Dive {
 #[derive(Default)]
 struct Seen {
     pings: Vec<Ping>,
-    /// Place of every return. The loop may decide later whether a return is wall or doubtful.
+    /// Place of every return. The loop may decide later whether the return is from the wall or doubtful.
     placed: Vec<Option<[f64; 3]>>,
-    /// Source of each ping.
+    /// Source (number of the sensor) of each ping.
     sources: Vec<SourceId>,
 }
 
@@ -112,7 +112,7 @@ impl Seen {
         }
     }
 
-    /// Adds a classified return to its ping.
+    /// Adds a return that the loop has classified to its ping.
     fn note_return(&mut self, words: &[u64], is_wall: bool) {
         let [received, source, _, place @ ..] = words else { panic!("a ping's words") };
         let [x_m, y_m, z_m, arc_m] = [0, 1, 2, 3].map(|k| f64::from_bits(place[k]));

@@ -5,7 +5,7 @@
 
 use serde_json::{Map, Value};
 
-/// Differences between `value` and the root schema, as text.
+/// Violations of the schema by `value`, as text.
 pub fn faults(schema: &Value, value: &Value) -> Vec<String> {
     let mut faults = Vec::new();
     Checker { root: schema, faults: &mut faults }.check("", schema, value);
@@ -40,7 +40,7 @@ impl Checker<'_> {
                     let fits = |one: &&Value| faults(one, value).is_empty();
                     wanted.as_array().unwrap().iter().filter(fits).count() == 1
                 }
-                // Only the encoding is checked here, not the decoded content.
+                // For `contentEncoding`, only the encoding is checked, not the decoded content.
                 "contentEncoding" => wanted == "base64" && base64(value.as_str().unwrap()).is_some(),
                 "const" => value == wanted,
                 "enum" => wanted.as_array().unwrap().contains(value),

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mcap::{Attachment, Message, MessageStream, WriteOptions};
 
-/// Messages of the devices, in the order of the file.
+/// Messages with the devices' raw data, in the order of the log file.
 pub fn raw_messages(log: &[u8]) -> Vec<Message<'_>> {
     let all = MessageStream::new(log).unwrap().map(Result::unwrap);
     all.filter(|message| message.channel.topic.starts_with("/raw/")).collect()

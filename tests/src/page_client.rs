@@ -19,10 +19,10 @@ const WITHIN: Duration = Duration::from_mins(2);
 
 const SCHEMA: &str = include_str!("../../docs/reference/page-feed.schema.json");
 
-/// A running program with a page, killed when it goes out of scope.
+/// A running program that serves the page. It is killed when this value goes out of scope.
 pub struct Serving {
     child: Child,
-    /// Host and port of the page.
+    /// Host and port at which the program serves the page.
     pub address: String,
     /// Standard input of the program.
     pub stdin: Option<ChildStdin>,
@@ -81,7 +81,7 @@ impl Serving {
         ask(&self.address, method, path, headers, body)
     }
 
-    /// Sends a request, which must succeed with status 200. Returns the body of the response.
+    /// Sends a GET request, which must succeed with status 200. Returns the body of the response.
     pub fn get(&self, path: &str) -> Vec<u8> {
         let bytes = answer_of(&self.address, "GET", path, &[], &[]);
         assert!(bytes.starts_with(b"HTTP/1.1 200"), "{path}: {}", String::from_utf8_lossy(&bytes));
@@ -131,47 +131,47 @@ fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[
     bytes
 }
 
-/// A section as the client received it.
+/// A section of the wall as the client received it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenSection {
-    /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
+    /// Verdict: 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
     pub verdict: u8,
     /// Verdict for the second target; `None` without a second target.
     pub compared: Option<u8>,
-    /// Number of the cause.
+    /// Number of the cause of the section's verdict.
     pub cause: u8,
-    /// Diameter of the hole, m.
+    /// Diameter of the section's largest hole, m.
     pub hole_m: f32,
     /// Bit set of the covered parts of the section.
     pub seen: u64,
 }
 
-/// A connected client.
+/// A connected client, and everything that it has received.
 pub struct Viewer {
     socket: WebSocket<TcpStream>,
-    /// First message.
+    /// First message that the server sent.
     pub hello: Value,
-    /// Sections by number.
+    /// Sections of the wall by number.
     pub sections: BTreeMap<i32, SeenSection>,
-    /// Number of samples received.
+    /// Number of wall samples received.
     pub samples: u64,
     /// Number of section frames received, and number of sections in these frames.
     pub section_frames: (u64, u64),
-    /// Last state.
+    /// Last live state received.
     pub state: Value,
     /// Last list of alerts, updated by all later changes.
     pub alerts: BTreeMap<u64, Value>,
-    /// Notes.
+    /// Operator's notes received.
     pub notes: Vec<Value>,
-    /// Other messages, newest last.
+    /// All other messages received, newest last.
     pub others: Vec<Value>,
-    /// Last sequence number.
+    /// Last sequence number received.
     pub seq: u64,
     /// Schema of text messages: `docs/reference/page-feed.schema.json`.
     schema: Value,
 }
 
-/// Differences between a text message and the schema of its type.
+/// Violations by a text message of the schema for its type.
 fn faults(schema: &Value, text: &Value) -> Vec<String> {
     let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
         let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();
@@ -184,7 +184,7 @@ fn faults(schema: &Value, text: &Value) -> Vec<String> {
 }
 
 impl Viewer {
-    /// Connects with this query, which begins with `?` or is empty.
+    /// Connects to the page with this URL query, which begins with `?` or is empty.
     pub fn connect(
         serving: &Serving,
         query: &str,
@@ -226,7 +226,8 @@ impl Viewer {
         })
     }
 
-    /// Reads until `holds` returns true. Panics if the connection ends or the time is over before that.
+    /// Reads messages until `holds` returns true. Panics if the connection ends or the time limit is reached before
+    /// that.
     #[expect(clippy::disallowed_methods, reason = "the wait would never end")]
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
         let began = std::time::Instant::now();
@@ -238,7 +239,7 @@ impl Viewer {
         }
     }
 
-    /// Reads until a message of this type arrives.
+    /// Reads messages until one of this type arrives.
     pub fn until_type(&mut self, kind: &str) -> Value {
         let before = self.others.len();
         self.until(kind, |viewer| viewer.others[before..].iter().any(|other| other["type"] == kind));
@@ -258,29 +259,29 @@ impl Viewer {
         }
     }
 
-    /// Reads until the dive has begun; before that, a replay can't be controlled.
+    /// Reads messages until the dive has begun; before that, a replay can't be controlled.
     pub fn until_begun(&mut self) {
         self.until("a state", |viewer| !viewer.state.is_null());
     }
 
-    /// Reads a message.
+    /// Reads a message and updates the fields.
     pub fn read(&mut self) -> Result<(), tungstenite::Error> {
         let message = self.socket.read()?;
         self.take(&message);
         if message.is_close() { Err(tungstenite::Error::ConnectionClosed) } else { Ok(()) }
     }
 
-    /// Sends a command.
+    /// Sends an operator's command to the server.
     pub fn send(&mut self, command: &Value) {
         self.send_raw(Message::Text(command.to_string().into())).unwrap();
     }
 
-    /// Sends any message.
+    /// Sends any WebSocket message to the server.
     pub fn send_raw(&mut self, message: Message) -> Result<(), tungstenite::Error> {
         self.socket.send(message)
     }
 
-    /// Query that resumes a lost connection.
+    /// URL query with which a client resumes a lost connection.
     pub fn resume(&self) -> String {
         format!("?instance={}&since={}", self.hello["instance"].as_str().unwrap(), self.seq)
     }

@@ -1,10 +1,11 @@
 //! Finds the largest speed at which a vehicle's sections truly pass, to compare it with the advised and planned
 //! speeds.
 //!
-//! A dive passes if nearly all of its sections have the verdict pass, and if no circle without true samples in these
-//! sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's coverage or
-//! advice.
+//! A dive passes if nearly all of its sections have the verdict "pass", and if no circle without true samples
+//! in these sections exceeds the target. The comparison uses `truth`, which shares nothing with the program's
+//! coverage or advice.
 
+use headrace_coverage::Verdict;
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
 use headrace_sensor::device::Sense;
@@ -16,75 +17,77 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// Start of a dive that isn't judged, s. In this time, the filter learns the biases of the inertial unit.
+/// Period at the start of a dive that isn't evaluated, s. In this time, the filter learns the biases of the inertial
+/// unit.
 const SETTLES_S: f64 = 100.0;
-/// Length that is judged, m.
+/// Length of the part of a dive that is evaluated, m.
 const JUDGED_M: f64 = 8.0;
-/// Fraction of sections that must pass, as in a dive at the planned speed. None of these sections may pass falsely.
+/// Fraction of the evaluated sections that must pass, as in a dive at the planned speed. None of them may pass although
+/// its true hole exceeds the target.
 const PASSING: f64 = 0.95;
-/// One section out of this many may fail.
+/// One evaluated section out of this many may fail.
 const FAILING: usize = 20;
-/// Speeds tried in the search, as multiples of the first speed.
+/// Speeds tried in the search for the largest passing speed, as multiples of the first speed tried.
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
 
-/// A vehicle on a dive.
+/// A vehicle with its mode, target and effects in a dive.
 #[derive(Debug, Clone)]
 pub struct Outing {
-    /// The vehicle with its layout and file.
+    /// The vehicle of the field table, with its layout of heads and its vehicle file.
     pub vehicle: Vehicle,
     /// Mode of the heads.
     pub mode: &'static str,
     /// Target T, m.
     pub target_m: f64,
-    /// Effects in addition to those from data sheets.
+    /// Simulator effects in addition to the sensor errors from data sheets.
     pub effects: String,
     /// Seed of the dive.
     pub seed: u64,
-    /// Chainage of the start, m.
+    /// Chainage at which the dive starts, m.
     pub start_m: f64,
-    /// Fraction of the planned speed for which the heads are in phase, and at which the vehicle drives before the
-    /// first advice.
+    /// Fraction of the planned speed. The heads are in phase for this reduced speed, and the vehicle drives at it
+    /// before the first advice.
     pub planned_share: f64,
 }
 
-/// Result of a dive.
+/// Result of the evaluated part of a dive.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// Fraction of the judged sections that pass, 0 to 1.
+    /// Fraction of the evaluated sections that pass, 0 to 1.
     pub passing: f64,
-    /// Fraction of the judged sections with the verdict can't say.
+    /// Fraction of the evaluated sections with the verdict "can't say", 0 to 1.
     pub unsure: f64,
-    /// Number of judged sections that pass with a true hole over the target.
+    /// Number of evaluated sections that pass although their true hole exceeds the target.
     pub falsely: usize,
-    /// Largest D_true / T among the judged sections.
+    /// Largest ratio of the true hole diameter D_true to the target T among the evaluated sections.
     pub true_share: f64,
-    /// Advice updates in the judged part.
+    /// Advice updates in the part of the dive that is evaluated.
     pub beats: Vec<AdviceEntry>,
 }
 
-/// An advised speed with the true largest speed.
+/// Advised speeds of a vehicle, and the largest speed at which its sections truly pass.
 #[derive(Debug, Clone)]
 pub struct Compared {
     /// Planned speed, m/s.
     pub plan_mps: f64,
-    /// Advised speed while driving at the planned speed, m/s.
+    /// Advised speed while the vehicle drives at the planned speed, m/s.
     pub advised_mps: f64,
     /// Largest speed near the advised one at which sections truly pass, m/s; `None` if there is none.
     pub true_mps: Option<f64>,
-    /// The dive at the planned speed.
+    /// Result of the dive at the planned speed.
     pub planned: Outcome,
-    /// The dive at the advised speed.
+    /// Result of the dive at the advised speed.
     pub followed: Outcome,
 }
 
 impl Compared {
-    /// Ratio of two speeds: the advice to a vehicle at the planned speed, and the true largest speed.
+    /// Speed advised to a vehicle that drives at the planned speed, divided by the largest speed that truly passes.
     pub fn ratio(&self) -> f64 {
         self.over_true(self.advised_mps)
     }
 
-    /// Ratio of two speeds: the advice to a pilot who follows it, and the true largest speed.
+    /// Speed advised to a pilot who follows the advice, divided by the largest speed that truly passes.
     pub fn followed_ratio(&self) -> f64 {
         self.over_true(self.followed.told_mps())
     }
@@ -95,12 +98,12 @@ impl Compared {
 }
 
 impl Outcome {
-    /// Whether the dive passes.
+    /// Whether enough of the evaluated sections pass, and none of them falsely.
     pub fn passes(&self) -> bool {
         self.passing >= PASSING && self.falsely == 0
     }
 
-    /// Median of a value over all updates.
+    /// Median of a value over all evaluated advice updates.
     pub fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(of).collect();
         all.sort_by(f64::total_cmp);
@@ -117,8 +120,8 @@ impl Outcome {
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }
 
-    /// Changes of the displayed speed per minute. A dive shorter than half a minute counts as half a minute long, so
-    /// that a single change doesn't give a high rate.
+    /// Number of changes of the displayed advised speed per minute. A dive shorter than half a minute counts as half a
+    /// minute long, so that a single change doesn't give a high rate.
     pub fn changes_a_minute(&self) -> f64 {
         let changed = |pair: &[AdviceEntry]| {
             (pair[0].advice.v_max_mps - pair[1].advice.v_max_mps).abs() > 1e-6
@@ -143,8 +146,8 @@ impl Outing {
         }
     }
 
-    /// The vehicle and dive of a seed. Vehicles rotate with the seed, every second round of vehicles sways, and all
-    /// other values are drawn.
+    /// The vehicle and dive that belong to a seed. Consecutive seeds rotate through the vehicles. In every second
+    /// rotation the vehicles sway. All other values are drawn at random.
     pub fn drawn(seed: u64) -> Self {
         let mut draw = Draw::new(seed ^ 0x5eed_ad71);
         let turn = usize::try_from(seed).unwrap();
@@ -193,16 +196,16 @@ impl Outing {
             section.report.start_m >= from_m && section.report.end_m <= to_m
         };
         let sections: Vec<_> = judged.sections.iter().filter(within).collect();
-        let share = |verdict: &str| {
+        let share = |verdict: Verdict| {
             let count = sections.iter().filter(|section| section.report.verdict == verdict).count();
             count as f64 / sections.len().max(1) as f64
         };
         let falsely = sections
             .iter()
-            .filter(|section| section.report.verdict == "pass" && section.true_hole_m > self.target_m);
+            .filter(|section| section.report.verdict == Verdict::Pass && section.true_hole_m > self.target_m);
         Outcome {
-            passing: share("pass"),
-            unsure: share("cannot_say"),
+            passing: share(Verdict::Pass),
+            unsure: share(Verdict::CannotSay),
             falsely: falsely.count(),
             true_share: sections.iter().map(|section| section.true_hole_m).fold(0.0, f64::max)
                 / self.target_m,
@@ -214,12 +217,12 @@ impl Outing {
         JUDGED_M.max(2.0 * self.target_m)
     }
 
-    /// Speed from `plan`, m/s.
+    /// Planned speed from `plan`, m/s.
     pub fn plan_mps(&self) -> f64 {
         planned_mps(&self.scene(0.1, 0.1, 1.0).vehicle, &self.vehicle_text(0.1), self.mode)
     }
 
-    /// Compares the planned, the advised and the true speed.
+    /// Compares the planned speed, the advised speed, and the largest speed at which the sections truly pass.
     pub fn compare(&self) -> Compared {
         let plan_mps = self.plan_mps();
         let planned_mps = self.planned_share * plan_mps;

@@ -6,10 +6,10 @@
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 
-/// Longer than any stall of a pseudoterminal.
+/// Silence timeout that is longer than any stall of a pseudoterminal.
 const SILENCE_TIMEOUT: DurNs = DurNs::from_millis(120_000);
 
-/// A driver that differs from the inner one only in the silence timeout.
+/// A driver that differs from the driver that it wraps only in the silence timeout.
 pub(crate) struct Patient(pub(crate) Box<dyn Driver>);
 
 impl Driver for Patient {

@@ -1,4 +1,4 @@
-//! Planned speeds of a vehicle.
+//! Planned speed of a vehicle, as `headrace plan` computes it.
 
 use headrace_geometry::math;
 use headrace_sampling::plan::Planner;
@@ -15,5 +15,6 @@ pub fn planned_mps(vehicle: &VehicleConfig, text: &str, mode: &str) -> f64 {
     let planner = Planner::new(vehicle.inspection().unwrap()).unwrap().with_errors(errors);
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
     // `plan` prints speeds in millimetres per second, rounded down.
-    math::floor_to_i64(planner.v_max_mps(number, vehicle.target_m).unwrap_or(0.0) * 1e3) as f64 * 1e-3
+    math::floor_to_i64(planner.v_max_mps(number, vehicle.target.max_hole_m).unwrap_or(0.0) * 1e3) as f64
+        * 1e-3
 }

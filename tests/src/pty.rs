@@ -30,7 +30,7 @@ impl Terminal {
         Self { reader: File::from(master), end }
     }
 
-    /// The end that the program uses.
+    /// The end of the pseudoterminal that the program uses.
     pub fn end(&self) -> File {
         self.end.try_clone().unwrap()
     }
@@ -49,8 +49,8 @@ impl Terminal {
 
     /// Fills the terminal's buffer until no more bytes are accepted. Later writes of the program block.
     pub fn fill(&self) {
-        // The end is opened again, because non-blocking mode belongs to the open file and must not affect the
-        // program.
+        // The terminal's end is opened again, because non-blocking mode belongs to the open file and must not affect
+        // the program.
         let name = format!("/proc/self/fd/{}", self.end.as_raw_fd());
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK;
         let mut end = File::from(rustix::fs::open(name, flags, Mode::empty()).unwrap());
@@ -78,7 +78,7 @@ impl OnTerminal {
         command.env("TERM", "xterm").env_remove("NO_COLOR");
         command.stdin(slave.try_clone().unwrap()).stderr(slave.try_clone().unwrap()).stdout(slave);
         let child = command.spawn().unwrap();
-        // The command still holds copies of the terminal's end.
+        // The `Command` value still holds copies of the terminal's end.
         drop(command);
         let (sender, pieces) = sync_channel(1 << 10);
         let mut master = File::from(master);
@@ -117,7 +117,7 @@ impl OnTerminal {
         String::from_utf8_lossy(&self.written).into_owned()
     }
 
-    /// All output so far.
+    /// All output of the program so far.
     pub fn so_far(&self) -> String {
         String::from_utf8_lossy(&self.written).into_owned()
     }

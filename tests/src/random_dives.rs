@@ -7,13 +7,13 @@ use headrace_geometry::math;
 /// Kind of a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// No errors.
+    /// A dive without errors.
     Ideal,
-    /// Noise on everything, a drifting pilot, missing and false returns.
+    /// Noise on all sensors, a drifting pilot, missing returns, and false returns.
     Noisy,
     /// Heads that sweep back and forth in sectors.
     Sectors,
-    /// A hull and heads that hide the wall from each other.
+    /// Heads whose view of the wall is blocked by the hull and by other heads.
     Occluded,
     /// A vehicle that goes forward, back, and forward again.
     Reversing,
@@ -40,7 +40,7 @@ const KINDS: [Kind; 8] = [
 pub struct Draw(u64);
 
 impl Draw {
-    /// Creates the stream of a seed.
+    /// Creates the stream of random numbers that belongs to a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
@@ -70,10 +70,10 @@ impl Draw {
     }
 }
 
-/// The files of a dive.
+/// The vehicle file and scene file of a drawn dive.
 #[derive(Debug, Clone)]
 pub struct Seeded {
-    /// Seed.
+    /// Seed from which the dive is drawn.
     pub seed: u64,
     /// Kind of the dive.
     pub kind: Kind,
@@ -148,7 +148,7 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
     (text, aside_m)
 }
 
-/// Sensors for the position.
+/// Sensor tables for the vehicle's position.
 pub const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"
@@ -243,7 +243,7 @@ fn trajectory(kind: Kind, draw: &mut Draw, speed_mps: f64, place: [f64; 2]) -> S
     text
 }
 
-/// The dive of a seed.
+/// The dive that belongs to a seed.
 pub fn seeded(seed: u64) -> Seeded {
     let mut draw = Draw::new(seed);
     let kind = KINDS[usize::try_from(seed).unwrap() % KINDS.len()];
@@ -261,7 +261,7 @@ pub fn seeded(seed: u64) -> Seeded {
     Seeded { seed, kind, vehicle, scene }
 }
 
-/// The reference point of a vehicle file's tunnel.
+/// Reference point of the tunnel's cross-section in a vehicle file, m.
 fn centre(vehicle: &str) -> [f64; 2] {
     crate::scenes::scene_from(
         "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 1\nspeed_mps = 0.1\n",

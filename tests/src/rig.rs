@@ -27,10 +27,10 @@ use crate::drops;
 use crate::faulty::{Control, End, Fault, Faulty};
 use crate::patient::Patient;
 
-/// Longest wait, also on a busy machine; a test that takes longer hangs.
+/// Longest wait for a condition. Even on a busy machine, only a test that hangs waits longer.
 const LONG: DurNs = DurNs::from_millis(300_000);
 
-/// Vehicle file without its sensors.
+/// Vehicle file without the sensors' tables.
 pub const HEADING: &str = r#"name = "faults"
 target_m = 1.2
 
@@ -46,20 +46,20 @@ pub const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 
 pub const PING: &str = "plugin = \"ping1d\"\ninterval_ms = 50\n";
 /// A cable counter that reports by UDP.
 pub const COUNTER: &str = "plugin = \"tether_hid\"\ncounts_per_metre = 2000\nrate_hz = 50\n";
-/// A depth sensor on a bus.
+/// A depth sensor (Bar100).
 pub const DEPTH: &str = "plugin = \"bar100\"\n";
 
-/// A sensor of a rig, with a table in the vehicle file, a device, and a fault of the line.
+/// A sensor for a [`Rig`]: its table in the vehicle file, the device's end of the line, and the line's fault.
 pub struct Sensor {
     /// Table of the sensor, without id and connect.
     pub text: &'static str,
     /// Device's end of the line.
     pub end: End,
-    /// Fault of the line.
+    /// Fault of the sensor's line.
     pub fault: Box<dyn Fault>,
 }
 
-/// State of a dive at a moment.
+/// State of a dive on real ports at a moment.
 #[derive(Debug, Clone, Default)]
 pub struct View {
     /// Number of good frames found by each sensor's decoder.
@@ -77,25 +77,25 @@ pub struct Rig {
     dive: Loop,
     supervisor: Supervisor,
     devices: Vec<Faulty>,
-    /// Line of each sensor.
+    /// Index in `devices` of the line of each sensor.
     on: Vec<usize>,
     view: View,
     places: Vec<String>,
     recorded: Option<(PathBuf, RecorderHandle, String)>,
 }
 
-/// Result of a dive.
+/// Result of a dive on real ports.
 pub struct Ended {
     /// State of the dive at its end.
     pub view: View,
-    /// History of each line.
+    /// Counts of openings, losses and dropped packets of each line, and its last status.
     pub lines: Vec<LineHistory>,
     /// Report of the dive.
     pub report: Report,
 }
 
 impl Rig {
-    /// Starts a rig. All devices are plugged in at first, except those with an absent end.
+    /// Starts the dive and the devices. All devices are plugged in at first, except those with an absent end.
     pub fn new(sensors: Vec<Sensor>) -> Self {
         Self::recorded(sensors, None)
     }
@@ -151,12 +151,12 @@ impl Rig {
         self.devices[self.on[number]].control()
     }
 
-    /// View of the dive at the latest update.
+    /// State of the dive at the latest update.
     pub fn view(&self) -> &View {
         &self.view
     }
 
-    /// Runs the dive until `condition` is true; returns the view.
+    /// Runs the dive until `condition` is true; returns the state of the dive.
     #[track_caller]
     pub fn until(&mut self, what: &str, condition: impl Fn(&View) -> bool) -> View {
         let Self { dive, supervisor, devices, on, view, places, .. } = self;
@@ -172,14 +172,14 @@ impl Rig {
         view.clone()
     }
 
-    /// Runs until the number of good frames of a sensor has grown by `more`.
+    /// Runs the dive until the number of good frames of a sensor has grown by `more`.
     #[track_caller]
     pub fn more(&mut self, number: usize, more: u64) -> View {
         let from = self.view.good[number];
         self.until(&format!("{more} more of {number}"), |view| view.good[number] >= from + more)
     }
 
-    /// Runs until a new status text of a sensor contains `words`.
+    /// Runs the dive until a new status text of a sensor contains `words`.
     #[track_caller]
     pub fn says(&mut self, number: usize, words: &str) -> View {
         self.until(&format!("{number} says {words:?}"), |view| {
@@ -229,7 +229,7 @@ impl Ended {
         assert!(lines.iter().all(|line| line.dropped == 0), "{lines:#?}");
     }
 
-    /// Checks that this sensor had no fault and no loss.
+    /// Checks that this sensor reported no fault and lost no data.
     #[track_caller]
     pub fn untroubled(&self, number: usize) {
         let (line, said) = (&self.lines[number], &self.view.said[number]);
@@ -263,7 +263,7 @@ impl View {
     }
 }
 
-/// Replaces addresses chosen by the system with fixed words.
+/// Replaces addresses in a status text, which the system chooses, with fixed words.
 fn neutral(words: &str, places: &[String]) -> String {
     let mut words = words.to_owned();
     for place in places {
@@ -303,7 +303,7 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
     (app.arm(vehicle.navigation()).unwrap(), handle)
 }
 
-/// The emulated device of a sensor, for a dive in another process.
+/// Creates the emulated device of a sensor, for a dive in another process.
 pub fn emulated(text: &str) -> Emulated {
     let text = format!("{HEADING}\n[[sensors]]\nid = \"s0\"\n{text}");
     let document = Document::new("vehicle.toml", &text);

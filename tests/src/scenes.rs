@@ -9,7 +9,7 @@ use headrace_simulator::{FileLoader, Scene, Simulation};
 
 use crate::repository::root;
 
-/// Content of a file in `deploy/vehicles`.
+/// Content of a vehicle file in `deploy/vehicles`.
 pub fn vehicle_file(name: &str) -> Result<Vec<u8>, String> {
     let folder = root().join("deploy/vehicles");
     std::fs::read(folder.join(name)).map_err(|error| error.to_string())
@@ -20,7 +20,7 @@ pub fn scene(text: &str) -> Scene {
     scene_from(text, &vehicle_file)
 }
 
-/// Parses a scene; its files come from `load`.
+/// Parses a scene; `load` provides the files that the scene names.
 pub fn scene_from(text: &str, load: FileLoader<'_>) -> Scene {
     seeded(text, load, None)
 }

@@ -21,13 +21,13 @@ use crate::folder::{Folder, program};
 const STEPS: u32 = 1200;
 const STEP: Duration = Duration::from_millis(100);
 
-/// A running program and its terminal.
+/// The running program under test and its terminal.
 pub struct Screen {
     child: Child,
     keys: File,
     coming: Receiver<Vec<u8>>,
     seen: RefCell<Vec<u8>>,
-    /// Size in columns and lines.
+    /// Size of the terminal in columns and lines.
     size: (u16, u16),
 }
 
@@ -57,7 +57,7 @@ impl Screen {
         command.envs(variables.iter().copied());
         command.stdin(end()).stdout(end()).stderr(end());
         let child = command.spawn().unwrap();
-        // As long as the command exists, it keeps the terminal open, even after the program's end.
+        // As long as the `Command` value exists, it keeps the terminal open, even after the program's end.
         drop(command);
         let mut reading = clone(&master);
         let (to, coming) = channel();
@@ -73,14 +73,14 @@ impl Screen {
         Self { child, keys: File::from(master), coming, seen: RefCell::default(), size: (lines, columns) }
     }
 
-    /// All output so far, including escape sequences.
+    /// All output of the program so far, including escape sequences.
     pub fn shown(&self) -> String {
         let mut seen = self.seen.borrow_mut();
         seen.extend(self.coming.try_iter().flatten());
         String::from_utf8_lossy(&seen).into_owned()
     }
 
-    /// Waits for a text; returns the output up to this text.
+    /// Waits until the program prints a text; returns the output up to this text.
     #[track_caller]
     pub fn until(&self, text: &str) -> String {
         for _ in 0..STEPS {
@@ -131,7 +131,7 @@ impl Screen {
             .unwrap();
     }
 
-    /// Presses keys.
+    /// Sends key presses to the program.
     pub fn press(&mut self, keys: &[u8]) {
         self.keys.write_all(keys).unwrap();
     }
@@ -153,7 +153,7 @@ impl Screen {
     pub fn end(&mut self) -> (Option<i32>, String) {
         for _ in 0..STEPS {
             if let Some(status) = self.child.try_wait().unwrap() {
-                // The last output may still be on its way.
+                // The program's last output may not have arrived yet.
                 thread::sleep(STEP);
                 return (status.code(), self.shown());
             }
@@ -165,7 +165,7 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        // This fails if the process has already ended.
+        // Killing fails if the process has already ended.
         self.child.kill().ok();
         self.child.wait().ok();
     }

@@ -13,7 +13,7 @@ use crate::instrumented::{Ping, Sample};
 /// Tolerance for rounding at the ends of a step, as a fraction of the step.
 const ROUNDING: f64 = 1e-9;
 
-/// Spacings of a sample, m.
+/// Spacings T_x, T_y and T of a sample, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spacing {
     /// Chainage of the sample, m.
@@ -22,13 +22,13 @@ pub struct Spacing {
     pub t_x_m: [Option<f64>; 2],
     /// T_y: distance to the previous sample of the same head.
     pub t_y_m: Option<f64>,
-    /// T from T_x and T_y, without and with the end points of series.
+    /// Spacing T from T_x and T_y, without and with the end points of series.
     pub t_m: [Option<f64>; 2],
 }
 
 struct Step {
     from: [f64; 2],
-    /// Chainage and arc length relative to `from`, the shorter way round.
+    /// Step in chainage and arc length from `from`, the shorter way round the wall, m.
     by: [f64; 2],
     /// Whether another step in the same direction precedes and follows this step.
     joined: [bool; 2],
@@ -48,7 +48,7 @@ impl Step {
 
 #[derive(Clone, Default)]
 struct Head {
-    /// Previous sample in this sweep.
+    /// Previous sample in this sweep of the head.
     last: Option<Sample>,
     /// Whether the previous ping has a return.
     returned: bool,

@@ -21,34 +21,34 @@ use headrace_sensor::reading::Reading;
 use headrace_simulator::{START, Scene, Scenery, Simulation};
 use headrace_vehicle::NavigationConfig;
 
-/// Capacity for records, more than a dive of an hour needs.
+/// Capacity for records of the navigation, more than a dive of an hour needs.
 const MOST_SAID: usize = 1 << 20;
 
-/// A requested fix, with the true pose.
+/// A position fix that the loop requested, with the true pose at that time.
 pub struct Tracked {
-    /// Time of the request.
+    /// Time for which the fix was requested.
     pub at: MonoNs,
-    /// The fix, or the reason why it is missing.
+    /// The position fix, or the reason why it is missing.
     pub fix: Result<Fix, NoFix>,
-    /// True pose.
+    /// True pose of the vehicle.
     pub truth: Pose,
 }
 
 /// State of the filter at the end of an epoch.
 pub struct Epoch {
-    /// Time of the estimate.
+    /// Time of the filter's estimate.
     pub at: MonoNs,
-    /// Factors of the estimate's covariance.
+    /// Factors of the covariance of the filter's estimate.
     pub factors: Box<Factors<ERRORS>>,
-    /// Corrections that turn the estimate into the truth. Only those of the pose are known.
+    /// Corrections that turn the filter's estimate into the truth. Only those of the pose are known.
     pub errors: Errors,
 }
 
-/// Records of a dive's navigation.
+/// Recorded position fixes and estimates of a dive's navigation.
 pub struct Track {
-    /// Fixes in the order of their requests.
+    /// Position fixes in the order in which the loop requested them.
     pub fixes: Vec<Tracked>,
-    /// Estimates in time order.
+    /// Filter states at the ends of epochs, in time order.
     pub epochs: Vec<Epoch>,
     /// Consistency statistics after each fused measurement: time of the last epoch, source, and statistics so far.
     pub consistency: Vec<(MonoNs, usize, Consistency)>,
@@ -59,11 +59,11 @@ pub struct Track {
 /// A time in which some sources are silent.
 #[derive(Debug, Clone, Default)]
 pub struct Silence {
-    /// Numbers of the sources.
+    /// Numbers of the silent sources.
     pub sources: Vec<usize>,
-    /// Start, seconds from the beginning of the dive.
+    /// Start of the silence, seconds from the beginning of the dive.
     pub from_s: f64,
-    /// End, seconds from the beginning of the dive.
+    /// End of the silence, seconds from the beginning of the dive.
     pub to_s: f64,
 }
 
@@ -73,9 +73,9 @@ enum Said {
     Consistency(usize, Consistency),
 }
 
-/// A navigation whose estimates can be observed.
+/// A navigation whose filter states can be observed by a test.
 pub trait Transparent: Navigation + 'static {
-    /// Estimate and its time, if the navigation has one.
+    /// Latest filter state and its time, if the navigation has a state.
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
         None
     }
@@ -133,7 +133,7 @@ struct RecordedNavigation<N> {
     said: SyncSender<Said>,
 }
 
-/// A snapshot excludes the records.
+/// The recorded fixes and estimates are not part of a loop's snapshot.
 impl<N: Transparent> Stateful for RecordedNavigation<N> {
     fn save(&self, to: &mut Saver) {
         self.inner.save(to);
@@ -175,7 +175,7 @@ impl<N: Transparent> Navigation for RecordedNavigation<N> {
     }
 }
 
-/// The filter with a scene's settings.
+/// The navigation filter with the settings of a scene's vehicle.
 pub fn filter(scene: &Scene) -> FilterNavigation {
     let vehicle = &scene.vehicle;
     let settings = match vehicle.navigation {

@@ -17,7 +17,7 @@ pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> JudgedDive {
     dive_noting(scene, believed, &mut |_| {})
 }
 
-/// As [`dive_believing`]; calls `note` with the loop after each tick.
+/// As [`dive_believing`], but calls `note` with the loop after each tick.
 pub fn dive_noting(scene: &Scene, believed: &VehicleConfig, note: &mut dyn FnMut(&Loop)) -> JudgedDive {
     let recorded = Recorded::of(scene, believed).unwrap_or_else(|why| panic!("{why}"));
     recorded.judged_with(believed, believed.navigation(), note).unwrap()

@@ -48,7 +48,7 @@ fn tell(name: &str, error: f64, bound: f64, condition: Option<f64>) {
     );
 }
 
-/// Fields of a case in the table.
+/// Cells of the row for a hard case in `docs/why/hard-cases.csv`.
 #[track_caller]
 fn row(name: &str) -> Vec<String> {
     let list = read("tests/hard_cases/list");

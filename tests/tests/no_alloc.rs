@@ -67,7 +67,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Number of allocator calls on this thread while `work` runs.
+/// Number of allocator calls that this thread makes while `work` runs.
 fn allocations(work: impl FnOnce()) -> u64 {
     COUNTED.with(|counted| counted.set(Some(0)));
     work();
@@ -106,7 +106,7 @@ fn million_packets_need_no_allocation() {
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref()).unwrap();
     }
-    // Nobody empties this outlet, because dropping the oldest notice must not allocate either.
+    // Nobody empties this outlet, so it becomes full. Dropping the oldest notice must not allocate either.
     let (outlet, notices) = NoticeOutlet::new(1000);
     app.add_plugin(&outlet).unwrap();
     let header = LogHeader {
@@ -122,7 +122,7 @@ fn million_packets_need_no_allocation() {
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
     app.add_plugin(&RecorderOutlet::new([port])).unwrap();
-    // Nobody empties the journal of the filter's steps either, so that it also drops the oldest ones.
+    // Nobody empties the journal of the filter's steps either, so it also drops its oldest entries.
     let (journal, steps) = Journal::new(1000);
     let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
     let profile = vehicle.tunnel.profile.clone();
@@ -152,7 +152,7 @@ fn million_packets_need_no_allocation() {
             allocated += allocations(|| consumed = dive.tick(until));
             packets += consumed;
             if consumed == 0 {
-                // The recorder has a backlog, so the loop holds packets back. None of them is lost.
+                // The recorder falls behind, so the loop holds packets back. None of them is lost.
                 waited += 1;
                 std::thread::sleep(std::time::Duration::from_millis(1));
             }
@@ -171,7 +171,7 @@ fn million_packets_need_no_allocation() {
     assert!(written.messages >= packets as u64, "recorded input is never dropped");
 }
 
-/// Data of these devices in pieces, some of them damaged.
+/// The decoders get the bytes of these devices in pieces. Some of the bytes are damaged.
 #[test]
 fn decoders_of_other_vehicles_allocate_nothing() {
     let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };

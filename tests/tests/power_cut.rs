@@ -17,9 +17,9 @@ use serde_json::Value;
 const KILLS: usize = 200;
 /// Number of dives that run at the same time.
 const AT_ONCE: usize = 6;
-/// Longest life of a dive, ms.
+/// Longest time from the start of a dive to its kill, ms.
 const LONGEST_MS: u64 = 2200;
-/// Largest loss that a power cut may cause.
+/// Longest span of data that a power cut may lose.
 const MAY_COST: Duration = Duration::from_secs(1);
 
 /// A dive of a minute and a half. A part of it is too fast, so that there are flags to lose.
@@ -50,7 +50,7 @@ fn wall_clock() -> Instant {
     Instant::now()
 }
 
-/// Results of the kills.
+/// Counts over all killed dives.
 #[derive(Default)]
 struct Count {
     /// Number of kills before the log had a header.
@@ -59,14 +59,14 @@ struct Count {
     after: AtomicUsize,
     /// Number of lines displayed more than a second before the kill.
     lines: AtomicUsize,
-    /// Number of results that were identical, bit for bit.
+    /// Number of recorded results that a replay of the log reproduced bit for bit.
     same: AtomicU64,
-    /// Longest delay with which the disk or processor of this machine served a thread, ns. Other work may use both at
-    /// the same time.
+    /// Longest time for which the test waited for this machine's disk or processor, ns. Other work may use both at the
+    /// same time.
     late_ns: AtomicU64,
 }
 
-/// Number `n` of a sequence of random numbers.
+/// Element `n` of a fixed sequence of pseudorandom numbers.
 fn random(n: u64) -> u64 {
     let mut word = (n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -89,8 +89,7 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // The second before the kill counts from this moment, after which the kill may take effect, and not from the
-    // moment of sending it.
+    // The second before the kill is counted from this moment, because the kill takes effect at some time after it.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();
@@ -140,7 +139,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
     match answer.code {
         Some(0) => assert!(ended, "{which}: no loss is reported: {told}"),
         Some(3) => assert!(same > 0 && told["losses"][0].is_string(), "{which}: {told}"),
-        // Nothing had been published yet.
+        // The killed dive had not published any result yet.
         code => assert!(code == Some(1) && same == 0 && lines.is_empty(), "{which}: {code:?}, {told}"),
     }
     count.same.fetch_add(same, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! Dives in the simulated world of faults, which satisfy all invariants for every seed.
+//! Dives in a simulated world of faults. For every seed, they satisfy all invariants.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -9,9 +9,10 @@ use headrace_tests::world::invariants::broken;
 use headrace_tests::world::plan::Plan;
 use headrace_tests::world::{DiveResult, Sabotage, World};
 
-/// Default seeds. The environment can set others: `HEADRACE_WORLD_SEEDS=1000..2000`.
+/// Default seeds of the simulated worlds. An environment variable can set others: `HEADRACE_WORLD_SEEDS=1000..2000`.
 const SEEDS: std::ops::Range<u64> = 0..300;
-/// Number of worlds, in at least one of which a sabotage must be detected.
+/// Number of simulated worlds tried with each sabotage (a deliberate fault of the program). At least one of them must
+/// detect the sabotage.
 const ENOUGH: u64 = 100;
 
 fn seeds() -> std::ops::Range<u64> {
@@ -20,7 +21,7 @@ fn seeds() -> std::ops::Range<u64> {
     from.parse().unwrap()..to.parse().unwrap()
 }
 
-/// Runs the world of a seed; returns broken invariants and results.
+/// Runs a dive in the world of a seed; returns its broken invariants and its results.
 fn lived(folder: &Folder, seed: u64, sabotage: Option<Sabotage>) -> (Vec<String>, DiveResult) {
     let lived = World::sabotaged(seed, sabotage).live();
     let replayed = lived.replay(folder);

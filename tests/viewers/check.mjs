@@ -1,9 +1,8 @@
-// Reads a dive log with npm's @mcap/core, which Foxglove and Lichtblick use. Compares its summary and indexes with a full read
-// of the file,
-// and its schemas with those that Foxglove publishes (@foxglove/schemas).
+// Reads a dive log with npm's @mcap/core, which Foxglove and Lichtblick use. Compares the log's summary and indexes
+// with a full read of the file, and its schemas with those that Foxglove publishes (@foxglove/schemas).
 //
 //     node check.mjs LOG.mcap               prints differences, and exits with 1 if there are any
-//     node check.mjs --self-test LOG.mcap   damages copies of the log in one way each, and checks that each is found
+//     node check.mjs --self-test LOG.mcap   damages copies of the log, and checks that each damage is found
 //
 // Run it in a folder with the packages. Without them it prints "skipped" and exits with 0.
 
@@ -22,7 +21,7 @@ const arguments_ = process.argv.slice(2);
 const log = new Uint8Array(await readFile(arguments_.at(-1)));
 process.exit(arguments_[0] === "--self-test" ? await selfTest(log) : await tell(log));
 
-// Packages of the current folder.
+// Loads packages from the current folder.
 async function load() {
   try {
     const require = createRequire(pathToFileURL(join(process.cwd(), "package.json")));
@@ -67,7 +66,7 @@ function readThrough(bytes) {
   return found;
 }
 
-// A viewer message that violates its schema, or whose data has another length than stated.
+// Viewer messages that violate their schema, or whose data length differs from the stated one.
 function messageFaults(message, { channels, schemas }) {
   const channel = channels.get(message.channelId);
   if (channel.messageEncoding !== "json") {
@@ -104,7 +103,7 @@ function valueFaults(place, schema, value) {
   return lacking.concat(Object.keys(value).flatMap(of));
 }
 
-// Differences between our schemas under Foxglove's names and Foxglove's own, in keys or types.
+// Differences in keys or types between our schemas and Foxglove's schemas of the same names.
 function schemaFaults(place, ours, theirs) {
   const faults = [];
   // Foxglove's schemas give enumerations without a type.
@@ -211,7 +210,8 @@ async function selfTest(bytes) {
     const opcode = bytes[at];
     first.set(opcode, first.get(opcode) ?? at + 9);
   }
-  // Opcodes and field positions: MCAP's specification, mcap.dev/spec. The summary's checksum is cleared (footer, byte 16).
+  // Opcodes and field positions: MCAP's specification, mcap.dev/spec. The summary's checksum is cleared (footer, byte
+  // 16).
   const spoil = (change) => {
     const copy = bytes.slice();
     const field = new DataView(copy.buffer);

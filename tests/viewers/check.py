@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Reads a dive log with Python's `mcap` package and compares its summary with the file read from end to end.
 
-    check.py LOG.mcap               prints what differs, and exits with 1 when anything does
-    check.py --self-test LOG.mcap   spoils copies of the log, one thing each, and wants every one found out
+    check.py LOG.mcap               prints differences, and exits with 1 if there are any
+    check.py --self-test LOG.mcap   damages each copy of the log in one way, and checks that the damage is found
 
-Says "skipped" and exits with 0 where the package isn't there.
+Prints "skipped" and exits with 0 if the package isn't installed.
 """
 
 import io

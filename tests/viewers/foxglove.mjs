@@ -16,7 +16,7 @@ const TOPICS = {
   transforms: "foxglove.FrameTransforms", pose: "foxglove.PoseInFrame", vehicle: "headrace.Vehicle", points: "foxglove.PointCloud",
   wall: "foxglove.Grid", sections: "headrace.Section", missed: "headrace.Missed", advice: "headrace.Advice", alerts: "foxglove.Log",
 };
-// The library's protocol name is that of an older server; the messages are the same.
+// The library uses the protocol name of an older server; the messages are the same.
 const PROTOCOL = "foxglove.sdk.v1";
 FoxgloveClient.SUPPORTED_SUBPROTOCOL = PROTOCOL;
 
@@ -51,7 +51,7 @@ const socket = new WebSocket(`ws://127.0.0.1:${port}`, [PROTOCOL]);
 socket.binaryType = "arraybuffer";
 const client = new FoxgloveClient({ ws: socket });
 client.on("error", (error) => {
-  // Playback state is newer than this version of the library.
+  // This version of the library doesn't know playback state yet.
   const words = `${error.message ?? error}`;
   if (!words.endsWith("opcode in binary message: 5")) faults.push(words);
 });
@@ -76,7 +76,7 @@ socket.addEventListener("message", ({ data }) => {
   const view = typeof data === "string" ? undefined : new DataView(data);
   if (view?.getUint8(0) === 5) state = { status: view.getUint8(1), at: view.getBigUint64(2, true) };
 });
-// The first stretch is missed after about twenty seconds of it.
+// The first missed stretch is flagged after about twenty seconds of the dive.
 const complete = () => Object.keys(TOPICS).every((name) => counts.has(`/result/view/${name}`));
 for (const until = Date.now() + 60_000; Date.now() < until && !complete();) await pause(100);
 for (const [name, schema] of Object.entries(TOPICS)) {
@@ -106,7 +106,7 @@ state = undefined;
 socket.send(request.buffer);
 await pause(2_000);
 console.log(`playback: status ${state?.status} at ${state?.at} ns`);
-// Paused, at the last tick of 20 ms before it.
+// Playback is paused at the last 20 ms tick before the wanted time.
 if (state?.status !== 1 || state.at > to || to - state.at > 20_000_000n) faults.push(`playback isn't paused at ${to} ns`);
 socket.close();
 dive.kill("SIGINT");

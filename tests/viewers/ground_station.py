@@ -3,7 +3,7 @@
 
     ground_station.py HEADRACE LOG.mcap      replays the log with --mavlink-out
 
-Says "skipped" and exits with 0 where the package isn't there.
+Prints "skipped" and exits with 0 if the package isn't installed.
 """
 
 import math

@@ -8,9 +8,9 @@ use super::document::Document;
 use super::error::ConfigError;
 use super::reader::Section;
 
-/// Word in a path that selects every table of an array.
+/// Word in a key's path that selects every table of an array of tables.
 const ALL: &str = "all";
-/// Key that identifies a table of an array.
+/// Key whose value identifies a table in an array of tables.
 const ID: &str = "id";
 
 /// Returns `text` with the values of the keys in `changes` replaced.
@@ -49,12 +49,12 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
     Ok(changed)
 }
 
-/// Whether a value is an inline array. Tables under `[[headers]]` are not inline, and cannot be moved.
+/// Whether a value is an inline array. Tables under `[[headers]]` are not inline arrays, and cannot be moved.
 fn is_array(value: &str) -> bool {
     value.starts_with('[') && !value.starts_with("[[")
 }
 
-/// Finds the byte ranges of the values at `path`.
+/// Finds the byte ranges of the values at `path` in the text.
 fn find(table: &DeTable<'_>, path: &[&str], found: &mut Vec<Range<usize>>) {
     let Some((key, rest)) = path.split_first() else { return };
     let Some(value) = table.get(*key) else { return };
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_key_is_rejected() {
+    fn change_of_a_missing_key_is_rejected() {
         let missing = "is not in the vehicle file, so it can't be changed";
         let tables = "\n[[openings]]\nname = \"gate\"";
         assert_eq!(change(tables).unwrap_err(), format!("s.toml:2: openings = [[openings]]: {missing}"));

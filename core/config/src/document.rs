@@ -5,11 +5,11 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
-/// Maximum length of a text, bytes: about a hundred times the length of a long vehicle file. Parsing a text takes many
-/// times its length in memory.
+/// Maximum length of a TOML text, bytes: about a hundred times the length of a long vehicle file. Parsing a text
+/// takes many times its length in memory.
 const MAX_TEXT_BYTES: usize = 1 << 20;
 
-/// A text and its file name.
+/// A TOML text and its file name.
 #[derive(Debug, Clone, Copy)]
 pub struct Document<'a> {
     pub(super) file: &'a str,
@@ -17,12 +17,12 @@ pub struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Creates a document; errors name it as `file`.
+    /// Creates a document; error messages call its file `file`.
     pub fn new(file: &'a str, text: &'a str) -> Self {
         Self { file, text }
     }
 
-    /// Parses the root table.
+    /// Parses the root table of the TOML text.
     pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
         self.is_short()?;
         DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| self.broken(&error))

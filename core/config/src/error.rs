@@ -1,4 +1,4 @@
-//! Errors of hand-written files, and their collection.
+//! Errors of hand-written files, and a collection of such errors.
 
 use core::cell::RefCell;
 use core::fmt;
@@ -10,20 +10,20 @@ use super::plain::one_line;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}", one_line(&self.text()))]
 pub struct ConfigError {
-    /// The file, as the caller named it.
+    /// The name of the file, as given by the caller.
     pub file: String,
-    /// Line, counted from one.
+    /// Line of the error, counted from one.
     pub line: usize,
-    /// Dotted path of the key.
+    /// Dotted path of the key that the error concerns.
     pub key: String,
-    /// The value of the key, if present.
+    /// The wrong value of the key, if present.
     pub value: Option<String>,
-    /// The problem and the allowed values.
+    /// The problem with the value, and the allowed values.
     pub problem: String,
 }
 
 impl ConfigError {
-    /// Formats the parts without any escaping.
+    /// Formats the parts of the error without escaping special characters.
     fn text(&self) -> String {
         let Self { file, line, key, value, problem } = self;
         let value = value.as_ref().map(|value| format!(" = {value}")).unwrap_or_default();
@@ -67,7 +67,7 @@ impl ConfigErrors {
         self
     }
 
-    /// The errors.
+    /// All errors of the file.
     pub fn errors(&self) -> &[ConfigError] {
         &self.0
     }
@@ -79,7 +79,7 @@ impl From<ConfigError> for ConfigErrors {
     }
 }
 
-/// One error per line.
+/// Formats the errors, one per line.
 impl fmt::Display for ConfigErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (number, error) in self.0.iter().enumerate() {
@@ -101,7 +101,7 @@ pub(super) const MOST_ERRORS: usize = 100;
 pub(super) struct Notes(Option<Rc<RefCell<Vec<ConfigError>>>>);
 
 impl Notes {
-    /// An empty collection.
+    /// Creates an empty collection of errors.
     pub(super) fn collecting() -> Self {
         Self(Some(Rc::default()))
     }
@@ -119,12 +119,12 @@ impl Notes {
         }
     }
 
-    /// Returns the first error that satisfies `is_so`.
+    /// Returns the first collected error that satisfies `is_so`.
     pub(super) fn find(&self, is_so: impl Fn(&ConfigError) -> bool) -> Option<ConfigError> {
         self.0.as_ref()?.borrow().iter().find(|error| is_so(error)).cloned()
     }
 
-    /// Whether there are more errors than will be reported.
+    /// Whether more errors were found than will be reported.
     pub(super) fn are_enough(&self) -> bool {
         self.count() > MOST_ERRORS
     }

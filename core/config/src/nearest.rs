@@ -1,12 +1,13 @@
 //! Search for the known word that the author of a file may have intended.
 
-/// Maximum number of edits between a word and the intended one: `FEW` for short words, `MORE` from `LONG` letters
+/// Maximum number of edits between a word and the intended word: `FEW` for short words, `MORE` from `LONG` letters
 /// on.
 const FEW: usize = 1;
 const MORE: usize = 2;
 const LONG: usize = 6;
 
-/// Returns the known word nearest to `word`; `None` if none is near. Of equally near words, returns the first.
+/// Returns the known word nearest to `word`; `None` if no known word is near. If several words are equally near,
+/// returns the first.
 pub(super) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
     let near = |candidate: &&str| {
         if stem(word) == stem(candidate) {

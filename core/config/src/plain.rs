@@ -22,7 +22,7 @@ pub fn is_plain(text: &str) -> bool {
     !text.contains(acts)
 }
 
-/// Whether a terminal or text layout acts on a character instead of displaying it.
+/// Whether a character controls the terminal or the text layout instead of being displayed.
 ///
 /// Source: Unicode 16, categories Cc, Zl and Zp; Bidi_Control; and the invisible characters of Cf.
 fn acts(c: char) -> bool {

@@ -14,15 +14,15 @@ use super::plain::is_plain;
 /// Function that reads a referenced file by the name in the key, for instance a polyline profile or a DBC file.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 
-/// Maximum number of tables in an array. It is limited because each table is compared with all others.
+/// Maximum number of tables in an array. The number is limited because each table is compared with all others.
 const MOST_TABLES: usize = 2000;
 
-/// A file referenced by a key.
+/// A file whose name is the value of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedFile {
-    /// File name, as written at the key.
+    /// File name, as written in the key's value.
     pub name: String,
-    /// Content of the file.
+    /// Text of the file.
     pub text: String,
 }
 
@@ -36,7 +36,7 @@ impl core::fmt::Debug for Files<'_> {
     }
 }
 
-/// Path of a value, text of the value, and a constructor for errors about it.
+/// Key path of a value, text of the value, and a constructor for errors about the value.
 pub(super) type Leaf<'s> = (Vec<String>, &'s str, Box<dyn Fn(&str) -> ConfigError + 's>);
 
 /// One table of a document. [`Section::finish`] reports keys that were never read.
@@ -52,14 +52,14 @@ pub struct Section<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Parses the text and returns its root table, whose methods fail at the first error.
+    /// Parses the TOML text and returns its root table, whose methods fail at the first error.
     ///
     /// Errors: the text is not TOML.
     pub fn root(self) -> Result<Section<'a>, ConfigError> {
         Ok(Section::of_root(self, self.table()?, Notes::default()))
     }
 
-    /// Reads the whole text with `read`, and finds all of its errors.
+    /// Reads the whole TOML text by calling `read`, and finds all errors in the text.
     ///
     /// The table and its subtables note each error, and reading continues as if the key were absent. Unread keys
     /// are also errors.
@@ -87,7 +87,7 @@ impl<'a> Document<'a> {
         match (result, ConfigErrors::of(notes.take())) {
             (Some(result), None) => Ok(result),
             (_, Some(errors)) => Err(errors),
-            // Unreachable: every missing result has a noted error.
+            // Unreachable, because an error is noted for every missing result.
             (None, None) => Err(self.broken_as("couldn't be read", 0).into()),
         }
     }
@@ -227,7 +227,7 @@ impl<'a> Section<'a> {
     /// Reads a number or an array of numbers, each within `allowed`; `wanted` describes the allowed values in
     /// errors.
     ///
-    /// Errors: the value is neither, or a number is outside `allowed`.
+    /// Errors: the value is neither a number nor an array of numbers, or a number is outside `allowed`.
     pub fn number_or_numbers(
         &self,
         key: &'static str,
@@ -279,7 +279,7 @@ impl<'a> Section<'a> {
 
     /// Reads one table or an array of tables; returns no tables if the key is absent.
     ///
-    /// Errors: the value is neither, or it has too many tables.
+    /// Errors: the value is neither a table nor an array of tables, or it has too many tables.
     pub fn tables(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
         let one = self.ask(key).is_some_and(|value| matches!(value.get_ref(), DeValue::Table(_)));
         if one { Ok(self.section(key)?.into_iter().collect()) } else { self.sections(key) }
@@ -310,7 +310,7 @@ impl<'a> Section<'a> {
         let is_below = |error: &ConfigError| {
             error.key.strip_prefix(&name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
-        // The key is present with a wrong value, so the noted error about it is returned.
+        // The key is present with a wrong value, so the already noted error about it is returned.
         if let Some(wrong) = self.noted(|error| self.table.contains_key(key) && is_below(error)) {
             return wrong;
         }
@@ -329,7 +329,7 @@ impl<'a> Section<'a> {
         Some(self.told(self.unknown(other, &[key])))
     }
 
-    /// Reads a part of the file; `None` if the part has errors. They are noted, so that reading continues.
+    /// Reads a part of the file; `None` if the part has errors. The errors are noted, so that reading continues.
     ///
     /// Errors: the error of the part, if errors are not collected.
     pub fn part<T>(&self, read: impl FnOnce() -> Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
@@ -338,7 +338,8 @@ impl<'a> Section<'a> {
         Ok(part.filter(|_| self.notes.count() == before))
     }
 
-    /// Returns the result. If it is an error and errors are collected, notes the error and returns `None`.
+    /// Returns the result's value. If the result is an error and errors are collected, notes the error and returns
+    /// `None`.
     fn go_on<T>(&self, result: Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
         match result {
             Ok(result) => Ok(Some(result)),
@@ -411,7 +412,7 @@ impl<'a> Section<'a> {
         self.noted(|noted| self.is_of(noted)).unwrap_or_else(|| self.told(error()))
     }
 
-    /// Whether an error is about a key of this table.
+    /// Whether an error concerns a key of this table.
     fn is_of(&self, error: &ConfigError) -> bool {
         let key = if self.path.is_empty() {
             Some(error.key.as_str())
@@ -433,7 +434,7 @@ impl<'a> Section<'a> {
     }
 
     /// Notes an error about a wrong value and returns `None`, as for an absent key. If errors are not collected,
-    /// fails.
+    /// returns the error.
     fn wrong<T>(
         &self,
         key: &str,
@@ -443,7 +444,7 @@ impl<'a> Section<'a> {
         self.go_on(Err(self.error(key, value, problem)))
     }
 
-    /// File of this table, as the caller named it.
+    /// File name of this table's document, as given by the caller.
     pub fn file(&self) -> &str {
         self.document.file
     }

@@ -1,4 +1,4 @@
-//! Tests of the reader.
+//! Tests of the reader of TOML files.
 
 use super::document::Document;
 use super::reader::NamedFile;
@@ -6,7 +6,7 @@ use super::reader::NamedFile;
 const TEXT: &str = "target_m = 0.5\n[water]\nsound_speed_mps = 14470\nsalt = 1\n";
 
 #[test]
-fn error_names_file_line_key_value_and_allowed_values() {
+fn config_error_names_file_line_key_value_and_allowed_values() {
     let root = Document::new("v.toml", TEXT).root().unwrap();
     assert_eq!(root.number("target_m", 0.0..=1.0).unwrap(), Some(0.5));
     let water = root.section("water").unwrap().unwrap();
@@ -74,7 +74,7 @@ fn all_errors_are_found_in_one_pass() {
         for part in root.sections("parts")? {
             root.part(|| {
                 let id = part.text("id")?;
-                // These errors may be mere consequences of earlier errors, so they are not reported.
+                // Errors that may be mere consequences of earlier errors are not reported.
                 part.number("rate_hz", 1.0..=9.0)?.ok_or_else(|| part.invalid("rate_hz", "is needed"))?;
                 part.required("id", id)
             })?;
@@ -101,7 +101,7 @@ fn valid_text_is_read_and_unknown_key_is_rejected() {
 }
 
 #[test]
-fn similar_word_is_suggested() {
+fn error_about_an_unknown_word_suggests_a_similar_word() {
     let root = Document::new("v.toml", "profile = \"cercle\"\n").root().unwrap();
     let error = root.choice("profile", &[("arch", 1), ("circle", 2)]).unwrap_err();
     assert_eq!(

@@ -9,25 +9,25 @@ use super::cause::Cause;
 pub enum Action {
     /// Drive slower.
     Slower,
-    /// Use a mode with a finer angular step, since a lower speed does not help.
+    /// Use a scan mode with a finer angular step, since a lower speed does not help.
     FinerMode,
-    /// Set a longer range.
+    /// Set a longer range on the heads.
     LongerRange,
     /// Roll the vehicle so that it occludes another part of the wall.
     ///
-    /// If the vehicle turned round, it would occlude the same part.
+    /// To turn the vehicle round would not help: it would occlude the same part.
     OtherSide,
     /// Stay centred in the tunnel, with a steady heading.
     Middle,
     /// Restart the heads in phase.
     InPhase,
-    /// Repair the stalled head, or drive slower without it.
+    /// Repair the stalled head, or drive slower without that head.
     Head,
     /// Get the silent heads pinging again.
     HeadBack,
     /// Restore the position fix first.
     Position,
-    /// Raise the gain.
+    /// Raise the sonar gain.
     ///
     /// The losses are so many, or so persistent on the same wall, that a lower speed does not help.
     HigherGain,
@@ -36,7 +36,7 @@ pub enum Action {
 }
 
 impl Action {
-    /// All actions, in order of declaration.
+    /// All actions, in the order of their declaration.
     pub const ALL: [Self; 11] = [
         Self::Slower,
         Self::FinerMode,
@@ -53,7 +53,7 @@ impl Action {
 
     /// Actions against several causes, in the order of the causes and without duplicates.
     ///
-    /// `is_beyond_speed` means that no speed makes up for the missing returns.
+    /// `is_beyond_speed` means that so many returns are missing that no speed makes up for them.
     pub fn against(causes: impl IntoIterator<Item = Cause>, is_beyond_speed: bool) -> Vec<Self> {
         let mut actions: Vec<Self> = Vec::new();
         for cause in causes {
@@ -68,7 +68,7 @@ impl Action {
         actions
     }
 
-    /// Action against one cause.
+    /// Action against one cause of a fail.
     fn of(cause: Cause) -> Self {
         match cause {
             Cause::TooFast => Self::Slower,
@@ -84,7 +84,7 @@ impl Action {
         }
     }
 
-    /// Word used in reports.
+    /// Word used for the action in reports.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Slower => "slower",

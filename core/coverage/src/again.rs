@@ -7,21 +7,21 @@ use super::cause::{Cause, Causes};
 /// Speed for passing a missed stretch again, and whether speed helps at all.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Again {
-    /// Largest speed that meets the target in all sections where a speed can, m/s.
+    /// Largest speed that meets the target in all sections where any speed can meet it, m/s.
     ///
-    /// Zero if no speed helps most sections.
+    /// Zero if most sections have no such speed.
     pub at_most_mps: f64,
-    /// Whether no speed makes up for the missing returns in at least a tenth of the sections.
+    /// Whether at least a tenth of the sections lose so many returns that no speed makes up for them.
     pub is_beyond_speed: bool,
 }
 
-/// A remedy is advised if at least one in this number of failed sections needs the remedy.
+/// A remedy is advised for a run if at least one in `NAMED_OF` of its failed sections needs the remedy.
 pub(super) const NAMED_OF: u32 = 10;
 
-/// A failed section.
+/// Causes and required speed of a failed section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Failing {
-    /// Causes assigned to the section.
+    /// Causes of the section's fail.
     pub causes: Causes,
     /// Speed that meets the target in the section, m/s; zero if no speed does.
     pub again_mps: f64,
@@ -33,12 +33,12 @@ pub(super) struct Tally {
     /// Number of sections in which a speed meets the target, and the lowest of these speeds, m/s.
     mended: u32,
     least_mps: f64,
-    /// Number of sections in which no speed makes up for the missing returns.
+    /// Number of sections that lose so many returns that no speed makes up for the losses.
     beyond: u32,
 }
 
 impl Again {
-    /// Advice for a single section.
+    /// Advice for passing a single section again.
     pub fn of(section: &Failing) -> Self {
         let mut tally = Tally::default();
         tally.add(section);
@@ -79,7 +79,7 @@ impl Tally {
         section.is_mended() && section.again_mps <= self.least_mps
     }
 
-    /// Whether the counts are possible for this number of failed sections.
+    /// Whether these counts are possible for a run with `failed` failed sections.
     pub(super) fn is_of(&self, failed: u32) -> bool {
         self.mended.checked_add(self.beyond).is_some_and(|counted| counted <= failed)
     }
@@ -99,7 +99,7 @@ impl Tally {
         self.beyond += other.beyond;
     }
 
-    /// Advice for all counted sections; `failed` is their number.
+    /// Advice for passing all counted sections again; `failed` is their number.
     pub(super) fn again(&self, failed: u32) -> Again {
         Again {
             at_most_mps: if self.mended > 0 && 2 * self.mended >= failed { self.least_mps } else { 0.0 },
@@ -131,7 +131,8 @@ mod tests {
         let lost = section(Cause::MissingReturns, 0.0);
         assert_eq!(again(&[fast[0], lost]), Again { at_most_mps: 0.12, is_beyond_speed: true });
         assert_eq!(again(&[fast[0], lost, lost]), Again { at_most_mps: 0.0, is_beyond_speed: true });
-        // In a mode in which no speed meets the target, missing returns are not the cause.
+        // In a scan mode in which no speed meets the target, the angular step is the cause, and not the
+        // missing returns.
         let coarse = section(Cause::AngularStep, 0.0);
         assert_eq!(again(&[coarse; 3]), Again::default());
         // One section of twelve is too few for a remedy to be advised.

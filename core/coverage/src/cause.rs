@@ -20,7 +20,7 @@ pub enum Cause {
     Phase,
     /// The hole extends beyond the stretch that all live heads have swept.
     NotPassed,
-    /// A head passed without pinging.
+    /// A head passed through the section without pinging.
     HeadSilent,
     /// A head was stalled, or has been out of phase since a stall.
     HeadStalled,
@@ -35,7 +35,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All causes, with the causes that the pilot can change first.
+    /// All causes, beginning with those that the pilot can change.
     ///
     /// If two causes explain a hole equally well, the first in this order is named.
     pub const ALL: [Self; 12] = [
@@ -53,7 +53,7 @@ impl Cause {
         Self::Unknown,
     ];
 
-    /// Word used in reports and logs.
+    /// Word used for the cause in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::TooFast => "too_fast",
@@ -86,30 +86,30 @@ impl Cause {
 pub struct Causes(u16);
 
 impl Causes {
-    /// Set of one cause.
+    /// Set that contains one cause.
     pub fn of(cause: Cause) -> Self {
         Self(1 << cause as u16)
     }
 
-    /// This set with a cause added.
+    /// Returns this set with a cause added.
     #[must_use]
     pub fn with(self, cause: Cause) -> Self {
         self.union(Self::of(cause))
     }
 
-    /// This set with a cause removed.
+    /// Returns this set with a cause removed.
     #[must_use]
     pub fn without(self, cause: Cause) -> Self {
         self.less(Self::of(cause))
     }
 
-    /// This set with another set's causes removed.
+    /// Returns this set with the causes of another set removed.
     #[must_use]
     pub fn less(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// The causes in either set.
+    /// The causes in either of two sets.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -125,17 +125,17 @@ impl Causes {
         self.0 & !other.0 == 0
     }
 
-    /// Number of causes.
+    /// Number of causes in the set.
     pub fn len(self) -> u32 {
         self.0.count_ones()
     }
 
-    /// Whether the set is empty.
+    /// Whether the set contains no cause.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// The causes, the main one first.
+    /// The causes in the set, the main cause first.
     pub fn iter(self) -> impl Iterator<Item = Cause> {
         Cause::ALL.into_iter().filter(move |cause| self.has(*cause))
     }

@@ -16,7 +16,7 @@ pub struct Evidence {
     pub cause: Cause,
     /// Smallest set of causes without which the section would have passed, with the main cause first.
     pub causes: Causes,
-    /// Speed along the tunnel, m/s.
+    /// Speed of the vehicle along the tunnel, m/s.
     pub speed_mps: f64,
     /// Largest speed that would have met the target from the tunnel's centre, m/s.
     ///
@@ -27,7 +27,7 @@ pub struct Evidence {
     ///
     /// The speed leaves time for the additional passes that replace lost returns.
     pub with_losses_mps: f64,
-    /// Longest time between passes, seconds.
+    /// Longest time between passes of heads over the same wall, seconds.
     pub pass_gap_s: f64,
     /// Longest time between passes if the passes had been evenly spread, seconds.
     pub even_pass_gap_s: f64,
@@ -35,26 +35,26 @@ pub struct Evidence {
     pub all_pass_gap_s: f64,
     /// Share of pings without a return, including pings whose wall was out of range.
     pub missing_share: f64,
-    /// Share of pings occluded by the vehicle.
+    /// Share of pings at which the vehicle occluded the beam.
     pub occluded_share: f64,
-    /// Share of pings of a stalled head.
+    /// Share of pings that a stalled head made.
     pub standing_share: f64,
     /// Number of samples missing in the hole for any reason: the ping was lost, or was not made.
     pub lost_in_hole: u32,
-    /// Largest step along the perimeter between neighbouring samples of one turn, m.
+    /// Largest step along the perimeter between neighbouring samples of one turn of a head, m.
     pub t_y_m: f64,
     /// Largest step predicted for a level vehicle in the centre of the tunnel, m.
     pub middle_t_y_m: f64,
     /// Distance by which the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
-    /// Numbers of the heads that passed without pinging.
+    /// Numbers of the heads that passed through the sections without pinging.
     #[serde(with = "head_numbers")]
     pub silent_heads: HeadSet,
 }
 
 impl Evidence {
-    /// Whether causes and figures agree: the main cause is a cause, shares are from 0 to 1, and losses allow no speed
-    /// above the fitting one.
+    /// Whether causes and figures agree: the main cause is among the causes, shares are from 0 to 1, and
+    /// `with_losses_mps` is at most `fits_mps`.
     pub fn is_consistent(&self) -> bool {
         let shares = [self.missing_share, self.occluded_share, self.standing_share];
         self.causes.has(self.cause)
@@ -62,7 +62,7 @@ impl Evidence {
             && (0.0..=self.fits_mps).contains(&self.with_losses_mps)
     }
 
-    /// Causes and speed of the section, for the counts of its run.
+    /// Causes and required speed of the section, as its run counts them.
     pub fn failing(&self) -> Failing {
         Failing { causes: self.causes, again_mps: self.with_losses_mps }
     }

@@ -30,22 +30,26 @@ use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 const WELL_OVER: f64 = 1.2;
 /// Ratio of the speed to the planned speed above which the vehicle did not follow the plan.
 const OVER_PLAN: f64 = 1.15;
-/// Ratio that replaces `WELL_OVER` and `OVER_PLAN` without a position.
+/// Ratio that replaces `WELL_OVER` and `OVER_PLAN` if there is no position.
 ///
 /// The speed is then known from the inertial unit alone.
 const OVER_LOST: f64 = 1.4;
-/// Speed counts as a factor if it exceeds both the planned speed and the fitting speed by this ratio.
+/// Speed counts as a factor if it exceeds the planned speed, and the largest speed that meets the target, by
+/// this ratio.
 ///
 /// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;
-/// Swing counts as a factor if, without it, the distance between passes shrinks below this share.
+/// Swing of the beams counts as a factor if, without it, the distance between passes shrinks below this
+/// share.
 ///
 /// Even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
-/// Share of the target above which a step along the wall, seen from the tunnel's centre, is a factor.
+/// A coarse angular step counts as a factor if the step along the wall, seen from the tunnel's centre,
+/// exceeds this share of the target.
 const COARSE: f64 = 0.75;
 
-/// Determines the causes of a section's hole from the sections within T of this section.
+/// Determines the causes of a section's hole. `passages` come from all sections within the target T of this
+/// section.
 ///
 /// Allocates: never.
 pub fn explain<'a>(
@@ -67,7 +71,7 @@ pub fn explain<'a>(
     let is_lossy = causes.has(Cause::MissingReturns);
     let here =
         if is_lossy { sampled.passes_needed(iter::once(LossRate::independent(missing_share))) } else { 1.0 };
-    // If there are other causes, too, losses need to explain a hole only as wide as the target.
+    // If other causes contribute, lost returns need to explain only a hole as wide as the target.
     let times = if causes.len() > 1 { 1.0 } else { WIDEST };
     let hole_m = case.hole.diameter_m.min(times * case.target_m);
     let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);
@@ -95,13 +99,13 @@ pub fn explain<'a>(
     evidence
 }
 
-/// Factors that were present at the section.
+/// Factors that were present when the section was passed.
 fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let Case { hole, bounds_m: (from_m, to_m), target_m, .. } = *case;
     let around_m = f64::midpoint(hole.diameter_m.min(WIDEST * target_m), target_m);
     let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
     let near = |lack: &&MissingSample| {
-        // For a hole all round the wall, missing samples all round the wall count.
+        // If the hole extends all round the wall, missing samples at any arc length count.
         let off_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m).abs();
         off_m < hole.diameter_m + target_m
     };
@@ -121,7 +125,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
-    // Without a position, the measured speed is less certain.
+    // Without a position, the measured speed is less reliable.
     let well_over = if is_lost { OVER_LOST } else { WELL_OVER };
     let over_planned = if is_lost { OVER_LOST } else { OVER_PLAN };
     let is_over_all = !is_lost
@@ -132,7 +136,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(over > well_over || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
-    // Above the planned speed, the passes of heads mounted apart along the hull may be evenly spread by
+    // Above the planned speed, the passes of heads at different places along the hull may be evenly spread by
     // chance.
     let is_fast = drive.speed_mps > OVER_PLAN * drive.planned_mps;
     add(is_slow || is_uneven || is_fast && drive.all_gap_s < HELPS * drive.healthy_at_plan_s, Cause::Phase);

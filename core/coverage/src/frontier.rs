@@ -10,16 +10,17 @@ use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::SILENT_AFTER;
 
-/// Stretch of tunnel in which a head's samples currently land.
+/// Range of chainages in which a head's samples currently land.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reach {
-    /// Least chainage, m.
+    /// Smallest chainage of the reach, m.
     pub from_m: f64,
-    /// Greatest chainage, m.
+    /// Largest chainage of the reach, m.
     pub to_m: f64,
 }
 
-/// Reach of one head: its current stretch, and the stretch of all its samples so far.
+/// Reach of one head: the stretch where its samples land now, and the stretch that all its samples have
+/// covered so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
     /// Receive time of the head's last ping, with or without a fix; `None` before the first.
@@ -40,7 +41,7 @@ impl HeadReach {
         Self { heard: Some(now), latest: reach, swept: Some(swept) }
     }
 
-    /// Creates the reach of a silent head that would be at `reach` if it pinged.
+    /// Creates the reach of a silent head. Its samples would land at `reach` if it pinged.
     pub fn silent_at(before: Option<Self>, reach: Reach) -> Self {
         debug_assert!(reach.is_ordered(), "a reach begins before it ends: {reach:?}");
         before.map_or(Self { heard: None, latest: reach, swept: None }, |before| Self {
@@ -56,7 +57,7 @@ impl HeadReach {
         self.heard = Some(now);
     }
 
-    /// Returns the last known reach.
+    /// Returns the last known reach of the head.
     pub fn latest(&self) -> Reach {
         self.latest
     }
@@ -81,22 +82,22 @@ pub struct Frontier {
     ///
     /// Heads count whether they ping or not.
     way: Option<Reach>,
-    /// Stretch that all heads, pinging or not, have passed with their whole combined reach.
+    /// Stretch where all heads, pinging or not, have been: the whole combined reach has moved across it.
     ///
     /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
     through: Option<Reach>,
-    /// Zone: index range of the sections within the reach of the awaited heads plus a margin.
+    /// Zone: index range of the sections within reach of the heads that sections wait for, plus a margin.
     zone: Option<Range<i64>>,
     /// Time of the zone's last change.
     zone_moved: Option<MonoNs>,
     /// Time of the last ping of any head.
     heard: Option<MonoNs>,
-    /// Time of the first ping, and of each ping that ended a silence of all heads.
+    /// Time of the latest ping that ended a silence of all heads, or of the first ping.
     ///
     /// Before the first ping, this is the time of the first update.
     woken: Option<MonoNs>,
     course: Option<Course>,
-    /// Number of course reversals.
+    /// Number of times that the vehicle has turned back.
     turns: u32,
 }
 
@@ -110,7 +111,7 @@ struct Course {
     heads: usize,
 }
 
-/// Hysteresis for a reversal of the course, m: yaw and tether slack cause smaller reversals.
+/// Hysteresis for a reversal of the course, m. Yaw and tether slack cause smaller back-and-forth movements.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
@@ -137,17 +138,17 @@ pub struct Outlook {
     pub at: MonoNs,
     /// Coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
-    /// Stretch covered by every awaited head that has pinged; `None` if empty.
+    /// Stretch covered by every head that sections wait for and that has pinged; `None` if empty.
     pub swept_by_all: Option<Reach>,
-    /// No head is alive.
+    /// Whether no head is alive: none has pinged for a while.
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Stretch behind the place where the vehicle began or turned back.
+    /// Stretch behind the place where the vehicle began or turned back, where not all heads have been.
     ///
-    /// Not all heads have been in this stretch. On the present course, the other heads will not reach it.
+    /// On the present course, the remaining heads will not reach it.
     pub not_passed: Option<Reach>,
-    /// Stretch that all heads, pinging or not, have passed; `None` before.
+    /// Stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub through: Option<Reach>,
     /// Zone of sections in reach if it has been unchanged for longer than [`SILENT_AFTER`].
     ///
@@ -158,9 +159,9 @@ pub struct Outlook {
 /// Change of the frontier by one ping or update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections that are newly behind the zone.
+    /// Sections that the zone has newly left behind.
     pub left_behind: Range<i64>,
-    /// Sections that are newly ahead of the zone, because the vehicle moves backwards.
+    /// Sections newly ahead of the zone, because the vehicle moves backwards.
     pub left_ahead: Range<i64>,
     /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
@@ -202,13 +203,14 @@ impl Frontier {
 
     /// Returns the zone if the vehicle is nearly stationary.
     ///
-    /// `None` within [`SILENT_AFTER`] of the first ping: the live heads are not known yet.
+    /// `None` within [`SILENT_AFTER`] of the first ping, because the live heads are not known yet.
     fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
         let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT_AFTER.0);
         self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
     }
 
-    /// Whether a head has been silent for so long that sections do not wait for it while others ping.
+    /// Whether a head has been silent for so long that sections do not wait for its samples while others
+    /// ping.
     pub fn is_silent(&self, head: Option<&HeadReach>, now: MonoNs) -> bool {
         match head.and_then(|head| head.heard) {
             Some(heard) => !is_within_silence(heard, now),
@@ -223,7 +225,7 @@ impl Frontier {
         self.woken.is_none_or(|woken| is_within_silence(woken, now))
     }
 
-    /// Returns the awaited heads: the live heads, whose samples may still land.
+    /// Returns the awaited heads: those whose samples may still land.
     ///
     /// All heads are awaited if none is alive, or while the live heads are not known yet.
     fn awaited(
@@ -259,7 +261,7 @@ impl Frontier {
             Some(Reach { from_m: through.from_m.min(all.to_m), to_m: through.to_m.max(all.from_m) });
     }
 
-    /// Returns the stretch that all heads, pinging or not, have passed; `None` before.
+    /// Returns the stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub fn through(&self) -> Option<Reach> {
         self.through.filter(|through| through.from_m <= through.to_m)
     }
@@ -299,10 +301,10 @@ impl Frontier {
         self.move_zone(heads, now, section_m, margin_m)
     }
 
-    /// Updates the frontier at `now`; vehicle and heads, pinging or not, are within `span`.
+    /// Updates the frontier for an update at `now`. `span` covers the vehicle and its heads, pinging or not.
     ///
-    /// `heads` are the reaches of all heads; silent heads are at the places where they would ping. While a head is
-    /// alive, only pings move the zone.
+    /// `heads` are the reaches of all heads; silent heads are at the places where they would ping. While a
+    /// head is alive, only pings move the zone.
     pub fn beat(
         &mut self,
         span: Reach,
@@ -373,7 +375,8 @@ impl Moved {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }
 
-    /// Whether nothing has changed: no section left the zone or joined the coverage extent.
+    /// Whether nothing has changed since the last ping or update: no section left the zone or joined the
+    /// coverage extent.
     ///
     /// Also true if no head's place is known.
     pub fn is_nothing(&self) -> bool {
@@ -393,7 +396,7 @@ impl Reach {
         f64::midpoint(self.from_m, self.to_m)
     }
 
-    /// Returns the smallest stretch that covers both stretches.
+    /// Returns the smallest stretch that covers two stretches.
     #[must_use]
     pub fn with(self, other: Self) -> Self {
         Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
@@ -411,7 +414,7 @@ pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A frontier with its heads.
+    /// Test fixture: a frontier with its heads.
     #[derive(Default)]
     struct Fixture {
         frontier: Frontier,
@@ -432,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn section_is_left_behind_once_the_last_head_is_a_margin_past_it() {
+    fn section_leaves_the_zone_once_the_last_head_is_past_it_by_the_margin() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -443,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn sections_are_left_ahead_when_the_vehicle_moves_backwards() {
+    fn sections_ahead_leave_the_zone_when_the_vehicle_moves_backwards() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 2.0, 0.25, 0.25);
         let moved = frontier.advance(0, MonoNs(1), 1.7, 0.25, 0.25);
@@ -466,7 +469,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_does_not_delay_leaving_sections() {
+    fn silent_head_does_not_keep_sections_in_the_zone() {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
@@ -476,7 +479,7 @@ mod tests {
     }
 
     impl Fixture {
-        /// Updates the frontier at `now_s`, seconds.
+        /// Updates the test frontier at `now_s`, seconds.
         ///
         /// The heads, alive or not, are half a metre before and behind the vehicle.
         fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {
@@ -518,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_position_decides_which_sections_are_left_if_no_head_is_alive() {
+    fn vehicle_position_decides_which_sections_leave_the_zone_if_no_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
@@ -531,7 +534,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_passed_by_all_heads_runs_from_front_start_to_rear_end() {
+    fn stretch_where_all_heads_have_been_runs_from_front_head_start_to_rear_head_end() {
         let mut frontier = Frontier::default();
         let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
         assert_eq!((frontier.through(), frontier.not_passed()), (None, None));
@@ -549,7 +552,7 @@ mod tests {
     }
 
     #[test]
-    fn every_head_is_awaited_again_after_all_heads_were_silent() {
+    fn sections_wait_for_every_head_again_after_all_heads_were_silent() {
         let mut frontier = Fixture::default();
         frontier.beat(0, 3.0);
         frontier.beat(5, 4.0);

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::cause::{Cause, Causes};
 use headrace_geometry::snapshot::stateful;
 
-/// Capacity: the pings of four heads in five minutes without any return.
+/// Maximum number of missing samples kept: the pings of four heads in five minutes without any return.
 const ROOM: usize = 1 << 16;
-/// Number of missing samples per block with a common extent.
+/// Number of missing samples per block. Each block has one extent along the tunnel.
 ///
 /// A search over a few metres skips the other blocks. The number divides the capacity.
 const BLOCK: usize = 1 << 8;
 
-/// A missing sample.
+/// A missing sample: a place where a ping would have left a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MissingSample {
     /// Chainage at which the sample would lie, m.
@@ -24,31 +24,31 @@ pub struct MissingSample {
     pub arc_m: f64,
     /// Number of the head that would have made the sample.
     pub head: u8,
-    /// Causes of the loss. The sample would exist only if all of them were absent.
+    /// Causes of the missing sample. It would exist only if all of them had been absent.
     pub why: Causes,
 }
 
-/// List of the latest missing samples.
+/// List of the most recent missing samples.
 #[derive(Debug)]
 pub struct MissingSamples {
     ring: Vec<MissingSample>,
     /// Least and greatest chainage in each block of the ring, m.
     extents_m: Vec<[f64; 2]>,
-    /// Position of the next entry once the ring is full.
+    /// Position of the next entry in the ring buffer once it is full.
     next: u32,
 }
 
 stateful!(MissingSamples { state: next; lists: ring, extents_m; });
 
 impl Default for MissingSamples {
-    /// Allocates: at startup, all that it will ever use.
+    /// Creates an empty list. Allocates: at startup, all that the list will ever use.
     fn default() -> Self {
         Self { ring: Vec::with_capacity(ROOM), extents_m: Vec::with_capacity(ROOM / BLOCK), next: 0 }
     }
 }
 
 impl MissingSamples {
-    /// Adds a missing sample, which replaces the oldest one if there is no room.
+    /// Adds a missing sample to the list, where it replaces the oldest one if there is no room.
     ///
     /// Allocates: never.
     pub fn add(&mut self, lack: MissingSample) {
@@ -67,7 +67,7 @@ impl MissingSamples {
         );
     }
 
-    /// Extends a block's extent by the entry at this position of the ring.
+    /// Extends a block's extent by the entry at this position of the ring buffer.
     ///
     /// Once all entries of a block are new, the extent is that of these entries alone.
     fn extend(&mut self, at: usize, x_m: f64) {
@@ -139,7 +139,7 @@ mod tests {
             lacks.add(MissingSample { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why) });
         }
         let last = (ROOM + 99) as f64;
-        // Head 1 made five of ten samples in a row. The last one is occluded.
+        // Head 1 should have made five of ten samples in a row. The last of them is occluded.
         assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
         let revised = |lack: &&MissingSample| lack.why == Causes::of(silent);
         let revised: Vec<MissingSample> =

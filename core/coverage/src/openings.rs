@@ -5,17 +5,18 @@
 use super::store::{SampleStore, StoreError, WallSample};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 
 /// A declared opening of the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
-    /// Display name.
+    /// Display name of the opening.
     pub name: String,
     /// Chainage of the opening's beginning, m.
     pub from_m: f64,
     /// Chainage of the opening's end, m.
     pub to_m: f64,
-    /// Arc length of the opening's beginning, and length along the perimeter, m.
+    /// Arc length at which the opening begins, and its length along the perimeter, m.
     ///
     /// `None` for the whole perimeter.
     pub arc_m: Option<(f64, f64)>,
@@ -32,24 +33,25 @@ impl Opening {
         self.arc_m.map_or((0.0, perimeter_m), |(from_m, length_m)| (from_m, length_m.min(perimeter_m)))
     }
 
-    /// Returns the numbers of intervals along the tunnel and the perimeter at a spacing.
+    /// Returns the numbers of intervals between filling samples along the tunnel and the perimeter, for a
+    /// given spacing.
     fn counts(&self, perimeter_m: f64, spacing_m: f64) -> (i64, i64) {
         let over = |length_m: f64| (-math::floor_to_i64(-length_m / spacing_m)).max(1);
         (over(self.to_m - self.from_m), over(self.arc(perimeter_m).1))
     }
 
     /// Returns the number of samples that fill the opening.
-    pub fn places(&self, perimeter_m: f64, target_m: f64) -> i64 {
-        let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
+    pub fn places(&self, perimeter_m: f64, target: Target) -> i64 {
+        let (along, around) = self.counts(perimeter_m, spacing_m(target));
         (along + 1) * (around + 1)
     }
 
     /// Fills the opening with samples, so that a hole extends into it by at most half of their spacing.
     ///
     /// Errors: the store is full, or the opening lies outside the store's extent.
-    pub fn fill(&self, store: &mut SampleStore, target_m: f64) -> Result<(), StoreError> {
+    pub fn fill(&self, store: &mut SampleStore, target: Target) -> Result<(), StoreError> {
         let perimeter_m = store.perimeter_m();
-        let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
+        let (along, around) = self.counts(perimeter_m, spacing_m(target));
         let (first_m, length_m) = self.arc(perimeter_m);
         for i in 0..=along {
             let x_m = self.from_m + (self.to_m - self.from_m) * i as f64 / along as f64;
@@ -71,8 +73,8 @@ impl Opening {
     }
 }
 
-fn spacing_m(target_m: f64) -> f64 {
-    SPACING_M.min(target_m / 10.0)
+fn spacing_m(target: Target) -> f64 {
+    SPACING_M.min(target.max_hole_m / 10.0)
 }
 
 #[cfg(test)]
@@ -86,7 +88,7 @@ mod tests {
         Opening { name: "gate".to_owned(), from_m: 4.0, to_m: 6.0, arc_m: Some((17.0, 4.0)) }
     }
 
-    /// A wall with samples every half metre, except in the opening.
+    /// A test wall with samples every half metre, except in the opening.
     fn store(profile: &Profile, with_opening: bool) -> SampleStore {
         let layout = StoreLayout {
             perimeter_m: profile.perimeter_m(),
@@ -107,7 +109,7 @@ mod tests {
             }
         }
         if with_opening {
-            gate().fill(&mut store, 0.8).unwrap();
+            gate().fill(&mut store, Target::new(0.8)).unwrap();
         }
         store
     }
@@ -138,7 +140,7 @@ mod tests {
         assert!((all_round.share_of(5.0, 5.25, &profile) - 1.0).abs() < 1e-12);
     }
 
-    /// Samples fill 2 m by 4 m every 5 cm, or every 2 cm for a target of 0.2 m.
+    /// An opening of 2 m by 4 m is filled with samples every 5 cm, or every 2 cm for a target of 0.2 m.
     #[test]
     fn number_of_samples_filled_into_an_opening_equals_the_predicted_number() {
         let profile = shapes::circle(3.0).unwrap();
@@ -151,8 +153,8 @@ mod tests {
                 capacity: 100_000,
             };
             let mut store = SampleStore::new(layout);
-            gate().fill(&mut store, target_m).unwrap();
-            let counted = gate().places(profile.perimeter_m(), target_m);
+            gate().fill(&mut store, Target::new(target_m)).unwrap();
+            let counted = gate().places(profile.perimeter_m(), Target::new(target_m));
             let filled = i64::try_from(store.usage().kept + store.usage().thinned).unwrap();
             assert_eq!((counted, filled), (expected, expected), "{target_m}");
         }

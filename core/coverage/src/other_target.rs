@@ -1,11 +1,12 @@
-//! Alternative targets: verdicts on the same holes for another target.
+//! Verdicts on the holes found in a dive for another target than the dive's own.
 
 use super::frontier::{Outlook, clear_of};
 use super::hole::Hole;
 use super::section::{Section, Verdict};
 use super::sections::{Sections, verdict};
+use headrace_sampling::Target;
 
-/// A section's hole, independent of the target.
+/// Inputs for the verdict on a section's hole that don't depend on the target.
 #[derive(Debug, Clone, Copy)]
 struct Measured {
     hole: Hole,
@@ -15,7 +16,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// Figures of a section with a measured hole.
+    /// Inputs for the verdict on a section with a measured hole.
     fn of(section: &Section) -> Option<Self> {
         Some(Self { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.doubt().is_some() })
     }
@@ -27,23 +28,19 @@ impl Sections {
     /// The counted visits and the settled sections are still those for the dive's own target. A replay with the other
     /// target gives the verdicts that the dive would have reported.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
+        let target = Target { max_hole_m: target_m, ..self.target() };
         self.sections_of(outlook.way).filter_map(move |index| {
-            Some((index, self.verdict_of(&Measured::of(self.get(index)?)?, target_m, outlook)))
+            Some((index, verdict_of(&Measured::of(self.get(index)?)?, target, outlook)))
         })
     }
+}
 
-    fn verdict_of(
-        &self,
-        Measured { hole, sd_m, doubtful }: &Measured,
-        target_m: f64,
-        outlook: &Outlook,
-    ) -> Verdict {
-        let error_m = self.confidence_sd() * sd_m;
-        let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
-        match verdict(hole, error_m, target_m, clear_m) {
-            Verdict::Pass if *doubtful => Verdict::CannotSay,
-            said => said,
-        }
+fn verdict_of(measured: &Measured, target: Target, outlook: &Outlook) -> Verdict {
+    let Measured { hole, sd_m, doubtful } = *measured;
+    let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
+    match verdict(&hole, sd_m, target, clear_m) {
+        Verdict::Pass if doubtful => Verdict::CannotSay,
+        said => said,
     }
 }
 
@@ -58,7 +55,7 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// A pipe with samples every 0.2 m, except from 5 m to 5.6 m.
+    /// Sections of a pipe with samples every 0.2 m, except from 5 m to 5.6 m.
     ///
     /// The coverage extent is 3 m to 7 m, judged in sections of a quarter of a metre.
     struct Seen {
@@ -89,7 +86,7 @@ mod tests {
                 still_zone: None,
             };
             let mut finder = HoleFinder::default();
-            let mut seen = Self { sections: Sections::new(0.25, 0.5, 0.0, 10.0), outlook };
+            let mut seen = Self { sections: Sections::new(0.25, Target::new(0.5), 0.0, 10.0), outlook };
             for index in seen.sections.sections_of(seen.outlook.way) {
                 let mut judging = Judging {
                     store: &store,
@@ -106,7 +103,7 @@ mod tests {
 
     /// The largest circle between 5 m and 5.6 m measures 0.63 m.
     ///
-    /// If the circle's centre is within a quarter of a metre of 5 m, it measures 0.54 m.
+    /// With its centre within a quarter of a metre of 5 m, the largest circle measures 0.54 m.
     #[test]
     fn verdicts_for_another_target_use_the_measured_holes() {
         let seen = Seen::new();
@@ -118,7 +115,7 @@ mod tests {
         }
     }
 
-    /// The error is two standard deviations of 0.05 m.
+    /// The position error allowed for is two standard deviations of 0.05 m each.
     #[test]
     fn verdict_for_another_target_respects_position_error_and_doubtful_samples() {
         let mut seen = Seen::new();

@@ -1,4 +1,4 @@
-//! Ping statistics of the passage through a section, as evidence for the cause of a fail.
+//! Statistics of the pings made during the passage through a section, as evidence for the cause of a fail.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,27 +13,27 @@ use headrace_sampling::losses::LossRate;
 /// Statistics of the pings made within a section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Passage {
-    /// All pings, whatever their outcome.
+    /// Number of pings, whatever their outcome.
     pub pings: u32,
-    /// Pings with a fix.
+    /// Number of pings with a fix.
     pub placed: u32,
-    /// Pings without a fix, or without a return although the wall was within range.
+    /// Number of pings without a fix, or without a return although the wall was within range.
     pub missing: u32,
-    /// Pings without a return where the wall was farther than the range setting.
+    /// Number of pings without a return where the wall was farther than the range setting.
     pub out_of_range: u32,
-    /// Pings occluded by the vehicle.
+    /// Number of pings occluded by the vehicle.
     pub occluded: u32,
-    /// Returns without a fix.
+    /// Number of returns without a fix.
     pub unplaced: u32,
-    /// Pings of a stalled head.
+    /// Number of pings of a stalled head.
     pub standing: u32,
     /// Heads that passed through the section without a ping.
     pub silent: HeadSet,
-    /// Driving figures at the moment of the largest T.
+    /// Driving figures at the moment of the largest spacing T.
     pub drive: Drive,
-    /// Whether more pings without a fix were made than are stored.
+    /// Whether there were more pings without a fix than could be stored.
     pub unseen: bool,
-    /// Whether the place of a ping was too uncertain for the measured speed to count as evidence.
+    /// Whether the position of a ping was too uncertain for the measured speed to count as evidence.
     ///
     /// The uncertainty is relative to the previous pass.
     pub adrift: bool,
@@ -41,7 +41,7 @@ pub struct Passage {
     pub pass_error: PassError,
 }
 
-/// Movement of the vehicle and its heads at a moment.
+/// Movement of the vehicle and its heads at one moment of a passage.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Drive {
     /// Absolute speed along the tunnel, m/s.
@@ -50,13 +50,13 @@ pub struct Drive {
     pub planned_mps: f64,
     /// Longest time between two passes of the heads that turned, seconds.
     pub gap_s: f64,
-    /// Time `gap_s` if these heads were evenly spread, seconds.
+    /// Time `gap_s` if the heads that turned were evenly spread, seconds.
     pub even_gap_s: f64,
     /// Time `gap_s` if all heads were turning, with none silent or stalled, seconds.
     pub healthy_gap_s: f64,
-    /// Time `gap_s` if all heads' angles were as scheduled, at this speed, seconds.
+    /// Time `gap_s` if all heads' angles were as scheduled, at the present speed, seconds.
     pub planned_gap_s: f64,
-    /// Time `gap_s` if all heads were evenly spread, seconds.
+    /// Time `gap_s` if all configured heads were turning and evenly spread, seconds.
     pub all_gap_s: f64,
     /// Time `gap_s` at the planned speed, or at this speed if none is planned, seconds.
     pub gap_at_plan_s: f64,
@@ -66,13 +66,13 @@ pub struct Drive {
     ///
     /// Their angles are as scheduled.
     pub left_at_plan_s: f64,
-    /// Time between two pings, seconds.
+    /// Longest time between two pings of a head, seconds.
     pub ping_period_s: f64,
     /// Largest distance that the beams have swung along the tunnel since the neighbouring passes, m.
     pub swing_m: f64,
-    /// Largest step along the perimeter between two pings from the vehicle's position, by geometry, m.
+    /// Largest step along the perimeter between two pings, computed from the vehicle's position, m.
     pub t_y_m: f64,
-    /// Largest step along the perimeter between two pings from the tunnel's centre, m.
+    /// Largest step along the perimeter between two pings, computed from the tunnel's centre, m.
     pub middle_t_y_m: f64,
     /// Largest speed that meets the target from the tunnel's centre, m/s.
     ///
@@ -81,7 +81,7 @@ pub struct Drive {
     pub fits_mps: f64,
     /// Largest distance between passes along the tunnel with which the target is met, m.
     pub fits_along_m: f64,
-    /// Number of passes that replace a single pass because of lost returns.
+    /// Number of passes needed in place of a single pass because of lost returns.
     ///
     /// See [`headrace_sampling::losses`].
     pub passes_needed: f64,
@@ -91,29 +91,30 @@ pub struct Drive {
     pub is_in_sectors: bool,
     /// Whether a head has not pinged since the dive began.
     pub is_unheard: bool,
-    /// Effect of other settings of the heads.
+    /// Predicted effect of alternative head settings on step and turn period.
     pub other: OtherSettings,
 }
 
-/// Ratios of other head settings to the present settings.
+/// Step and turn period with alternative head settings, relative to the present settings.
 ///
 /// A turn takes longer with a finer step or a longer range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherSettings {
-    /// Step of the finer mode, divided by the present step.
+    /// Step of the alternative finer mode, divided by the present step.
     ///
-    /// The finer mode is the coarsest one whose step is below the target.
+    /// The finer mode is the mode with a finer step that allows the highest speed, or the finest one if none
+    /// meets the target.
     pub finer_step: f64,
-    /// Turn period of the finer mode, divided by the present one.
+    /// Turn period of the alternative finer mode, divided by the present turn period.
     pub finer_turn: f64,
-    /// Turn period with a longer range setting, divided by the present one.
+    /// Turn period with a longer range setting, divided by the present turn period.
     ///
-    /// The setting is the shortest that reaches all wall from the centre.
+    /// The longer setting is the shortest one that reaches all wall from the tunnel's centre.
     pub longer_turn: f64,
 }
 
 impl Default for OtherSettings {
-    /// Ratios for heads with unknown settings. They assume a finer mode with the same turn period.
+    /// Ratios for heads with unknown settings. The ratios assume a finer mode with the same turn period.
     fn default() -> Self {
         Self { finer_step: 0.375, finer_turn: 1.0, longer_turn: 1.0 }
     }
@@ -123,33 +124,35 @@ impl Default for OtherSettings {
 const SLOWER: f64 = 0.97;
 
 impl Drive {
-    /// Distance between passes including the swing, if no head had been silent or stalled, m.
+    /// Distance along the tunnel between passes, including swing, as if no head had been silent or stalled,
+    /// m.
     pub fn along_m(&self) -> f64 {
         self.speed_mps * self.healthy_gap_s + self.swing_m + self.advance_m()
     }
 
-    /// Distance between passes with all heads turning as scheduled, m.
+    /// Distance along the tunnel between passes if all heads turned as scheduled, m.
     pub fn planned_along_m(&self) -> f64 {
         self.speed_mps * self.planned_gap_s
     }
 
-    /// Distance travelled between two pings, m.
+    /// Distance that the vehicle travels between two pings, m.
     pub fn advance_m(&self) -> f64 {
         self.speed_mps * self.ping_period_s
     }
 
     /// Whether the heads are out of phase because the vehicle is slower than planned.
     ///
-    /// True if passes are farther apart by a factor above `over` than at the planned speed with the heads at their
-    /// scheduled angles. Heads apart along the hull are in phase only near the planned speed. The planned speed must
-    /// also meet the target: no speed helps heads that were started with wrong phases.
+    /// True if passes are farther apart, by a factor above `over`, than at the planned speed with the heads
+    /// at their scheduled angles. Heads at different places along the hull are in phase only near the planned
+    /// speed. The planned speed must also meet the target, because no speed helps heads that were started
+    /// with wrong phases.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;
         is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
-    /// Returns the drive with the larger distance between passes.
+    /// Returns the worse of two drives, which is the one with the larger distance between passes.
     #[must_use]
     pub fn or_worse(self, other: Self) -> Self {
         if other.along_m() > self.along_m() { other } else { self }
@@ -163,37 +166,38 @@ pub enum Loss {
     Missing,
     /// The wall was farther than the range setting.
     OutOfRange,
-    /// The vehicle occluded the beam.
+    /// The vehicle occluded the beam of the ping.
     Occluded,
 }
 
 impl Loss {
-    /// All reasons.
+    /// All reasons why a ping left no sample.
     pub const ALL: [Self; 3] = [Self::Missing, Self::OutOfRange, Self::Occluded];
 }
 
-/// Ratio of two errors: that of a section's largest hole, and that of a single pass distance.
+/// Ratio of the position error that affects a section's largest hole to that of a single distance between
+/// passes.
 ///
 /// The largest hole is often one that errors have enlarged. The ratio is measured over the field dives of
 /// `tests/tests/navigation/fusion.rs`.
 const LARGEST_OF_MANY: f64 = 1.2;
 
-/// Error along the tunnel of the samples of a pass relative to the previous pass.
+/// Error along the tunnel of the samples of one pass relative to the previous pass.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassError {
-    /// Covariance of the relative errors that move the samples.
+    /// Covariance of the position and attitude errors of one pass relative to the previous one.
     pub relative: Relative,
     /// Position of the vehicle in the cross-section, [y, z], m.
     pub from_m: [f64; 2],
 }
 
 impl PassError {
-    /// Creates the error of a pass at a fix.
+    /// Creates the pass error at a fix.
     pub fn of(fix: &Fix) -> Self {
         Self { relative: fix.relative, from_m: [fix.pose.position.y(), fix.pose.position.z()] }
     }
 
-    /// Keeps the larger of two errors.
+    /// Keeps the larger of two pass errors.
     pub fn add(&mut self, other: &Self) {
         if other.relative.sd_m(Vec3::zero()) >= self.relative.sd_m(Vec3::zero()) {
             *self = *other;
@@ -272,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn worse_drive_has_the_larger_distance_between_passes() {
+    fn drive_with_the_larger_distance_between_passes_is_the_worse_one() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));
@@ -290,7 +294,8 @@ mod tests {
         let worst_m = LARGEST_OF_MANY * 0.01 * (3.0 + (y_m - 0.5).abs());
         assert!((error.worst_m(&profile) - worst_m).abs() < 1e-4, "{}", error.worst_m(&profile));
         assert!((error.slope() - LARGEST_OF_MANY * 0.01).abs() < 1e-12);
-        // The first estimated position is inside the profile. The second is far outside, as a lost estimate may be.
+        // The first estimated position of the vehicle is inside the profile. The second is far outside, as it
+        // may be when navigation is lost.
         for from_m in [error.from_m, [40.0, -30.0]] {
             let error = PassError { from_m, ..error };
             let worst_m = error.worst_m(&profile);

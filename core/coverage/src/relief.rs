@@ -1,4 +1,5 @@
-//! Relief: places where heads recently found wall off the design, and votes of the heads on each other.
+//! Relief: places where heads recently found wall that deviates from the design, and votes of the heads on
+//! each other.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,38 +8,40 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
 
-/// Number of bins around the perimeter; a bin is about as wide as a step of a head.
+/// Number of bins around the perimeter; a bin is about as wide as the step of a head.
 const BINS: i64 = 128;
-/// Number of bins along the tunnel, each half a reach long.
+/// Number of bins along the tunnel. Each is half of `WallLimits::reach_m` long.
 ///
 /// In a tunnel of 6 m radius, all bins together are 9 m long, which exceeds the distance between heads.
 const SLABS: i64 = 32;
 
-/// Findings in a bin.
+/// Recent returns in one bin of the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Cell {
-    /// Number of the slab since chainage zero; a bin of another slab is outdated.
+    /// Number of the bin's slab (row of bins) since chainage zero. A bin with the number of another slab is
+    /// outdated.
     slab: i64,
-    /// The latest return off the design, and whether it was classified as wall.
+    /// The latest return that deviates from the design, and whether it was classified as wall.
     off: Option<(PlacedReturn, bool)>,
-    /// Bitmasks of heads whose returns in this bin agree with the design, and contradict the design.
+    /// Bitmasks of the heads whose returns in this bin agree with the design, and of those whose returns
+    /// contradict it.
     as_designed: u8,
     contradicting: u8,
 }
 
-/// Votes on a head, counted in bins that other heads have seen, too.
+/// Votes on a head, counted in bins of the wall that other heads have also seen.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ballot {
     /// Number of bins in which the head agrees with the design, as other heads do.
     agreed: u32,
     /// Number of bins in which the head contradicts the design, while other heads agree with it.
     outvoted: u32,
-    /// Sum of the deviations in the outvoted bins, m, and the range of their chainages.
+    /// Sum of the deviations in the bins where the head was outvoted, m, and the range of their chainages.
     off_sum_m: f64,
     between_m: Option<[f64; 2]>,
 }
 
-/// Number of votes needed for a decision: about the bins of a turn.
+/// Number of votes needed for a decision on a head: about one per bin of a turn.
 const FULL_BALLOT: u32 = 128;
 
 impl Ballot {
@@ -60,28 +63,28 @@ impl Ballot {
         self.between_m = Some([from_m.min(placed.x_m), to_m.max(placed.x_m)]);
     }
 
-    /// Returns the mean deviation and the chainages of the outvoted bins, m.
+    /// Returns the mean deviation and the chainages of the bins where the head was outvoted, m.
     ///
-    /// `None` unless enough bins have votes, and most of these bins are outvoted.
+    /// `None` unless enough bins have votes, and the head was outvoted in most of them.
     pub(super) fn verdict(&self) -> Option<(f64, [f64; 2])> {
         let lost = self.agreed + self.outvoted >= FULL_BALLOT && self.outvoted > self.agreed;
         lost.then(|| Some((self.off_sum_m / f64::from(self.outvoted), self.between_m?))).flatten()
     }
 
-    /// Whether more than a quarter of the head's bins are outvoted.
+    /// Whether the head was outvoted in more than a quarter of the bins with votes.
     pub(super) fn is_lost(&self) -> bool {
         4 * self.outvoted > self.agreed + self.outvoted
     }
 }
 
-/// The relief of the wall near the vehicle.
+/// The relief of the wall near the vehicle, with the heads' votes.
 #[derive(Debug, Clone)]
 pub struct Relief {
     cells: Vec<Cell>,
     ballots: [Ballot; MAX_HEADS],
     /// Bitmask of heads that aren't trusted.
     distrusted: u8,
-    /// Bitmask of heads whose range changes as the range to the design does.
+    /// Bitmask of heads whose range varies when the range to the design varies.
     changing: u8,
 }
 
@@ -114,8 +117,8 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 impl Relief {
     /// Whether earlier returns near this place have the same deviation from the design.
     ///
-    /// The limits are the reach along the tunnel and the tolerance. An earlier wall return must be within both
-    /// limits, a doubtful one within half of each.
+    /// Two limits apply: the reach along the tunnel and the tolerance of the deviation. An earlier wall
+    /// return must be within both limits, a doubtful one within half of each.
     pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         let (slab, bin) = place(placed, limits);
         (slab - 2..=slab + 2).any(|slab| {
@@ -130,7 +133,7 @@ impl Relief {
         })
     }
 
-    /// Stores a return off the design as support for later passes.
+    /// Stores a return that deviates from the design as support for later passes.
     pub(super) fn remember(&mut self, placed: &PlacedReturn, is_wall: bool, limits: &WallLimits) {
         if limits.is_design(placed) {
             return;
@@ -144,7 +147,8 @@ impl Relief {
     /// Counts a head's vote in the bin of a return, and updates the votes on other heads there.
     pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
         let (slab, bin) = place(placed, limits);
-        // Returns between the two limits don't vote, because noise would make heads disagree at a single limit.
+        // Returns between half and the whole contradiction limit don't vote, because noise would make heads
+        // disagree at a single limit.
         let as_designed = placed.off_m.abs() <= limits.contradiction_m / 2.0;
         if !as_designed && placed.off_m.abs() <= limits.contradiction_m {
             return;
@@ -155,7 +159,8 @@ impl Relief {
             return;
         };
         if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
-            // This head agrees with the design here, so an object that was seen only once is gone.
+            // This head agrees with the design here, so the unconfirmed object that earlier returns showed
+            // here is gone.
             cell.off = None;
         }
         let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };
@@ -199,19 +204,19 @@ impl Relief {
         self.ballots.get(head).copied().unwrap_or_default()
     }
 
-    /// Sets whether the votes of a head count.
+    /// Sets whether the votes of a head on other heads count.
     pub(super) fn believe(&mut self, head: usize, believed: bool) {
         set(&mut self.distrusted, head, !believed);
     }
 
-    /// Records whether the range of a head changes as the range to the design does.
+    /// Records whether the range of a head varies when the range to the design varies.
     pub(super) fn note_changing(&mut self, head: usize, changes: bool) {
         set(&mut self.changing, head, changes);
     }
 
-    /// Whether the range of another head changes as the range to the design does.
+    /// Whether the range of another head varies when the range to the design varies.
     ///
-    /// If so, no error of the estimate explains this head's constant range.
+    /// If so, no error of the estimated position explains a constant range of this head.
     pub(super) fn others_change(&self, head: usize) -> bool {
         self.changing & !bit(head) != 0
     }

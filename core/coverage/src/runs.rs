@@ -13,32 +13,32 @@ use headrace_geometry::time::MonoNs;
 /// Across a wider gap, the speed that one section needs is no evidence for the next section.
 const JOIN_M: f64 = 0.5;
 
-/// Number of a run, which is never used again.
+/// Number of a run. It is never used for another run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
 /// A run of neighbouring failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Cause of most of the run's sections.
+    /// Most frequent cause among the run's sections.
     ///
-    /// If two causes are equally frequent, the earlier main cause is kept.
+    /// A tie leaves the current cause unchanged.
     pub cause: Cause,
     /// Number of the run's sections with each cause, in the order of [`Cause::ALL`].
     counts: [u32; Cause::ALL.len()],
-    /// Counts for the advice on passing the run again.
+    /// Counts that decide the advice on passing the run again.
     tally: Tally,
-    /// Index of the first section.
+    /// Index of the run's first section.
     pub from: i64,
-    /// Index after the last section.
+    /// Index after the run's last section.
     pub to: i64,
     /// Number of the run's sections that fail.
     pub failed: u32,
     /// Section with the largest hole, and this hole.
     ///
-    /// In a cleared run, both are as of the time before the run was cleared.
+    /// In a cleared run, both are those from before the run was cleared.
     pub worst: (i64, Hole),
-    /// Time of the run's first flag.
+    /// Time at which the run was first flagged.
     pub raised: MonoNs,
     /// Time of the run's last change.
     pub changed: MonoNs,
@@ -68,7 +68,8 @@ impl Run {
         self.counts.get(cause as usize).copied().unwrap_or(0)
     }
 
-    /// Causes named in texts: the main cause, and the next one if a tenth of the sections have it.
+    /// Causes named in texts: the main cause, and the next most frequent cause if at least a tenth of the
+    /// sections have it.
     pub fn named(&self) -> Causes {
         let others = Cause::ALL.into_iter().filter(|cause| *cause != self.cause);
         let next = others.rev().max_by_key(|cause| self.count(*cause));
@@ -91,7 +92,7 @@ impl Run {
         self.tally.again(self.failed)
     }
 
-    /// Adds a section to the counts.
+    /// Adds a section to the run's counts.
     fn count_in(&mut self, section: &Failing) {
         self.tally.add(section);
         for cause in section.causes.iter() {
@@ -101,7 +102,7 @@ impl Run {
         }
     }
 
-    /// Removes a section from the counts; returns true if the lowest speed must be found again.
+    /// Removes a section from the run's counts; returns true if the lowest speed must be found again.
     fn count_out(&mut self, section: &Failing) -> bool {
         for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
@@ -112,13 +113,13 @@ impl Run {
         self.tally.remove(section)
     }
 
-    /// Resets the counts.
+    /// Resets the run's counts to zero.
     fn count_none(&mut self) {
         self.counts.fill(0);
         self.tally = Tally::default();
     }
 
-    /// Makes the most frequent cause the main one.
+    /// Makes the most frequent cause the run's main cause.
     fn choose(&mut self) {
         let most = Cause::ALL.into_iter().rev().max_by_key(|cause| self.count(*cause));
         self.cause = most.filter(|most| self.count(*most) > self.count(self.cause)).unwrap_or(self.cause);
@@ -128,13 +129,13 @@ impl Run {
 /// Kind of change of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunChange {
-    /// New run.
+    /// The run is new.
     Raised,
-    /// The ends, the causes or the worst hole of the run have changed.
+    /// The ends, the causes or the largest hole of the run have changed.
     Changed,
     /// No section of the run fails any more, because a later pass filled the holes.
     Cleared,
-    /// Merged into another run.
+    /// The run was merged into another run.
     Merged,
 }
 
@@ -144,21 +145,21 @@ pub struct Runs {
     first: i64,
     join: i64,
     runs: Vec<Run>,
-    /// Number of the run plus one for each section, or zero.
+    /// For each section: number of its run plus one, or zero.
     member: Vec<u32>,
-    /// Causes of each section of a run.
+    /// Causes and required speed of each section that belongs to a run.
     failing: Vec<Failing>,
 }
 
 stateful!(Runs { lists: runs; slots: member, failing; fixed: first, join; });
 
-/// Context for updating runs.
+/// Context for updating runs, with the callback for changed runs.
 pub struct Telling<'a> {
-    /// Timestamp.
+    /// Time of the change.
     pub at: MonoNs,
-    /// The hole of any section.
+    /// Function that returns the hole of any section.
     pub hole: &'a dyn Fn(i64) -> Option<Hole>,
-    /// Called for every run that changes.
+    /// Function that is called for every run that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
@@ -246,7 +247,7 @@ impl Runs {
         }
     }
 
-    /// Causes for which a section fails.
+    /// Causes for which a section fails, and the speed it requires.
     fn failing_at(&self, section: i64) -> Failing {
         debug_assert!(self.slot(section).is_some(), "section {section} is one of {}", self.member.len());
         self.slot(section).and_then(|slot| self.failing.get(slot)).copied().unwrap_or_default()
@@ -359,7 +360,7 @@ impl Runs {
         }
     }
 
-    /// Updates a run for a section just added.
+    /// Updates a run for a section that was just added.
     fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let (hole, failing) = ((telling.hole)(section), self.failing_at(section));
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
@@ -384,7 +385,7 @@ impl Runs {
         }
     }
 
-    /// Recomputes a run's section count, causes, ends and worst hole.
+    /// Recomputes a run's section count, causes, ends and largest hole.
     fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
         let Some(run) = self.get(id).copied() else {
             debug_assert!(false, "{id:?} is one of {} runs", self.runs.len());

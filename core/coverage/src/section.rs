@@ -11,28 +11,29 @@ use super::visits::{Visit, Visits};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 
-/// Coverage verdict of a section. Source: docs/why/coverage.md, "Verdicts".
+/// Coverage verdict on a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Undecided: samples may still land, or not all heads have passed the section.
+    /// Undecided: samples may still land, or some heads have not been in the section.
     ///
     /// Samples count only if they may land without the vehicle turning back.
     #[default]
     Open,
-    /// D + k sd <= T, where k is the confidence.
+    /// Pass: D + k sd <= T, for hole diameter D, target T and confidence k.
     Pass,
-    /// D - k sd > T.
+    /// Fail: D - k sd > T.
     Fail,
-    /// Neither condition holds within the error of D.
+    /// Can't say: neither condition holds within the error of D.
     CannotSay,
 }
 
 impl Verdict {
-    /// All verdicts.
+    /// All verdicts, in order.
     pub const ALL: [Self; 4] = [Self::Open, Self::Pass, Self::Fail, Self::CannotSay];
 
-    /// Word used in reports and logs.
+    /// Word used for the verdict in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Open => "open",
@@ -46,7 +47,7 @@ impl Verdict {
 /// Count, mean, deviation and extremes of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Number of values.
+    /// Number of values in the statistics.
     pub count: u32,
     /// Smallest value.
     pub min: f64,
@@ -64,7 +65,7 @@ impl Default for Spread {
 }
 
 impl Spread {
-    /// Adds a value.
+    /// Adds a value to the statistics.
     pub fn add(&mut self, value: f64) {
         self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
     }
@@ -87,7 +88,7 @@ impl Spread {
         debug_assert!(self.scatter >= 0.0 && self.min <= self.max, "squares have a sum: {self:?}");
     }
 
-    /// Mean; `None` without values.
+    /// Mean of the values; `None` without values.
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then_some(self.mean)
     }
@@ -101,43 +102,49 @@ impl Spread {
 /// Change made by judging a section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Judgement {
-    /// The verdict or the hole has a new value.
+    /// The section's verdict or hole has a new value.
     Updated,
-    /// A flag was raised.
+    /// The section was flagged as missed.
     Raised,
-    /// A flag was cleared.
+    /// The section's flag was cleared.
     Cleared,
 }
 
-/// One section.
+impl Judgement {
+    /// All changes that judging can make.
+    pub const ALL: [Self; 3] = [Self::Updated, Self::Raised, Self::Cleared];
+}
+
+/// One section of the tunnel.
 #[expect(clippy::struct_excessive_bools, reason = "the flags are independent of one another")]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
-    /// Current verdict.
+    /// Current verdict on the section.
     pub verdict: Verdict,
-    /// Hole as last measured.
+    /// Largest hole of the section as last measured.
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
-    /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
+    /// Whether the verdict is final on the present course: no further sample can change it, or the hole of a
+    /// fail.
     pub settled: bool,
     /// Whether the section is open although no sample can change it without the vehicle turning back.
     ///
-    /// The vehicle began or turned back in this section, so not all heads have passed it.
+    /// The vehicle began or turned back in this section, so some heads have not been in it.
     pub not_inspected: bool,
     /// Time at which the fail was flagged.
     pub flagged: Option<MonoNs>,
-    /// Time at which a later pass filled the hole.
+    /// Time at which a later pass filled the hole of the flagged section.
     pub cleared: Option<MonoNs>,
-    /// Causes of the fail.
+    /// Evidence for the causes of the fail.
     pub evidence: Option<Evidence>,
-    /// Whether the causes were found when the heads had left only a part of the section.
+    /// Whether the causes were determined when the heads had passed only a part of the section.
     pub(super) explained_in_part: bool,
     /// Ping statistics of the passage through the section.
     pub passage: Passage,
     /// T_x of the section's samples: distance between passes, m.
     pub t_x_m: Spread,
-    /// T_y of the section's samples: distance between neighbours of one sweep, m.
+    /// T_y of the section's samples: distance between neighbouring samples of one sweep, m.
     pub t_y_m: Spread,
     /// T of the section's samples: lattice diagonal of T_x and T_y, m.
     pub t_m: Spread,
@@ -147,15 +154,15 @@ pub struct Section {
     pub deviation: Deviation,
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// Whether samples have landed within T of the section since it was last judged.
+    /// Whether samples have landed within the target T of the section since it was last judged.
     pub(super) stale: bool,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,
     /// Whether the section holds samples of a head that was distrusted soon after.
     pub suspect: bool,
-    /// Number of the newest visit when this head became distrusted.
+    /// Number of the newest visit at the time when this head became distrusted.
     suspected_in: u32,
-    /// Visits with samples within T of the section.
+    /// Visits of the vehicle with samples within the target T of the section.
     pub(super) visits: Visits,
     /// Number of the visit that the pass error in `passage` belongs to.
     passed_in: u32,
@@ -179,10 +186,10 @@ impl Section {
     /// Whether verdict, hole, flag and evidence of a section that was just judged agree.
     ///
     /// A pass has a hole with D + k sd <= T. A fail has evidence and a flag. Only an open section is not inspected.
-    pub(super) fn is_consistent(&self, target_m: f64, confidence_sd: f64) -> bool {
-        let error_m = confidence_sd * self.hole_sd_m;
+    pub(super) fn is_consistent(&self, target: Target) -> bool {
+        let error_m = target.error_m(self.hole_sd_m);
         let is_judged = self.hole.is_some_and(|hole| hole.is_consistent()) && error_m >= 0.0;
-        let is_small = |hole: Hole| hole.bounded && hole.most_m + error_m <= target_m;
+        let is_small = |hole: Hole| hole.bounded && hole.most_m + error_m <= target.max_hole_m;
         is_judged
             && match self.verdict {
                 Verdict::Pass => self.settled && !self.is_flagged() && self.hole.is_some_and(is_small),
@@ -197,7 +204,7 @@ impl Section {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
-    /// Records the error between passes at a ping with a fix in the section.
+    /// Records the error between passes at a ping that has a fix in the section.
     pub fn note_pass(&mut self, visit: &Visit, profile: &Profile) {
         if self.passed_in != visit.number {
             self.visits.note_earlier(self.passage.pass_error.worst_m(profile));
@@ -212,7 +219,7 @@ impl Section {
         self.visits.are_several() && !(self.suspect && self.visits.newest() <= self.suspected_in)
     }
 
-    /// Discards the samples of all visits except the newest.
+    /// Discards the section's samples of all visits except the newest.
     pub(super) fn keep_newest_visit(&mut self) {
         self.visits.keep_newest();
         self.suspect = false;
@@ -220,14 +227,16 @@ impl Section {
 
     /// Returns the reason why a small hole is no evidence of coverage; `None` if it is evidence.
     ///
-    /// The returns accepted as wall may be something else, or the relative positions of the samples may be uncertain.
+    /// The returns accepted as wall may come from something else, or the positions of the samples relative to
+    /// one another may be uncertain.
     pub(super) fn doubt(&self) -> Option<Unsure> {
         let of_heads = self.suspect.then_some(Unsure::DistrustedHead);
         let of_places = self.visits.are_unrelated().then_some(Unsure::SeveralStretches);
         self.wall_doubt().or(of_heads).or(of_places)
     }
 
-    /// Returns the reason why most returns accepted as wall may be something else.
+    /// Returns the reason why most of the returns accepted as wall may come from something else; `None` if
+    /// there is no such reason.
     pub(super) fn wall_doubt(&self) -> Option<Unsure> {
         Some(match self {
             _ if self.contradicts() => Unsure::ContradictedProfile,
@@ -282,22 +291,22 @@ impl Section {
 /// Metres of tunnel by verdict. Each metre is counted once.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Metres {
-    /// Metres that pass.
+    /// Metres that have passed.
     pub pass_m: f64,
-    /// Metres that fail.
+    /// Metres that have failed.
     pub fail_m: f64,
     /// Metres undecided within the error of D.
     pub cannot_say_m: f64,
-    /// Metres that further driving may still fill.
+    /// Metres still open: further driving may fill their holes.
     pub open_m: f64,
-    /// Metres at the ends of the coverage extent that not all heads have passed.
+    /// Metres at the ends of the coverage extent where some heads have not been.
     ///
     /// Further driving on the present course does not change them.
     pub not_inspected_m: f64,
 }
 
 impl Metres {
-    /// Adds metres with a verdict.
+    /// Adds metres of tunnel with a verdict.
     pub fn add(&mut self, verdict: Verdict, metres_m: f64) {
         *match verdict {
             Verdict::Pass => &mut self.pass_m,

@@ -5,10 +5,11 @@
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
+use headrace_geometry::tunnel::WallPoint;
 
-/// Minimum number of samples per node.
+/// Minimum number of samples that a node needs.
 pub const ENOUGH: u16 = 5;
-/// Default node edge, m.
+/// Default edge of a grid node, m.
 pub const NODE_M: f64 = 0.5;
 
 /// Extent and resolution of [`Soundings`].
@@ -16,9 +17,9 @@ pub const NODE_M: f64 = 0.5;
 pub struct GridLayout {
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
-    /// First chainage, m; rows are aligned to chainage zero.
+    /// First chainage of the grid, m; rows are aligned to chainage zero.
     pub from_m: f64,
-    /// Last chainage, m.
+    /// Last chainage of the grid, m.
     pub to_m: f64,
     /// Node edge along the tunnel, m.
     ///
@@ -37,7 +38,7 @@ pub struct Soundings {
 
 stateful!(Soundings { slots: counts; fixed: layout, first_row, columns; });
 
-/// Number of nodes of a stretch, by density.
+/// Number of grid nodes in a stretch, by density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GridSummary {
     /// Number of nodes whose centre is in the stretch.
@@ -48,7 +49,7 @@ pub struct GridSummary {
     pub empty: u32,
 }
 
-/// A node of the grid.
+/// A node of the sounding grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridNode {
     /// Chainage of the node's centre, m.
@@ -60,7 +61,7 @@ pub struct GridNode {
 }
 
 impl GridSummary {
-    /// Share of nodes with enough samples; `None` without nodes.
+    /// Share of nodes with enough samples; `None` if there are no nodes.
     pub fn enough_share(&self) -> Option<f64> {
         (self.nodes > 0).then(|| f64::from(self.enough) / f64::from(self.nodes))
     }
@@ -83,12 +84,12 @@ impl Soundings {
         [self.layout.node_m, self.layout.perimeter_m / self.columns as f64]
     }
 
-    /// Counts a sample; returns false if the sample lies outside or isn't finite.
+    /// Counts a sample in its node; returns false if the sample lies outside the grid or isn't finite.
     ///
     /// Allocates: never.
-    pub fn add(&mut self, x_m: f64, arc_m: f64) -> bool {
-        let inside = x_m >= self.layout.from_m && x_m <= self.layout.to_m && arc_m.is_finite();
-        let Some(index) = inside.then(|| self.index(x_m, arc_m)).flatten() else { return false };
+    pub fn add(&mut self, at: WallPoint) -> bool {
+        let inside = at.x_m >= self.layout.from_m && at.x_m <= self.layout.to_m && at.arc_m.is_finite();
+        let Some(index) = inside.then(|| self.index(at)).flatten() else { return false };
         let Some(count) = self.counts.get_mut(index) else {
             debug_assert!(false, "node {index} of a sample inside is one of {}", self.counts.len());
             return false;
@@ -97,7 +98,7 @@ impl Soundings {
         true
     }
 
-    fn index(&self, x_m: f64, arc_m: f64) -> Option<usize> {
+    fn index(&self, WallPoint { x_m, arc_m }: WallPoint) -> Option<usize> {
         let row = math::floor_to_i64(x_m / self.layout.node_m) - self.first_row;
         let into = math::wrap(arc_m, self.layout.perimeter_m) / self.node_m()[1];
         usize::try_from(row * self.columns + math::floor_to_i64(into).min(self.columns - 1)).ok()
@@ -153,8 +154,8 @@ mod tests {
 
     fn soundings(samples: &[(f64, f64)]) -> Soundings {
         let mut soundings = Soundings::new(LAYOUT);
-        for (x_m, arc_m) in samples {
-            assert!(soundings.add(*x_m, *arc_m));
+        for &(x_m, arc_m) in samples {
+            assert!(soundings.add(WallPoint { x_m, arc_m }));
         }
         soundings
     }
@@ -216,11 +217,11 @@ mod tests {
         let mut soundings = soundings(&[]);
         for (x_m, arc_m) in [(-3.3, 0.0), (20.1, 0.0), (f64::NAN, 0.0), (0.0, f64::NAN), (0.0, f64::INFINITY)]
         {
-            assert!(!soundings.add(x_m, arc_m), "{x_m} {arc_m}");
+            assert!(!soundings.add(WallPoint { x_m, arc_m }), "{x_m} {arc_m}");
         }
         assert_eq!(soundings.summary(-10.0, 30.0).empty, soundings.summary(-10.0, 30.0).nodes);
         for _ in 0..70_000 {
-            soundings.add(1.0, -0.1);
+            soundings.add(WallPoint { x_m: 1.0, arc_m: -0.1 });
         }
         let most = soundings.nodes_between(1.0, 1.5).map(|node| node.count).max();
         assert_eq!(most, Some(u16::MAX));

@@ -12,15 +12,16 @@ use headrace_geometry::math;
 pub enum Distrust {
     /// Most successive returns of the head disagree; the value is their mean difference.
     Scattered(f64),
-    /// The head's range is constant although the range to the design changes; the value is the head's range.
+    /// The head's range is constant although the range to the design varies; the value is the head's range.
     Constant(f64),
-    /// The head contradicts the design where other heads agree with it; the value is the mean deviation.
+    /// The head contradicts the design where other heads agree with it; the value is the mean deviation from
+    /// the design.
     Outvoted(f64),
 }
 
-/// The beam of a return.
+/// Beam of a return: range, direction and motion of the head.
 pub struct Beam<'a> {
-    /// Range, m.
+    /// Range of the return, m.
     pub range_m: f64,
     /// Direction of the beam across the tunnel, rad.
     pub angle_rad: f64,
@@ -32,13 +33,21 @@ pub struct Beam<'a> {
 
 /// Evidence on one head from the vehicle's other heads.
 pub(super) struct Others {
-    /// Votes on the head.
+    /// Votes of other heads on this head.
     pub(super) ballot: Ballot,
-    /// Whether another head's range changes as the range to the design does.
+    /// Whether another head's range varies when the range to the design varies.
     pub(super) change: bool,
 }
 
-/// Counts over half a turn.
+/// Disagreement of a return with the returns before it.
+pub(super) struct Disagreement {
+    /// Difference from the previous return, m; `None` if both agree.
+    pub(super) jump_m: Option<f64>,
+    /// Number of returns that this return made doubtful.
+    pub(super) doubtful: u32,
+}
+
+/// Counts of a head's returns over half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct HalfTurn {
     returns: u32,
@@ -47,7 +56,7 @@ struct HalfTurn {
     jumps: u32,
     jump_sum_m: f64,
     turned_rad: f64,
-    /// Least and greatest chainage of the returns, m.
+    /// Least and greatest chainage of the half turn's returns, m.
     between_m: Option<[f64; 2]>,
     /// Number of returns within runs of constant range.
     ///
@@ -76,7 +85,7 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether more than one in `parts` returns has a constant range.
+    /// Whether the range is constant in more than one in `parts` returns.
     ///
     /// The range to the design must vary widely for these returns.
     fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
@@ -92,25 +101,27 @@ impl HalfTurn {
     }
 }
 
-/// Minimum number of returns in half a turn.
+/// Minimum number of returns in half a turn for a decision on the head.
 const FEW: u32 = 20;
 /// A range counts as unchanged if it varies by less than this share of the tolerance.
 ///
 /// The share corresponds to some quanta of a profiling sonar.
 const UNCHANGED: f64 = 0.2;
-/// Maximum difference between runs of unchanged range that count as one constant range.
-///
-/// The difference is a share of the tolerance.
+/// Maximum difference between runs of unchanged range that count as one constant range, as a share of the
+/// tolerance.
 const CONSTANT: f64 = 0.6;
-/// Variation of the range to the design that a constant range contradicts, in tolerances.
+/// A constant range contradicts the design if the range to the design varies by more than this multiple of
+/// the tolerance.
 const VARIES: f64 = 2.0;
 /// Number of successive returns that make a run of unchanged range.
 ///
 /// A few neighbouring returns of a wall may have nearly the same range.
 const RUN: u32 = 8;
-/// Variation of the design's range that an exactly constant range contradicts, in tolerances.
+/// An exactly constant range contradicts the design if the range to the design varies by more than this
+/// multiple of the tolerance.
 ///
-/// This limit applies if another head's range changes. In a round tunnel, the range to the design varies if the
+/// This limit applies if another head's range varies when the range to the design varies. Without this
+/// condition, a constant range may be correct: in a round tunnel, the range to the design also varies if the
 /// vehicle is beside its estimated place.
 const STUCK_VARIES: f64 = 1.0;
 
@@ -121,11 +132,11 @@ fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     }
 }
 
-/// Successive returns with the same range.
+/// Successive returns with nearly the same range.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Unchanged {
     returns: u32,
-    /// Least and greatest range, m.
+    /// Smallest and largest range of these returns, m.
     range_m: [f64; 2],
 }
 
@@ -143,10 +154,10 @@ impl Unchanged {
     }
 }
 
-/// Trust in one head.
+/// State of the trust in one head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct HeadTrust {
-    /// The present half turn, and the two half turns before.
+    /// Counts of the present half turn, and of the two half turns before.
     halves: [HalfTurn; 3],
     angle_rad: Option<f64>,
     unchanged: Unchanged,
@@ -167,19 +178,15 @@ impl HeadTrust {
     /// Adds a return.
     ///
     /// Returns the reason if the head is distrusted from now on, with the chainages of its recent returns.
-    ///
-    /// `jump_m` is the difference from the previous return, m, if both disagree. `doubtful` is the number of returns
-    /// that this return made doubtful.
     pub(super) fn note(
         &mut self,
         placed: &PlacedReturn,
         beam: &Beam<'_>,
-        jump_m: Option<f64>,
-        doubtful: u32,
+        Disagreement { jump_m, doubtful }: Disagreement,
         limits: &WallLimits,
         others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {
-        // A stalled head sees only one place, which may well be off the design.
+        // A stalled head sees only one place, and the wall there may well deviate from the design.
         if beam.standing {
             return None;
         }

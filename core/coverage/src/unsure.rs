@@ -13,7 +13,7 @@ use super::passage::{Drive, Passage};
 pub enum Unsure {
     /// The coverage extent begins, or the vehicle turned back, in the section.
     ///
-    /// Not all heads have passed the section.
+    /// Some heads have not been in the section.
     NotInspected,
     /// The hole is within its error of the target, because position errors are too large.
     Position,
@@ -32,7 +32,7 @@ pub enum Unsure {
 }
 
 impl Unsure {
-    /// All reasons.
+    /// All reasons for which a section can be unsure.
     pub const ALL: [Self; 8] = [
         Self::NotInspected,
         Self::Position,
@@ -44,7 +44,7 @@ impl Unsure {
         Self::NoWall,
     ];
 
-    /// Word used in reports and logs.
+    /// Word used for the reason in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NotInspected => "not_inspected",
@@ -62,31 +62,31 @@ impl Unsure {
 /// Neighbouring sections that are unsure for the same reason.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {
-    /// Reason of all sections in the stretch.
+    /// Reason that all sections in the stretch share.
     pub why: Unsure,
-    /// Index of the first section.
+    /// Index of the stretch's first section.
     pub from: i64,
-    /// Index after the last section.
+    /// Index after the stretch's last section.
     pub to: i64,
     /// The stretch's unsure sections in two groups.
     ///
-    /// In sections of the first group, the hole matters more than its error. In those of the second, the
-    /// error does.
+    /// In the first group, a section is unsure mainly because of its hole's size. In the second group, it is
+    /// unsure mainly because of the hole's error.
     of: [Largest; 2],
 }
 
-/// Number of unsure sections, and the figures of the one with the largest hole.
+/// Count of a group of unsure sections, and the figures of the one with the largest hole.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Largest {
-    /// Number of unsure sections.
+    /// Number of unsure sections in the group.
     pub sections: u32,
-    /// Largest hole, and its standard deviation, m.
+    /// Diameter of the group's largest hole, and its standard deviation, m.
     pub hole_m: [f64; 2],
     /// Driving figures of the section with the largest hole.
     pub driven: Driven,
 }
 
-/// Speed at which a section was driven, and the speed that fits.
+/// Speed at which a section was driven, and the largest speed that would meet the target there.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Driven {
     /// Speed along the tunnel, m/s; zero if nothing passed.
@@ -95,17 +95,18 @@ pub struct Driven {
     pub fits_mps: f64,
     /// Whether heads at their scheduled angles pass unevenly at this speed.
     ///
-    /// Heads apart along the hull are then out of phase.
+    /// Heads at different places along the hull are then out of phase.
     pub is_uneven: bool,
-    /// Whether heads were silent or detected no wall. The speeds are nevertheless those for all heads.
+    /// Whether some heads were silent or detected no wall. The speeds nevertheless assume that all heads
+    /// work.
     pub is_short: bool,
 }
 
-/// Ratio of the time between passes to that of evenly spread passes, above which passes are uneven.
+/// Passes are uneven if the time between them exceeds that of evenly spread passes by this ratio.
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
-    /// Returns the figures of a section's passage.
+    /// Returns the driving figures of the passage through a section.
     pub fn of(passage: &Passage) -> Self {
         let Drive { speed_mps, passes_needed, planned_gap_s, all_gap_s, .. } = passage.drive;
         Self {
@@ -117,11 +118,12 @@ impl Driven {
     }
 }
 
-/// Ratio of error to hole above which the error matters more.
+/// Ratio of the hole's error to its diameter above which a section counts as unsure mainly because of the
+/// error.
 const MOSTLY_ERROR: f64 = 0.2;
-/// Maximum gap within a stretch, m.
+/// Maximum gap between sections of one unsure stretch, m.
 ///
-/// Within this distance, a vehicle that repeats one section also passes the other.
+/// If a vehicle repeats one section, it also passes the sections within this distance.
 const JOIN_M: f64 = 2.0;
 
 impl Stretch {
@@ -135,7 +137,7 @@ impl Stretch {
         Self { why, from: index, to: index + 1, of }
     }
 
-    /// Number of the stretch's sections that are unsure for this reason.
+    /// Number of the stretch's unsure sections.
     pub fn sections(&self) -> u32 {
         self.of.iter().map(|of| of.sections).sum()
     }

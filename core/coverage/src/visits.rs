@@ -1,4 +1,4 @@
-//! Visits of a place.
+//! Visits of the vehicle to a place in the tunnel.
 //!
 //! The error between passes of one visit is known. The error between passes of different visits may be larger.
 //!
@@ -11,27 +11,27 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Limits for the age of a sample: below the first, the error between passes applies.
+/// Limits for the age of a sample. Below the first limit, the error between successive passes applies.
 ///
 /// Above the second limit, the error relative to a much earlier visit applies.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 
-/// The visit that a sample belongs to.
+/// The visit during which a sample was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Visit {
     /// Number of the visit, from zero. The number never decreases.
     pub number: u32,
-    /// Number of the stretch of navigation.
+    /// Number of the visit's stretch of uninterrupted navigation.
     pub tie: u32,
-    /// Time of the sample.
+    /// Time at which the sample was measured.
     pub at: MonoNs,
     /// Error relative to the previous pass, and error relative to a much earlier visit.
     pub errors: [PassError; 2],
 }
 
 impl Visit {
-    /// Creates the visit of a fix at `at`, after the vehicle has turned back `turns` times.
+    /// Creates the visit to which a fix at `at` belongs, after the vehicle has turned back `turns` times.
     pub fn of(fix: &Fix, at: MonoNs, turns: u32) -> Self {
         let [pass, long_before] =
             [fix.relative, fix.revisit].map(|relative| PassError { relative, ..PassError::of(fix) });
@@ -45,7 +45,7 @@ impl Visit {
 
     /// Largest standard deviation of the diameter of a hole between two visits, m.
     ///
-    /// One visit is this one; the other has its last sample at the time `then`.
+    /// The first visit is this one. The second visit has its last sample at the time `then`.
     fn apart_sd_m(&self, then: MonoNs, profile: &Profile) -> f64 {
         let over = (self.at.since(then) + DurNs(-SAME_PASS.0)).as_secs_f64();
         let share = (over / (LONG_BEFORE.0 - SAME_PASS.0) as f64 * 1e9).clamp(0.0, 1.0);
@@ -55,7 +55,7 @@ impl Visit {
     }
 }
 
-/// The visits of a section: those with samples within T of it.
+/// The visits of a section: those with samples within the target T of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Visits {
     /// Number of the newest visit, its stretch of navigation, and the time of its last sample.
@@ -73,7 +73,7 @@ pub struct Visits {
 }
 
 impl Visits {
-    /// Records a sample's visit.
+    /// Records a sample's visit among the section's visits.
     pub(super) fn note(&mut self, visit: &Visit, profile: &Profile) {
         if let Some((number, tie, last)) = self.newest.filter(|(number, ..)| *number != visit.number) {
             self.several |= number >= self.first;
@@ -83,14 +83,13 @@ impl Visits {
         self.newest = Some((visit.number, visit.tie, visit.at));
     }
 
-    /// Records the error between the passes of an earlier visit.
-    ///
-    /// The error is the standard deviation of a hole's diameter, m.
+    /// Records the error between the passes of an earlier visit, as the standard deviation of a hole's
+    /// diameter, m.
     pub(super) fn note_earlier(&mut self, sd_m: f64) {
         self.apart_sd_m = self.apart_sd_m.max(sd_m);
     }
 
-    /// Number of the newest visit.
+    /// Number of the newest visit to the section.
     pub(super) fn newest(&self) -> u32 {
         self.newest.map_or(0, |(number, ..)| number)
     }
@@ -163,7 +162,7 @@ mod tests {
         assert_eq!((visits.first(), visits.are_several(), visits.are_unrelated()), (4, false, false));
     }
 
-    /// The error between visits grows with the time since the earlier visit, between 20 s and 40 s.
+    /// The error between two visits grows with the time since the earlier visit, between 20 s and 40 s.
     #[test]
     fn error_between_visits_grows_with_the_time_between_them() {
         let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);

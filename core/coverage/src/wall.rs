@@ -1,4 +1,4 @@
-//! Decides which returns are wall: those near the design, and those that others agree with.
+//! Decides which returns are wall: those near the design profile, and those with which other returns agree.
 //!
 //! A return within the tolerance of the design is wall. Another return needs a neighbour along the turn that is wall,
 //! or an earlier pass nearby with the same deviation from the design. Successive returns that agree only with one
@@ -12,13 +12,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::relief::Relief;
-use super::trust::{Beam, Distrust, HeadTrust, Others};
+use super::trust::{Beam, Disagreement, Distrust, HeadTrust, Others};
 use super::wall_limits::{PlacedReturn, WallLimits};
 
 /// Classification of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Taken {
-    /// Wall.
+    /// The return came from wall.
     Wall,
     /// Uncertain: wall, or something in the water.
     Doubtful,
@@ -26,34 +26,36 @@ pub enum Taken {
     Waits,
 }
 
-/// Decisions that a return brings about.
+/// Decisions on a head's returns that follow from its newest return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sorted {
-    /// Classification of all waiting returns; `None` if there are none, or if they still wait.
+    /// Classification of all waiting returns; `None` if no return waits, or if the returns still wait.
     pub waiting: Option<Taken>,
-    /// Classification of this return.
+    /// Classification of the newest return.
     pub this: Taken,
-    /// Reason if the head becomes distrusted with this return, and the chainages of its recent returns, m.
+    /// Reason if the newest return makes the head distrusted, and the chainages of the head's recent returns,
+    /// m.
     pub distrusted: Option<(Distrust, [f64; 2])>,
 }
 
-/// Maximum number of waiting returns.
+/// Maximum number of a head's returns that wait for classification.
 pub const MOST_WAITING: usize = 24;
-/// Ratio of distance from the wall to width above which a run is no wall.
+/// A run is no wall if its distance from the wall is more than this multiple of its width, and if it has a
+/// jump to the wall on both sides.
 ///
-/// The run has a jump to the wall on both sides. It hangs in the water, or is an echo off two walls. Rocks, heaps,
-/// niches and caves are about as wide as they are high or deep. Side tunnels appear as deep as they are wide.
+/// Such a run hangs in the water, or is an echo off two walls. Rocks, heaps, niches and caves are about as
+/// wide as they are high or deep. Side tunnels appear as deep as they are wide.
 ///
-/// Tuned on the condition `murk` of the field table: its clusters of returns are at least 12 times as far from the
-/// wall as they are wide.
+/// Tuned on the condition `murk` of the field table: its clusters of returns are at least 12 times as far
+/// from the wall as they are wide.
 const SLENDER: f64 = 4.0;
 
-/// A run of returns, as described above.
+/// A run: successive returns that agree only with one another.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Run {
     waiting: [PlacedReturn; MOST_WAITING],
     waits: u8,
-    /// First return of the run, including returns that no longer wait, and number of returns.
+    /// First return and number of returns of the run. Both include returns that have already been classified.
     first: Option<PlacedReturn>,
     all: u32,
     /// Largest distance of the run from the design, and its width, m.
@@ -67,18 +69,18 @@ impl Run {
         u32::from(self.waits)
     }
 
-    /// Returns the waiting returns.
+    /// Returns the waiting returns of the run.
     fn returns(&self) -> impl Iterator<Item = &PlacedReturn> {
         self.waiting.iter().take(usize::from(self.waits))
     }
 
-    /// Adds a waiting return.
+    /// Adds a waiting return to the run.
     fn add(&mut self, placed: &PlacedReturn, limits: &WallLimits) {
         debug_assert!(!self.is_full(), "a run is given up when {MOST_WAITING} returns wait: {}", self.waits);
         let first = *self.first.get_or_insert(*placed);
         self.all += 1;
         self.off_m = self.off_m.max(placed.off_m.abs());
-        // Each return stands for a step, half of it on either side.
+        // Each return represents one step of width: half a step on either side.
         let steps = f64::from(self.all.max(2)) / f64::from(self.all.max(2) - 1);
         self.width_m = self.width_m.max(steps * limits.width_m(&first, placed));
         if let Some(slot) = self.waiting.get_mut(usize::from(self.waits)) {
@@ -92,12 +94,12 @@ impl Run {
         self.all > 1 && SLENDER * self.width_m >= self.off_m
     }
 
-    /// Whether no further return can wait.
+    /// Whether there is no room for another waiting return.
     fn is_full(&self) -> bool {
         usize::from(self.waits) == MOST_WAITING
     }
 
-    /// Removes the waiting returns except the last one.
+    /// Removes all waiting returns except the last one.
     fn give_up(&mut self, last: &PlacedReturn) {
         self.waiting[0] = *last;
         self.waits = 1;
@@ -109,7 +111,7 @@ impl Run {
 pub struct HeadWall {
     /// The last two returns, latest first, and their classification.
     last: [Option<(PlacedReturn, Taken)>; 2],
-    /// The waiting returns.
+    /// The run of returns that wait for classification.
     run: Run,
     trust: HeadTrust,
 }
@@ -148,7 +150,7 @@ impl HeadWall {
             before.filter(|_| last.is_none() && !both_design).map(|other| placed.off_m - other.off_m);
         let doubtful = if waiting == Some(Taken::Doubtful) { waited.count() } else { 0 };
         let others = Others { ballot: relief.ballot(head), change: relief.others_change(head) };
-        let distrusted = self.trust.note(&placed, beam, jump_m, doubtful, limits, &others);
+        let distrusted = self.trust.note(&placed, beam, Disagreement { jump_m, doubtful }, limits, &others);
         relief.note_changing(head, !self.trust.is_stuck(limits));
         relief.believe(head, self.distrusted().is_none());
         if self.distrusted().is_some() {
@@ -187,7 +189,7 @@ impl HeadWall {
         let this = if is_wall || is_broad { Taken::Wall } else { Taken::Waits };
         let waiting = match waited.count() {
             0 => None,
-            // The run ended in a slope to the wall, or it is wide enough.
+            // Either the run ended in a slope to the wall, or the run is wide enough.
             _ if is_wall && agrees || is_broad && goes_on => Some(Taken::Wall),
             _ if !goes_on => Some(Taken::Doubtful),
             _ if run.is_full() => Some(Taken::Doubtful),

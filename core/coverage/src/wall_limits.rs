@@ -1,4 +1,5 @@
-//! Limits on the deviation of returns from the design, and from one another, for returns of one wall.
+//! Limits for accepting returns as wall: on their deviation from the design profile, and on their deviation
+//! from one another.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ pub struct WallLimits {
     pub perimeter_m: f64,
     /// Radius of a circle with this perimeter.
     pub radius_m: f64,
-    /// Distance along the tunnel within which an earlier pass counts.
+    /// Distance along the tunnel within which returns of an earlier pass count as neighbours.
     ///
     /// The distance doesn't depend on the target T, so the samples don't depend on it either.
     pub reach_m: f64,
@@ -27,12 +28,13 @@ const TOLERANCE_SHARE: f64 = 0.1;
 /// Minimum tolerance, m: three times the resolution and noise of profiling sonars.
 const LEAST_TOLERANCE_M: f64 = 0.03;
 
-/// Reach as a share of the equivalent radius, and minimum reach, m: about the distance between passes.
+/// Reach along the tunnel as a share of the equivalent radius, and minimum reach, m: about the distance
+/// between passes.
 const REACH_SHARE: f64 = 0.1;
 const LEAST_REACH_M: f64 = 0.2;
 
 impl WallLimits {
-    /// Limits for a profile of this perimeter.
+    /// Limits for a design profile of this perimeter.
     pub fn new(perimeter_m: f64, contradiction_m: f64) -> Self {
         let radius_m = perimeter_m / math::TAU;
         let tolerance_m = (TOLERANCE_SHARE * radius_m).max(LEAST_TOLERANCE_M).min(contradiction_m);
@@ -45,7 +47,7 @@ impl WallLimits {
         placed.off_m.abs() <= self.tolerance_m
     }
 
-    /// Whether two returns of neighbouring beams belong to one wall.
+    /// Whether two returns of neighbouring beams belong to the same wall.
     pub(super) fn agree(&self, a: &PlacedReturn, b: &PlacedReturn) -> bool {
         let apart_m = self.apart_m(a, b);
         let slope_m = (SLOPE * apart_m).min(MOST_SLOPE * self.tolerance_m);
@@ -59,7 +61,7 @@ impl WallLimits {
         math::hypot(a.x_m - b.x_m, around_m)
     }
 
-    /// Distance between the rays of two returns along the wall, m, at the farther return.
+    /// Distance along the wall between the rays of two returns, m, at the range of the farther return.
     fn apart_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
         let outward = 1.0 + a.off_m.max(b.off_m).max(0.0) / self.radius_m;
         let around_m = math::wrap_signed(a.arc_m - b.arc_m, self.perimeter_m) * outward;
@@ -69,17 +71,17 @@ impl WallLimits {
 
 /// Slope between two neighbouring beams that is allowed in addition to the tolerance: 45 degrees.
 const SLOPE: f64 = 1.0;
-/// Maximum allowance for the slope, in tolerances.
+/// Maximum allowance for the wall's slope, as a multiple of the tolerance.
 const MOST_SLOPE: f64 = 1.0;
-/// Maximum distance between neighbours as a share of the radius.
+/// Maximum distance between neighbouring returns as a share of the radius.
 const NEAR_SHARE: f64 = 0.4;
 
 /// A return placed on the unrolled wall.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PlacedReturn {
-    /// Chainage, m.
+    /// Chainage of the return, m.
     pub x_m: f64,
-    /// Arc length, m.
+    /// Arc length of the return, m.
     pub arc_m: f64,
     /// Outward deviation from the design along the ray from the profile's reference point, m.
     pub off_m: f64,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Ranges that differ by less than this count as equal, m.
 ///
-/// The limit is finer than a profiling sonar's resolution, so that noise alone separates the ranges of a wall.
+/// The limit is finer than a profiling sonar's resolution, so the noise of ranges to a real wall exceeds it.
 const SAME_M: f64 = 0.002;
 
 /// A run of returns with the same range, and the spread of the design range along the run.
@@ -13,12 +13,12 @@ const SAME_M: f64 = 0.002;
 pub struct ConstantRange {
     returns: u32,
     range_m: f64,
-    /// Minimum and maximum of the range less the design range, m.
+    /// Minimum and maximum of the range minus the design range, m.
     off_m: [f64; 2],
 }
 
 impl ConstantRange {
-    /// Adds a return: its range, and the excess of the range over the design range, m.
+    /// Adds a return, given by its range and by its range minus the design range, m.
     pub fn note(&mut self, range_m: f64, off_m: f64) {
         if self.returns == 0 || (range_m - self.range_m).abs() > SAME_M {
             *self = Self { returns: 1, range_m, off_m: [off_m; 2] };
@@ -36,12 +36,12 @@ impl ConstantRange {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
 
-    /// Whether there has been any return.
+    /// Whether any return has been recorded.
     pub fn is_heard(&self) -> bool {
         self.returns > 0
     }
 
-    /// Whether the last return began a new run.
+    /// Whether the last return began a new run of equal ranges.
     pub fn is_new(&self) -> bool {
         self.returns == 1
     }
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn constant_range_expected_by_the_design_and_changing_range_are_not_stuck() {
+    fn range_that_varies_or_is_constant_by_design_is_not_stuck() {
         assert!(!after((0..1000).map(|_| (1.0, 1.0))).is_stuck(8, 0.05));
         assert!(!after((0..1000).map(|k| (1.0 + 0.003 * f64::from(k), 1.0))).is_stuck(2, 0.05));
     }

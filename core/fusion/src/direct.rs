@@ -17,19 +17,19 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{EchoRange, Level, MAX_SOURCES, Reading, TetherLength};
 
-/// Maximum age of ranges used for the position in the section.
+/// Maximum age of an echosounder range that is used for the position in the cross-section.
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
 /// Time window of tether readings from which the speed is computed, and the maximum number of these readings.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
-/// Standard deviation of an echo's range, m.
+/// Standard deviation of an echosounder's range, m.
 const ECHO_SD_M: f64 = 0.01;
 /// Standard deviation of the prior position, across and up, m.
 const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
-/// Navigation without a filter.
+/// Navigation without a Kalman filter.
 pub struct DirectNavigation {
     profile: Profile,
     site: Site,
@@ -50,14 +50,15 @@ struct TetherTrack {
     readings: [(MonoNs, f64); SPEED_READINGS],
     count: usize,
     resolution_m: f64,
-    /// Number of restarts of the counter before its first reading here.
+    /// Restart number in the cable counter's first reading. A higher number means that the counter has restarted
+    /// since.
     restarts: u32,
 }
 
 stateful!(TetherTrack { state: count, resolution_m, restarts; slots: readings; });
 
 impl DirectNavigation {
-    /// Creates the navigation, without readings.
+    /// Creates the navigation, which has no readings yet.
     pub fn new(profile: Profile, site: Site) -> Self {
         Self {
             profile,
@@ -90,7 +91,7 @@ impl DirectNavigation {
         self.find_place(at);
     }
 
-    /// Updates the position in the section to the best fit of recent ranges to the profile.
+    /// Updates the position in the cross-section to the best fit of recent ranges to the profile.
     fn find_place(&mut self, now: MonoNs) {
         let Some((_, attitude)) = self.attitude else { return };
         let [reference_y, reference_z] = self.profile.reference();
@@ -110,7 +111,7 @@ impl DirectNavigation {
         let up = self.attitude.map_or(mount.position.z(), |(_, attitude)| (attitude * mount.position).z());
         let height_m = self.site.surface_above_floor_m - self.site.depth_m(pressure_pa) - up;
         self.height_m = Some(height_m);
-        // Without recent echoes, depth alone updates the height.
+        // Without recent echoes, the depth sensor alone updates the height.
         let silent = self.echoes.iter().flatten().all(|(echoed, _)| at.since(*echoed).0.abs() > ECHO_AGE.0);
         if let (true, Some((_, place))) = (silent, &mut self.place) {
             place[1] = height_m + self.height_offset_m;
@@ -124,7 +125,8 @@ impl TetherTrack {
         if self.count == 0 {
             self.restarts = restarts;
         }
-        // After a restart, the count begins at zero again. This method has no means to restore the chainage.
+        // After a restart, the cable counter begins at zero again. Navigation without a filter has no means to
+        // restore the chainage.
         if restarts != self.restarts {
             return;
         }
@@ -184,7 +186,7 @@ impl Navigation for DirectNavigation {
         let (_, [y_m, z_m]) = self.place.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Section)?;
         let speed_mps = self.tether.speed_mps();
         let x_m = chainage_m + speed_mps * at.since(since).as_secs_f64();
-        // The error is the rounding of two readings to the counter's quantum.
+        // The chainage error between two passes is the rounding of two cable readings to the counter's resolution.
         let relative = Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
@@ -218,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn four_echoes_determine_the_position_in_the_section() {
+    fn four_echoes_determine_the_position_in_the_cross_section() {
         let profile = shapes::ceran().unwrap();
         let site = Site { axis_yaw_rad: 0.3, ..Site::default() };
         let truth = Pose {

@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 /// Pose of the vehicle at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fix {
-    /// Position and attitude.
+    /// Position and attitude of the vehicle.
     pub pose: Pose,
     /// Speed along the tunnel, m/s, positive inwards.
     pub speed_mps: f64,
@@ -39,7 +39,7 @@ pub enum NoFix {
 }
 
 impl NoFix {
-    /// All variants.
+    /// All parts of a fix that can be missing.
     pub const ALL: [Self; 3] = [Self::Heading, Self::Chainage, Self::Section];
 
     /// Name of the missing part in reports and logs.
@@ -55,8 +55,8 @@ impl NoFix {
 /// Receive time and time of validity of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Times {
-    /// Receive time of the first byte.
+    /// Receive time of the reading's first byte.
     pub received: MonoNs,
-    /// Time of validity.
+    /// Time of validity of the reading.
     pub valid: MonoNs,
 }

@@ -39,17 +39,17 @@ impl Relative {
         math::sqrt((pitch + yaw).max(0.0))
     }
 
-    /// Returns the covariance for a reference point on the vehicle at `arm` from the present one.
+    /// Returns the covariance for another reference point on the vehicle, at `arm` from the present reference point.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
-        // The matrix is symmetric: the shear acts on the rows, then on the columns.
+        // The matrix stays symmetric, because the shear acts on the rows and then on the columns.
         let once = self.0.map(sheared);
         let columns = [0, 1, 2].map(|c| sheared(once.map(|row| row.get(c).copied().unwrap_or(0.0))));
         Self(columns)
     }
 
-    /// Returns the weighted sum of two covariances.
+    /// Returns the weighted sum of two relative covariances.
     #[must_use]
     pub fn weighted(&self, share: f64, other: &Self, other_share: f64) -> Self {
         let mut sum = [[0.0; 3]; 3];

@@ -5,27 +5,27 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::tunnel::Profile;
 
-/// Minimum cosine of the angle of incidence. Beams at a more grazing angle are ignored.
+/// Minimum cosine of the angle of incidence. Echosounder beams at a more grazing angle are ignored.
 const LEAST_COSINE: f64 = 0.1;
-/// Minimum change of range with height, m/m. A beam with a larger change determines the height.
+/// Minimum change of a range per metre of height, m/m, at which the beam determines the vehicle's height.
 const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 
-/// A range to the wall, measured along the sensor's x axis.
+/// A measured range to the wall along the sonar's x axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Echo {
     /// Mount of the sonar.
     pub mount: Mount,
-    /// Range at the site's speed of sound, m.
+    /// Range computed with the site's speed of sound, m.
     pub range_m: f64,
 }
 
-/// A position in the cross-section, with a note whether its height is determined by echoes.
+/// A fitted position in the cross-section, and whether echoes determine its height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// y and z, m.
+    /// Coordinates y and z of the position, m.
     pub at_m: [f64; 2],
-    /// Whether an echo determines the height.
+    /// Whether an echo determines the height of the position.
     pub is_height_seen: bool,
 }
 
@@ -69,7 +69,7 @@ pub fn settle(
             gy += weight * slope[0] * residual;
             gz += weight * slope[1] * residual;
         }
-        // The prior keeps the determinant positive.
+        // The prior term keeps the determinant of the normal equations positive.
         let determinant = hyy * hzz - hyz * hyz;
         debug_assert!(determinant > 0.0, "the prior keeps the determinant positive: {determinant}");
         let moved =
@@ -82,7 +82,7 @@ pub fn settle(
     place
 }
 
-/// Weight of an observation with this standard deviation.
+/// Least-squares weight of an observation with this standard deviation.
 fn weight(sd_m: f64) -> f64 {
     1.0 / (sd_m * sd_m)
 }

@@ -9,18 +9,19 @@ use headrace_geometry::frames::{Sensor, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Minimum duration of identical readings before the unit counts as stuck.
+/// Minimum duration of identical readings before the inertial unit counts as stuck.
 const HANGS_AFTER: DurNs = DurNs(500_000_000);
 /// Maximum probability that noise alone causes the repetition, as a natural logarithm: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
-/// Weight of the latest difference and of the latest run in their running means.
+/// Weight of the latest difference between readings and of the latest run of identical readings in their running
+/// means.
 const LATEST: f64 = 1.0 / 64.0;
-/// Minimum share of differences with a reversed sign at which readings count as noisy.
+/// Minimum share of differences between readings with a reversed sign at which the readings count as noisy.
 ///
 /// White noise reverses the sign of two thirds of the differences, and a motion reverses hardly any.
 const NOISY: f64 = 0.3;
 
-/// Repetition statistics of one source; part of the loop's state.
+/// Statistics of repeated readings of one sensor; part of the loop's saved state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StuckSensor {
     last: Option<[f64; 3]>,
@@ -28,15 +29,15 @@ pub struct StuckSensor {
     steps: [f64; 3],
     /// Share of differences whose sign is opposite to that of the previous difference, from 0 to 1.
     to_and_fro: f64,
-    /// Mean length of runs of identical readings, and length of the present run, both in readings.
+    /// Mean length of runs of identical readings, and length of the present run, both as numbers of readings.
     usual_run: f64,
     run: u32,
-    /// Start time of the present run.
+    /// Start time of the present run of identical readings.
     since: MonoNs,
 }
 
 impl StuckSensor {
-    /// Processes a turn rate; returns whether the unit counts as stuck now.
+    /// Processes a turn rate; returns whether the inertial unit counts as stuck now.
     ///
     /// Allocates: never.
     pub fn hangs(&mut self, at: MonoNs, rate_radps: Vec3<Sensor>) -> bool {
@@ -45,7 +46,7 @@ impl StuckSensor {
             (self.since, self.run) = (at, 1);
             return false;
         };
-        // The comparison is bitwise, because a stuck unit repeats its bytes.
+        // Readings are compared bit by bit, because a stuck unit repeats its bytes.
         if now.map(f64::to_bits) == before.map(f64::to_bits) {
             self.run = self.run.saturating_add(1);
             return self.has_hung(at);
@@ -76,7 +77,7 @@ impl StuckSensor {
 mod tests {
     use super::*;
 
-    /// Feeds readings at 400 Hz; returns after each reading whether the unit counts as stuck.
+    /// Processes readings at 400 Hz; returns for each reading whether the inertial unit counts as stuck.
     fn hangs(readings: impl IntoIterator<Item = [f64; 3]>) -> Vec<bool> {
         let mut repeats = StuckSensor::default();
         let mut of =
@@ -97,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn noisy_unit_with_constant_reading_is_stuck_after_0_5_s() {
+    fn noisy_inertial_unit_with_constant_reading_counts_as_stuck_after_0_5_s() {
         let frozen = noisy(999);
         let all = hangs(
             (0..1000).map(noisy).chain(std::iter::repeat_n(frozen, 1000)).chain((2000..2100).map(noisy)),
@@ -110,7 +111,7 @@ mod tests {
     /// The simulator's ideal units repeat a reading while the motion is steady. Every change of motion changes the
     /// reading.
     #[test]
-    fn noise_free_unit_is_never_stuck() {
+    fn noise_free_inertial_unit_never_counts_as_stuck() {
         let swaying = |k: u64| [1e-2 * math::sin(k as f64 / 800.0), 0.0, 2e-2 * math::cos(k as f64 / 1700.0)];
         let still = [0.0; 3];
         let all = (0..4000)
@@ -121,12 +122,12 @@ mod tests {
         assert!(hangs(all).iter().all(|hangs| !hangs));
     }
 
-    /// A coarse unit at rest repeats each reading for a while. The coarser the unit, the longer the detection
-    /// takes.
+    /// A coarsely quantised unit at rest repeats each reading for a while. The coarser the unit, the longer the
+    /// detection takes.
     #[test]
-    fn coarse_unit_at_rest_is_not_stuck() {
-        // One reading in two hundred differs. So a run of three readings is no evidence, and neither is one of two
-        // thousand.
+    fn coarsely_quantised_inertial_unit_at_rest_does_not_count_as_stuck() {
+        // One reading in two hundred differs from the others. So a run of three readings is no evidence, and neither
+        // is one of two thousand.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

@@ -29,7 +29,7 @@ pub enum Tunnel {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Body {}
 
-/// The frame of one sensor, as mounted.
+/// The frame of one sensor, as the sensor is mounted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {}
 
@@ -199,7 +199,7 @@ impl<To, From> Rot<To, From> {
         )
     }
 
-    /// Components w, x, y, z of the unit quaternion.
+    /// Components w, x, y, z of the rotation's unit quaternion.
     pub fn wxyz(&self) -> [f64; 4] {
         let q = self.0.quaternion();
         [q.w, q.i, q.j, q.k]
@@ -207,7 +207,8 @@ impl<To, From> Rot<To, From> {
 
     /// Whether the quaternion has unit length, within the rounding errors of a long product of rotations.
     pub fn is_unit(&self) -> bool {
-        /// Limit of the squared length's error. Products of a ten-hour dive at 600 Hz stay below 1e-8.
+        /// Maximum error of the quaternion's squared length. Products of rotations over ten hours at 600 Hz stay
+        /// below 1e-8.
         const DRIFT: f64 = 1e-6;
         let [w, x, y, z] = self.wxyz();
         (w * w + x * x + y * y + z * z - 1.0).abs() <= DRIFT
@@ -244,7 +245,7 @@ impl<To, From> fmt::Debug for Rot<To, From> {
 /// Position and attitude of the vehicle in the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Origin of the body frame.
+    /// Position of the body frame's origin in the tunnel.
     pub position: Point3<Tunnel>,
     /// Rotation from body to tunnel frame.
     pub attitude: Rot<Tunnel, Body>,
@@ -258,10 +259,10 @@ impl Pose {
     }
 }
 
-/// Mounting of a sensor on the vehicle.
+/// Position and attitude of a sensor on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mount {
-    /// Origin of the sensor frame in the body frame.
+    /// Position of the sensor frame's origin in the body frame.
     pub position: Vec3<Body>,
     /// Rotation from sensor to body frame.
     pub rotation: Rot<Body, Sensor>,

@@ -69,10 +69,10 @@ pub fn erfc(x: f64) -> f64 {
 
 /// Wraps `value` to [0, `modulus`). `modulus` must be positive and finite.
 pub fn wrap(value: f64, modulus: f64) -> f64 {
-    // Nearly all values are within one modulus of the interval. For these, the branches give the same bits as the
-    // quotient.
+    // Nearly all values are within one modulus of [0, `modulus`). For these values, the branches give the same bits
+    // as the formula with the quotient.
     if (0.0..modulus).contains(&value) {
-        // -0.0 becomes 0.0.
+        // The addition turns -0.0 into 0.0.
         return value + 0.0;
     }
     if value < 0.0 && value > -modulus {
@@ -81,7 +81,7 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
     }
     debug_assert!(modulus > 0.0 && modulus.is_finite(), "a modulus is positive and finite: {modulus}");
     let r = value - modulus * libm::floor(value / modulus);
-    // Rounding can make r equal to the modulus, or slightly negative.
+    // Rounding can make the remainder r equal to the modulus, or slightly negative.
     if r >= modulus || r < 0.0 { 0.0 } else { r }
 }
 
@@ -103,7 +103,8 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
 /// The largest integer not above `x`; saturates, and NaN gives zero.
 #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn floor_to_i64(x: f64) -> i64 {
-    // Avoids a library call, because each sample needs several calls to look up cells and sections.
+    // Inline code instead of a library call, because each sample needs several roundings to look up cells and
+    // sections.
     let towards_zero = x as i64;
     if towards_zero as f64 > x { towards_zero.saturating_sub(1) } else { towards_zero }
 }
@@ -111,7 +112,7 @@ pub fn floor_to_i64(x: f64) -> i64 {
 /// The nearest integer to `x` (halves to even); saturates, and NaN gives zero.
 #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn round_to_i64(x: f64) -> i64 {
-    /// 2^52: doubles of this size have no fraction.
+    /// 2^52: doubles of this size have no fractional part.
     ///
     /// The sum of a value and this constant is thus rounded to an integer, halves to even.
     const WHOLE: f64 = 4_503_599_627_370_496.0;

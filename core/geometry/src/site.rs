@@ -1,6 +1,6 @@
 //! Site constants: water, gravity and the direction of the tunnel's axis. Every log records them.
 
-/// The site's constants.
+/// Constants of the site: water, gravity and the direction of the tunnel's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Site {
     /// Speed of sound in the tunnel's water, m/s. Measured ranges are rescaled to this speed.
@@ -13,7 +13,7 @@ pub struct Site {
     pub surface_pressure_pa: f64,
     /// Height of the water's surface above the tunnel's floor at the portal, m.
     pub surface_above_floor_m: f64,
-    /// Yaw of the tunnel's axis in the IMU's level reference, radians.
+    /// Yaw of the tunnel's axis in the IMU's level reference frame, radians.
     pub axis_yaw_rad: f64,
 }
 
@@ -59,7 +59,7 @@ impl Site {
         self.surface_pressure_pa + depth_m * self.density_kgpm3 * self.gravity_mps2
     }
 
-    /// Rescales a range to the water's speed of sound, m; the device computed it with `device_mps`.
+    /// Rescales a range to the water's speed of sound, m; the device computed the range with the speed `device_mps`.
     pub fn rescaled_range_m(&self, range_m: f64, device_mps: f64) -> f64 {
         range_m * (self.sound_speed_mps / device_mps)
     }
@@ -69,7 +69,7 @@ impl Site {
 mod tests {
     use super::{Site, fresh_water_sound_speed_mps};
 
-    /// Reference values: Del Grosso and Mader 1972, tables for pure water.
+    /// The reference values are tables for pure water: Del Grosso and Mader 1972.
     #[test]
     fn sound_speed_equals_reference_tables() {
         for (degc, mps) in [(0.0, 1402.39), (5.0, 1426.16), (10.0, 1447.27), (20.0, 1482.34), (30.0, 1509.13)]

@@ -48,22 +48,22 @@ pub enum SnapshotError {
     /// The bytes are not a snapshot of this loop.
     #[error("restoring {part} from a snapshot: {why}; it is from another vehicle or version, or damaged")]
     Unfit {
-        /// Part of the state that was being restored.
+        /// Name of the part of the state that was being restored.
         part: String,
-        /// The cause.
+        /// The cause of the failure to restore.
         why: String,
     },
     /// A value cannot be written.
     #[error("saving {part}: {why}")]
     Unsaved {
-        /// Part of the state that was being saved.
+        /// Name of the part of the state that was being saved.
         part: String,
-        /// The cause.
+        /// The cause of the failure to save.
         why: String,
     },
 }
 
-/// Writes a snapshot.
+/// Writer of a snapshot.
 #[derive(Debug, Default)]
 pub struct Saver {
     bytes: Vec<u8>,
@@ -72,13 +72,13 @@ pub struct Saver {
 }
 
 impl Saver {
-    /// Begins a part and writes its name, which later errors report.
+    /// Begins a named part of the state, and writes its name, which later errors report.
     pub fn part(&mut self, name: &'static str) {
         self.part = name;
         self.value(&name);
     }
 
-    /// Adds a value.
+    /// Appends a value to the snapshot.
     pub fn value(&mut self, value: &(impl Serialize + ?Sized)) {
         match postcard::to_extend(value, core::mem::take(&mut self.bytes)) {
             Ok(bytes) => self.bytes = bytes,
@@ -89,7 +89,7 @@ impl Saver {
         }
     }
 
-    /// Adds a list, preceded by its length.
+    /// Appends a list to the snapshot, preceded by its length.
     pub fn list<T: Serialize>(&mut self, list: &[T]) {
         self.value(&list.len());
         for element in list {
@@ -97,18 +97,18 @@ impl Saver {
         }
     }
 
-    /// Adds stateful elements without their number, because the number is a setting.
+    /// Appends stateful elements without their number, because the number of elements is a setting.
     pub fn each<'a, T: Stateful + ?Sized + 'a>(&mut self, each: impl Iterator<Item = &'a T>) {
         each.for_each(|one| one.save(self));
     }
 
-    /// Adds raw bytes, preceded by their length.
+    /// Appends raw bytes, preceded by their length.
     pub fn raw(&mut self, bytes: &[u8]) {
         self.value(&bytes.len());
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// The complete snapshot.
+    /// Returns the complete snapshot.
     ///
     /// Errors: a value could not be written.
     pub fn finish(self) -> Result<Vec<u8>, SnapshotError> {
@@ -116,7 +116,7 @@ impl Saver {
     }
 }
 
-/// Reads a snapshot.
+/// Reader of a snapshot.
 #[derive(Debug)]
 pub struct Restorer<'a> {
     bytes: &'a [u8],
@@ -124,12 +124,12 @@ pub struct Restorer<'a> {
 }
 
 impl<'a> Restorer<'a> {
-    /// Creates a reader of the bytes of [`Saver::finish`].
+    /// Creates a reader of a snapshot that [`Saver::finish`] returned.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, part: "the beginning" }
     }
 
-    /// Begins the part of this name.
+    /// Begins reading the part of the state with this name.
     ///
     /// Errors: the next part has another name.
     pub fn part(&mut self, name: &'static str) -> Result<(), SnapshotError> {
@@ -168,7 +168,7 @@ impl<'a> Restorer<'a> {
         Ok(())
     }
 
-    /// Reads a slice of fixed length.
+    /// Reads values into a slice of fixed length.
     ///
     /// Errors: the snapshot has another length, or an element can't be read.
     pub fn slots<T: DeserializeOwned>(&mut self, slots: &mut [T]) -> Result<(), SnapshotError> {
@@ -179,7 +179,7 @@ impl<'a> Restorer<'a> {
         slots.iter_mut().try_for_each(|slot| self.value().map(|value| *slot = value))
     }
 
-    /// Restores stateful elements, whose number is a setting.
+    /// Restores stateful elements in place; their number is a setting.
     ///
     /// Errors: as for each element.
     pub fn each<'t, T: Stateful + ?Sized + 't>(
@@ -205,7 +205,7 @@ impl<'a> Restorer<'a> {
         SnapshotError::Unfit { part: self.part.to_owned(), why }
     }
 
-    /// Whether all bytes have been read.
+    /// Whether all bytes of the snapshot have been read.
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()
     }

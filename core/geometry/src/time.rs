@@ -1,7 +1,7 @@
 //! Time as integer nanoseconds, in three types that can't be mixed up.
 //!
 //! The loop uses only [`MonoNs`], the host's monotonic clock. The timestamp comes from the thread that received the
-//! bytes, from a log or from a simulation. UTC appears only at the program's edges.
+//! bytes, from a log or from a simulation. UTC appears only at the program's inputs and outputs.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ const NS_PER_S: f64 = 1e9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct MonoNs(pub u64);
 
-/// A UTC timestamp, in nanoseconds since 1970-01-01 (negative before). Only the program's edges use it.
+/// A UTC timestamp, in nanoseconds since 1970-01-01 (negative before). Only the program's inputs and outputs use it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct UtcNs(pub i64);
 
@@ -62,7 +62,7 @@ impl MonoNs {
 impl Add<DurNs> for MonoNs {
     type Output = Self;
 
-    /// The sum saturates at both ends of the clock's range.
+    /// Overflow of the sum saturates at either end of the clock's range.
     fn add(self, span: DurNs) -> Self {
         Self(self.0.saturating_add_signed(span.0))
     }
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn span_is_signed_and_saturates() {
+    fn duration_between_timestamps_is_signed_and_saturates() {
         assert_eq!(MonoNs(5).since(MonoNs(8)), DurNs(-3));
         assert_eq!(MonoNs(u64::MAX).since(MonoNs(0)), DurNs(i64::MAX));
         assert_eq!(MonoNs(0).since(MonoNs(u64::MAX)), DurNs(i64::MIN));
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_over_10_hours_sum_exactly() {
+    fn time_steps_over_10_hours_sum_exactly() {
         let step = DurNs::from_secs_f64(0.0048);
         let mut now = MonoNs(0);
         for _ in 0..7_500_000 {

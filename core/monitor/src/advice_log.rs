@@ -1,4 +1,4 @@
-//! Advice history.
+//! Advice history: speed advice shown during the dive.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -15,26 +15,26 @@ pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);
 pub struct AdviceEntry {
     /// Time of the entry, in data time.
     pub at: MonoNs,
-    /// Chainage at that time, m; `None` without a fix.
+    /// Chainage of the vehicle at the entry's time, m; `None` without a fix.
     pub chainage_m: Option<f64>,
-    /// Speed at that time, m/s.
+    /// Speed of the vehicle at the entry's time, m/s.
     pub speed_mps: f64,
-    /// The advice.
+    /// Speed advice shown at the entry's time.
     pub advice: Advice,
 }
 
-/// Advice history.
+/// Advice history: speed advice shown during the dive.
 ///
 /// An entry is added when the advice has changed significantly, or after ten seconds. When the history is
 /// full, every other entry is dropped and the minimum time between entries is doubled. A longer dive is thus
 /// logged more coarsely from beginning to end.
 #[derive(Debug, Clone, Resource)]
 pub struct AdviceLog {
-    /// The entries, in order.
+    /// Entries of the advice history, in order of time.
     pub entries: Vec<AdviceEntry>,
-    /// Entries dropped for lack of room.
+    /// Number of advice entries dropped for lack of room.
     pub dropped: u64,
-    /// Minimum time between two entries.
+    /// Minimum time between two entries of the advice history.
     apart: DurNs,
 }
 

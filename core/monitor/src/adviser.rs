@@ -22,20 +22,20 @@ use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
-/// Minimum speed assumed for heads apart along the hull, m/s. It limits the time between their visits of a
-/// place.
+/// Lowest speed, m/s, assumed when the time between the passes of heads at different places along the hull is
+/// computed. At a standstill this time would be infinite.
 const SLOWEST_MPS: f64 = 0.05;
 
 /// Part of the loop that computes the advice.
 pub struct Adviser {
     part: Part<AdviseStage>,
-    /// A tick without packets, which the world has between ticks.
+    /// Empty tick for the placer's values. The adviser keeps it as a placeholder between ticks.
     nothing: Arc<Placed>,
 }
 
-/// Advice of a tick.
+/// Advice computed in one tick.
 ///
-/// The list is reused from tick to tick. That of [`Advised::default`] grows as needed.
+/// The list is reused from tick to tick. In a default value the list grows as needed.
 #[derive(Debug, Default)]
 pub struct Advised {
     /// Advice at each update, in order.
@@ -44,7 +44,7 @@ pub struct Advised {
 }
 
 impl Advised {
-    /// A tick without updates after this one.
+    /// Returns the advice of an empty tick that follows this tick.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut stream = self.stream.clone();
         stream.next_tick();
@@ -56,7 +56,7 @@ impl Advised {
 #[derive(Debug, Default, Resource)]
 struct AdviceList(Vec<AdviceEntry>);
 
-/// Stream of the advice.
+/// Result stream of the speed advice.
 #[derive(Debug, Default, Resource)]
 struct AdviceStream(ResultStream);
 
@@ -82,7 +82,7 @@ pub(super) struct Advisor {
 stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
 
 impl Adviser {
-    /// Creates the adviser. `keeps_results` says whether its stream keeps the words of each tick.
+    /// Creates the adviser. `keeps_results` says whether its stream keeps the contents of each tick.
     ///
     /// Errors: the order of two systems is ambiguous.
     pub(super) fn new(
@@ -104,21 +104,26 @@ impl Adviser {
         Ok(Self { part, nothing: Arc::default() })
     }
 
-    /// Computes the advice of a tick. Every tick must be passed once and in order.
+    /// Computes the advice of a tick. Must be called once for each tick, in order.
     ///
     /// Allocates: never, if the list has room.
     pub fn tick(&mut self, placed: &Arc<Placed>, into: &mut Advised) {
         let Self { part, nothing } = self;
-        core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
         part.world.resource_mut::<AdviceStream>().0.next_tick();
-        part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
-        part.run(AdviseStage::Advise);
-        part.world.resource_mut::<PlacedTick>().0 = Arc::clone(nothing);
-        core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
+        if placed.updates().next().is_none() {
+            into.entries.clear();
+        } else {
+            core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
+            part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
+            part.run(AdviseStage::Advise);
+            part.world.resource_mut::<PlacedTick>().0 = Arc::clone(nothing);
+            core::mem::swap(&mut part.world.resource_mut::<AdviceList>().0, &mut into.entries);
+        }
         self.report(into);
     }
 
-    /// Advice before the next tick, with room for any tick. Allocates: all memory of the list.
+    /// Creates the advice result that readers see before the first tick, with room for a tick of any size.
+    /// Allocates: all memory of the list.
     pub(super) fn advised_with_room(&self) -> Advised {
         let mut advised = Advised { entries: Vec::with_capacity(MAX_TICK_PACKETS), ..Advised::default() };
         advised.stream.reserve_as(&self.part.world.resource::<AdviceStream>().0);
@@ -126,12 +131,12 @@ impl Adviser {
         advised
     }
 
-    /// Copies the state that other parts read.
+    /// Copies the state that other parts of the loop read.
     pub(super) fn report(&self, into: &mut Advised) {
         into.stream.follow(&self.part.world.resource::<AdviceStream>().0);
     }
 
-    /// Advice history.
+    /// History of the speed advice.
     pub fn log(&self) -> &AdviceLog {
         self.part.world.resource()
     }
@@ -172,7 +177,7 @@ fn advise(
 }
 
 impl Advisor {
-    /// Allocates: at startup, all memory of the advisor.
+    /// Creates the state of the advisor. Allocates: at startup, all memory of the advisor.
     pub(super) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
@@ -182,8 +187,8 @@ impl Advisor {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
-        // On the way back, heads apart along the hull are in phase at other speeds. Advice from before the
-        // vehicle turned round is no longer valid.
+        // While the vehicle goes back, heads at different places along the hull are in phase at other speeds.
+        // Advice from before the vehicle reversed is no longer valid.
         if self.advisor.is_astern() != was_astern {
             self.hysteresis.forget();
         }
@@ -191,7 +196,7 @@ impl Advisor {
     }
 }
 
-/// Rotation of the vehicle between two passes.
+/// Rotation of the vehicle between two passes of heads over the same wall.
 fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
     if let Some(pose) = situation.pose {
         looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));
@@ -238,7 +243,7 @@ mod tests {
         MonoNs(0) + DurNs::from_secs_f64(seconds)
     }
 
-    /// Two heads that turn in 8 s. Along the hull they are this far apart, m.
+    /// Situation of two heads that turn in 8 s and are mounted `apart_m` metres apart along the hull.
     fn two_heads(apart_m: f64) -> Situation {
         let mut situation = Situation { configured: 2, ..situation(Some(5.0)) };
         for (number, slot) in situation.heads.iter_mut().take(2).enumerate() {
@@ -257,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn every_update_within_a_tick_gets_advice_with_the_time_left() {
+    fn advice_at_each_update_states_the_dive_time_left_at_that_update() {
         let head = HeadSpec {
             mount: mount(),
             step_rad: 0.0157,
@@ -293,10 +298,10 @@ mod tests {
         assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
     }
 
-    /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, heads 0.8 m apart
-    /// reach the same place 8 s after one another.
+    /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, the rear one of
+    /// two heads 0.8 m apart reaches a place 8 s after the front one.
     #[test]
-    fn swing_is_measured_between_passes_and_between_heads_along_the_hull() {
+    fn vehicle_rotation_spans_the_time_between_passes_and_between_heads_along_the_hull() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();
@@ -309,7 +314,7 @@ mod tests {
             }
             last
         };
-        // The tolerance is one update.
+        // The tolerance is one advice update (0.2 s).
         let near = |found: f64, expected: f64| (found - expected).abs() < 0.05 * expected;
         for (apart_m, speed_mps) in [(0.8, 0.1), (0.8, -0.1), (0.8, 0.2)] {
             let found = swung(apart_m, speed_mps);
@@ -317,13 +322,13 @@ mod tests {
         }
         let side_by_side = swung(0.0, 0.1);
         assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
-        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the heads are 16 s apart. Only the last
-        // half minute counts.
+        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the second head arrives 16 s after the
+        // first. Only the rotation of the last 30 s counts.
         let at_rest = swung(0.8, 0.0);
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }
 
-    /// Other resources and components are constant since arming, or set in each tick.
+    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let (_, adviser) = armed().split().unwrap();

@@ -1,5 +1,5 @@
-//! The alerter: combines the values of the other parts and the operator's commands to the live state, alerts
-//! and notes.
+//! The alerter: combines the results of the other parts of the loop and the operator's commands into the live
+//! state, alerts and notes.
 
 use super::adviser::Advised;
 use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};
@@ -20,9 +20,9 @@ use headrace_sampling::head::HeadSet;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Maximum share of the target for position errors for which the advice allows.
+/// Largest share of the target that position errors may use up. Above it, the position is doubtful.
 const SPREAD_SHARE: f64 = 0.2;
-/// Notices per update: each alert may change several times.
+/// Maximum notices per alert in the list and tick. An alert may change several times in a tick.
 const NOTICES_PER_ALERT: usize = 4;
 
 /// Alerts, notes and the live state.
@@ -30,20 +30,20 @@ pub struct Alerter {
     pub(super) list: AlertList,
     pub(super) notes: Notes,
     pub(super) state: LiveState,
-    /// Number of commands without effect.
+    /// Number of operator commands without effect.
     pub(super) without_effect: u64,
-    /// Live states at the updates.
+    /// Result stream of the live states at the advice updates.
     pub(super) states: ResultStream,
-    /// Changes of alerts, and notes.
+    /// Result stream of alert changes and notes.
     pub(super) changes: ResultStream,
-    /// Changes of alerts, and notes, of the last tick, in order.
+    /// Alert changes and notes of the last tick, in order.
     pub(super) notices: Vec<Notice>,
     /// Sources of the heads, by number.
     heads: Vec<SourceId>,
 }
 
 impl Alerter {
-    /// Creates the alerter. `keeps_results` says whether its streams keep the words of each tick.
+    /// Creates the alerter. `keeps_results` says whether its streams keep the contents of each tick.
     ///
     /// `runs` is the maximum number of runs that change in a tick. Allocates: all memory.
     pub(super) fn new(
@@ -77,7 +77,7 @@ impl Alerter {
         self.changes.next_tick();
     }
 
-    /// Takes what the other parts have made of a tick, which ends at `now`. Allocates: never.
+    /// Applies the results of the other parts for a tick that ends at `now`. Allocates: never.
     pub(super) fn tick(&mut self, placed: &Placed, found: &Found, advised: &Advised, now: MonoNs) {
         self.notices.clear();
         let (runs, commands) = (&found.runs[..], &placed.commands.0[..]);
@@ -94,7 +94,7 @@ impl Alerter {
         self.state.now = now;
     }
 
-    /// Takes the runs that a judgement at the end of a dive has changed.
+    /// Applies the changes of runs that were judged at the end of a dive.
     pub(super) fn take_runs_at_end(&mut self, runs: &[RunInput]) {
         self.notices.clear();
         for run in runs {
@@ -102,7 +102,7 @@ impl Alerter {
         }
     }
 
-    /// Takes the observations after the last judgement of a dive.
+    /// Applies the observations after the last judgement of a dive.
     pub(super) fn take_observations_at_end(&mut self, observations: &Observations, at: MonoNs) {
         self.notices.clear();
         let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
@@ -113,13 +113,13 @@ impl Alerter {
         let Update { at, situation, doubts, fix, sd } = update;
         let turning = (0..).zip(&situation.heads).filter(|(_, motion)| motion.is_some());
         let turning = turning.fold(HeadSet::default(), |set, (head, _)| set.with(head));
-        let reserved_m = self.state.confidence_sd * situation.pass_error_m;
+        let reserved_m = self.state.target.error_m(situation.pass_error_m);
         self.state = LiveState {
             at: Some(*at),
             position: match fix {
                 Err(lacking) => PositionState::None(*lacking),
                 Ok(_) if doubts.cable.is_some() => PositionState::Doubtful(PositionDoubt::Cable),
-                Ok(_) if reserved_m > SPREAD_SHARE * self.state.target_m => {
+                Ok(_) if reserved_m > SPREAD_SHARE * self.state.target.max_hole_m => {
                     PositionState::Doubtful(PositionDoubt::Spread)
                 }
                 Ok(_) => PositionState::Ok,
@@ -202,36 +202,36 @@ fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &
     }
 }
 
-/// Inputs of a tick, and how many of them have been applied.
+/// Inputs of a tick, and how many of them have been applied so far.
 struct Inputs<'a> {
     runs: &'a [RunInput],
     commands: &'a [ReceivedCommand],
     events: &'a [Event],
-    /// Numbers of runs, commands and events applied so far.
+    /// Number of runs, commands and events applied so far.
     taken: (usize, usize, usize),
 }
 
 impl Alerter {
-    /// Applies everything that was consumed before an update. `event` is the index of the first event after
-    /// the update.
+    /// Applies everything that was consumed before an advice update. `event` is the index of the first event
+    /// after the update.
     fn take_before(&mut self, event: usize, inputs: &mut Inputs<'_>) {
         self.take_until(Some(event), inputs);
         self.hear(inputs, event);
     }
 
-    /// Applies an update. Everything before it must have been applied.
+    /// Applies an advice update. All inputs before it must have been applied already.
     fn take_beat(&mut self, beat: &Beat<'_>) {
         let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
         self.list.beat(beat, &mut to);
     }
 
-    /// Applies the rest of the tick.
+    /// Applies the inputs that remain in the tick.
     fn take_rest(&mut self, inputs: &mut Inputs<'_>) {
         self.take_until(None, inputs);
         self.hear(inputs, inputs.events.len());
     }
 
-    /// Applies a changed run.
+    /// Applies a changed run of flagged sections.
     fn take_run(&mut self, run: &RunInput) {
         let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
         self.list.take_run(run, &mut to);
@@ -247,7 +247,7 @@ impl Alerter {
         inputs.taken.2 = until.max(inputs.taken.2);
     }
 
-    /// Applies runs and commands up to an update, or all of them.
+    /// Applies changed runs and commands up to an advice update, or all of them.
     ///
     /// A command comes before the results of the event that follows it.
     fn take_until(&mut self, beat: Option<usize>, inputs: &mut Inputs<'_>) {

@@ -13,7 +13,7 @@ use headrace_sensor::device::{Device, SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_vehicle::{CONSOLE_ID, Mission};
 
-/// An addition to the loop, such as an outlet or a system.
+/// A plugin: an addition to the loop, such as an outlet or a system.
 pub trait Plugin {
     /// Registers sources, outlets, and resources and systems of a world.
     ///
@@ -33,7 +33,7 @@ pub struct App {
     pub(super) outlets: Vec<Box<dyn Outlet>>,
     pub(super) keeps_results: bool,
     pub(super) sources: Vec<SourceInfo>,
-    /// Entity of each source in the placer.
+    /// Entity of each source in the placer's world.
     pub(super) entities: Vec<Entity>,
     pub(super) ports: Vec<Port>,
     pub(super) readers: Vec<PortReader>,

@@ -20,7 +20,7 @@ use super::other_settings;
 use super::part::Part;
 use super::placer::Placer;
 use super::placer::sound_speed::SoundSpeed;
-use super::resources::{Coverage, Finder, Target, TunnelDesign};
+use super::resources::{Coverage, Finder, Plan, TunnelDesign};
 use super::ring;
 use super::run::{Loop, Parts};
 use super::source::SourceInfo;
@@ -58,21 +58,20 @@ impl App {
         let heads = spawn_vehicle(&mut placer, &entities, navigation, &advisor);
         copy_heads(&placer.world, &heads, &mut surveyor);
         let world = &mut placer.world;
-        let (tunnel, target, reach_m) =
-            (tunnel_design(&mission), target(world, &mission), heads_reach_m(world));
+        let (tunnel, plan, reach_m) = (tunnel_design(&mission), plan(world, &mission), heads_reach_m(world));
         let descriptions = head_descriptions(world, &mission, &sources);
         let head_sources = heads.iter().filter_map(|head| world.get::<Mounted>(*head));
         let head_sources: Vec<SourceId> = head_sources.map(|mounted| mounted.source).collect();
-        let advisor = Advisor::new(advisor, mission.target_m, mission.dive_time);
+        let advisor = Advisor::new(advisor, mission.target.max_hole_m, mission.dive_time);
         let adviser = Adviser::new(adviser, advisor, keeps_results)?;
         surveyor.insert_resource(tunnel.clone());
-        surveyor.insert_resource(target);
+        surveyor.insert_resource(plan);
         let coverage = coverage(&mission, reach_m)?;
         let list = AlertList::new(mission.alerts, mission.limits, coverage.sections.len());
         let finder = Finder(HoleFinder::new(mission.coverage.hole_tolerance_m));
         let surveyor = Surveyor::new(surveyor, coverage, finder, keeps_results)?;
         placer.insert_resource(tunnel);
-        placer.insert_resource(target);
+        placer.insert_resource(plan);
         let (console, console_reader) = ring::ring(0);
         let ports = self.ports.into_iter().chain([console]).collect();
         let readers = self.readers.into_iter().chain([console_reader]).collect();
@@ -89,8 +88,7 @@ impl App {
 
 fn advisor(mission: &Mission, heads: &[(HeadSpec, Vec<HeadMode>)]) -> advice::Advisor {
     let task = Task {
-        target_m: mission.target_m,
-        confidence_sd: mission.coverage.confidence_sd,
+        target: mission.target,
         length_m: mission.length_m,
         layout: mission.layout,
         sound_speed_mps: mission.site.sound_speed_mps,
@@ -128,7 +126,7 @@ fn spawn_vehicle(
     heads
 }
 
-/// Spawns the heads in the surveyor, with the placer's constants.
+/// Spawns the heads in the surveyor's world, with the constants that they have in the placer's world.
 fn copy_heads(placer: &World, heads: &[Entity], surveyor: &mut Part<SurveyStage>) {
     for head in heads {
         let head = placer.entity(*head);
@@ -152,23 +150,23 @@ fn tunnel_design(mission: &Mission) -> TunnelDesign {
     }
 }
 
-fn target(placer: &mut World, mission: &Mission) -> Target {
-    Target {
-        target_m: mission.target_m,
+fn plan(placer: &mut World, mission: &Mission) -> Plan {
+    Plan {
+        target: mission.target,
         layout: mission.layout,
         planned_speed_mps: mission.planned_speed_mps,
-        other: other_settings::of_heads(placer, &mission.profile, mission.target_m),
+        other: other_settings::of_heads(placer, &mission.profile, mission.target.max_hole_m),
     }
 }
 
 fn live_state(mission: &Mission, heads: &[SourceId], sources: usize, heads_reach_m: f64) -> LiveState {
     let bits = source_bits(heads.iter().copied(), HeadSet::from_bits(u8::MAX));
     let sources = u16::try_from(sources).unwrap_or(0);
-    let live = LiveState::new(mission.target_m, mission.coverage.confidence_sd, bits, sources);
+    let live = LiveState::new(mission.target, bits, sources);
     LiveState { length_m: mission.length_m, heads_reach_m, ..live }
 }
 
-/// Numbers the heads in the order of sources. Returns each head's specification and modes.
+/// Numbers the heads in the order of sources. Returns each head's specification and scan modes.
 fn number_heads(
     world: &mut World,
     sensors: &[Entity],
@@ -197,16 +195,16 @@ fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<Sour
     place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
 }
 
-/// Names of the heads and their alternative settings.
+/// Names of the heads, and the alternative settings that could be advised.
 fn head_descriptions(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadDescriptions {
     let mut heads = world.query::<(&Head, &Mounted, &HeadSpecification)>();
     let mut heads: Vec<_> = heads.iter(world).collect();
     heads.sort_by_key(|(head, ..)| head.0);
     let name = |mounted: &Mounted| sources.get(mounted.source.index()).map_or("", |source| &source.id);
     HeadDescriptions::of(
-        heads
-            .into_iter()
-            .map(|(_, mounted, head)| head.settings(name(mounted), &mission.profile, mission.target_m)),
+        heads.into_iter().map(|(_, mounted, head)| {
+            head.settings(name(mounted), &mission.profile, mission.target.max_hole_m)
+        }),
     )
 }
 
@@ -225,16 +223,15 @@ fn coverage(mission: &Mission, heads_reach_m: f64) -> Result<Coverage, PluginErr
         perimeter_m: mission.profile.perimeter_m(),
         from_m,
         to_m,
-        cell_m: StoreLayout::cell_for_target_m(mission.target_m),
+        cell_m: StoreLayout::cell_for_target_m(mission.target.max_hole_m),
         capacity: u32::try_from(samples).unwrap_or(u32::MAX),
     });
-    let mut sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m)
-        .with_confidence_sd(mission.coverage.confidence_sd)
+    let mut sections = Sections::new(mission.section_m, mission.target, 0.0, mission.length_m)
         .with_heads_reach_m(heads_reach_m);
     for opening in &mission.coverage.openings {
         let name = || opening.name.clone();
         opening
-            .fill(&mut store, mission.target_m)
+            .fill(&mut store, mission.target)
             .map_err(|why| PluginError::Opening { name: name(), why: why.to_string() })?;
         sections.mask(opening, &mission.profile);
     }

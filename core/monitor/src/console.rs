@@ -29,14 +29,14 @@ const MOST_WAITING: usize = 256;
 /// Interval of [`Command::Time`] while no sensor delivers data. The commands let the loop notice stale data.
 const TIME_EVERY: DurNs = DurNs(500_000_000);
 
-/// Reason for refusing a command.
+/// Reason for refusing a command at the console.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConsoleError {
-    /// Too many commands are waiting.
+    /// Too many commands are waiting for the loop.
     #[error("sending a command to the loop: {MOST_WAITING} are waiting already; send it again")]
     Full,
-    /// The dive already has as many notes as its report holds.
+    /// The dive already has as many notes as its report can hold.
     #[error(
         "sending a note to the loop: the dive has {MOST_NOTES} notes, and its report holds no more; further notes are refused"
     )]
@@ -48,11 +48,11 @@ pub enum ConsoleError {
 pub struct ConsolePort {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     clock: Option<Arc<DiveClock>>,
-    /// Number of notes accepted through all ports.
+    /// Number of notes accepted through all console ports.
     notes: Arc<AtomicUsize>,
 }
 
-/// Clock of a dive's timestamps.
+/// Clock that gives the timestamps of a dive.
 type DiveClock = dyn Fn() -> MonoNs + Send + Sync;
 
 impl ConsolePort {

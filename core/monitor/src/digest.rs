@@ -16,18 +16,18 @@ impl core::fmt::Debug for Digest {
 }
 
 impl Digest {
-    /// Adds an integer.
+    /// Adds an integer to the digest.
     pub fn integer(&mut self, value: u64) -> &mut Self {
         self.0 = xxh64(&value.to_le_bytes(), self.0);
         self
     }
 
-    /// Adds the bits of a number; -0 counts as +0.
+    /// Adds the bits of a number to the digest; -0 counts as +0.
     pub fn number(&mut self, value: f64) -> &mut Self {
         self.integer((value + 0.0).to_bits())
     }
 
-    /// The digest so far.
+    /// The digest of all numbers so far.
     pub fn value(&self) -> u64 {
         self.0
     }

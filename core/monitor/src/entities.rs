@@ -31,7 +31,7 @@ use headrace_sensor::reading::SourceId;
 /// The vehicle's navigation: converts readings to fixes.
 #[derive(Component)]
 pub struct Navigator {
-    /// Navigation method.
+    /// Method that computes fixes from readings.
     pub navigation: Box<dyn Navigation>,
     /// Time of the next update, a multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
@@ -59,9 +59,9 @@ impl Stateful for Navigator {
 /// Fix of the vehicle at the last update, and its standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Component, Serialize, Deserialize)]
 pub struct VehicleState {
-    /// Time of the update; `None` before the first.
+    /// Time of the last update; `None` before the first one.
     pub at: Option<MonoNs>,
-    /// Pose and speed, or the reason for which there is no fix.
+    /// Pose and speed of the vehicle, or the reason for which there is no fix.
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the pose, from its covariance; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
@@ -78,9 +78,9 @@ impl Default for VehicleState {
 /// Source, mount and kind of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub struct Mounted {
-    /// Source of the sensor.
+    /// Source that supplies the sensor's bytes.
     pub source: SourceId,
-    /// Mount and kind.
+    /// Mount and kind of the sensor.
     pub info: SensorInfo,
 }
 
@@ -101,15 +101,15 @@ impl Stateful for SensorDecoder {
 /// Traffic statistics of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct SensorHealth {
-    /// Packets received.
+    /// Number of packets received.
     pub packets: u64,
-    /// Bytes received.
+    /// Number of bytes received.
     pub bytes: u64,
-    /// Readings decoded.
+    /// Number of readings decoded.
     pub readings: u64,
-    /// First and last receive time.
+    /// Receive times of the first and last packet.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Longest time between two packets.
+    /// Longest time between two packets of the sensor.
     pub longest_gap: DurNs,
 }
 
@@ -131,7 +131,7 @@ impl SensorHealth {
     }
 }
 
-/// The span of time extended to `at`.
+/// The time span between two packets, extended to include time `at`.
 pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, MonoNs) {
     span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
 }
@@ -140,20 +140,21 @@ pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, Mo
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub struct Head(pub usize);
 
-/// A profiling head, as configured.
+/// Specification of a profiling head, as configured in the vehicle file.
 #[derive(Debug, Clone, PartialEq, Component)]
 pub struct HeadSpecification {
-    /// Mount and scan parameters.
+    /// Mount and scan parameters of the head.
     pub spec: HeadSpec,
-    /// Modes to which the head can be set.
+    /// Scan modes to which the head can be set.
     pub modes: Vec<HeadMode>,
-    /// Shortest range setting that reaches all wall from the centre, m, and the head's modes at that setting.
+    /// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's modes at that
+    /// setting.
     ///
-    /// The setting is the head's own or a longer one. `None` if no setting is long enough.
+    /// The setting is the head's present one or a longer one. `None` if no setting is long enough.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 
-/// Angles of a head occluded by the vehicle, in the head's frame.
+/// Angles at which the vehicle occludes the head's beam, in the head's frame.
 #[derive(Debug, Clone, PartialEq, Default, Component)]
 pub struct HiddenAngles(pub Vec<AngleRange>);
 
@@ -164,41 +165,41 @@ impl HiddenAngles {
     }
 }
 
-/// Classification of a head's returns.
+/// Classifier of a head's returns.
 #[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
 pub struct HeadClassifier(pub(super) HeadWall);
 
-/// Sweep state of a head.
+/// Sweep state of a head: its last sample and the returns that wait for classification.
 #[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
 pub struct HeadSweep {
-    /// Last valid sample in the present sweep.
+    /// Last valid sample in the present sweep of the head.
     pub(super) last: Option<LastSample>,
-    /// Returns that wait for the next ones before they are classified.
+    /// Returns that are classified only after the head's next returns.
     pub(super) waiting: WaitingReturns,
 }
 
-/// A return that waits for the head's next ones.
+/// A return that can be classified only after the head's next returns.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Waiting {
     pub(super) ping: PlacedPing,
-    /// Whether the next ping gave no return.
+    /// Whether the ping after this return gave no return.
     pub(super) broken: bool,
     /// Whether a new sweep has begun since this return.
     pub(super) new_sweep: bool,
 }
 
-/// Waiting returns, in order.
+/// Returns of a head that wait for classification, in order.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct WaitingReturns([Option<Waiting>; MOST_WAITING]);
 
 impl WaitingReturns {
-    /// Adds a return. Returns false if there is no room.
+    /// Adds a waiting return. Returns false if there is no room.
     pub(super) fn add(&mut self, ping: &PlacedPing) -> bool {
         let slot = self.0.iter_mut().find(|slot| slot.is_none());
         slot.map(|slot| *slot = Some(Waiting { ping: *ping, broken: false, new_sweep: false })).is_some()
     }
 
-    /// Last waiting return.
+    /// Most recent waiting return.
     pub(super) fn last_mut(&mut self) -> Option<&mut Waiting> {
         self.0.iter_mut().flatten().next_back()
     }
@@ -213,13 +214,14 @@ impl WaitingReturns {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct LastSample {
     pub(super) point: Point3<Tunnel>,
-    /// Arc length, m.
+    /// Arc length of the sample, m.
     pub(super) arc_m: f64,
-    /// Whether every later ping has been a single step with a return.
+    /// Whether each ping since this sample has been a single step with a return.
     pub(super) unbroken: bool,
 }
 
-/// Reach of a head; `None` before its first ping with a fix.
+/// Reach of a head: the chainages where its samples land now, and have landed so far; `None` before its first
+/// ping with a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadFrontier(pub Option<HeadReach>);
 

@@ -7,13 +7,13 @@ pub enum PluginError {
     /// Two sources have the same id.
     #[error("adding source {id:?}: a source of that id is registered already; ids must differ")]
     DuplicateSource {
-        /// The id.
+        /// Id that two sources have.
         id: String,
     },
-    /// The id is reserved for the operator's input.
+    /// The id of a source is reserved for the operator's input.
     #[error("adding source {id:?}: that is the id of the operator's input; choose another one")]
     ReservedSource {
-        /// The id.
+        /// Reserved id.
         id: String,
     },
     /// A required source is missing.
@@ -21,29 +21,29 @@ pub enum PluginError {
         "arming the loop: water.sound_speed_from = {id:?}: no source has that id; name one of the sources"
     )]
     MissingSource {
-        /// The id.
+        /// Id of the missing source.
         id: String,
     },
-    /// More sources than the loop's tables hold.
+    /// There are more sources than the loop's tables hold.
     #[error("adding source {id:?}: at most {max} sources are allowed; remove one")]
     TooManySources {
-        /// The id.
+        /// Id of the source that exceeds the limit.
         id: String,
-        /// The limit.
+        /// Maximum number of sources.
         max: usize,
     },
-    /// More heads than the loop's tables hold.
+    /// There are more heads than the loop's tables hold.
     #[error("arming the loop: {count} heads; at most {max} are allowed; remove some")]
     TooManyHeads {
-        /// Heads registered.
+        /// Number of heads registered.
         count: usize,
-        /// The limit.
+        /// Maximum number of heads.
         max: usize,
     },
     /// A declared opening can't be added to the sample store.
     #[error("arming the loop: opening {name:?}: {why}")]
     Opening {
-        /// The opening.
+        /// The declared opening.
         name: String,
         /// Problem with the opening.
         why: String,

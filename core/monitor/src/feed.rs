@@ -1,11 +1,11 @@
-//! Runs an armed loop. Ports, logs and the simulator differ only in their [`Feed`].
+//! Runs an armed loop. Ports, logs and the simulator differ only in their [`Feed`] of packets.
 
 use super::run::Loop;
 use headrace_geometry::time::MonoNs;
 
 /// Packet source that fills the rings of a loop: ports, a log, or a simulation.
 pub trait Feed {
-    /// Error that ends the feed.
+    /// Type of the error that ends the feed.
     type Error;
 
     /// Waits for the next tick and fills the rings for it. Returns the end of the tick's time; `None` at the
@@ -38,7 +38,7 @@ pub fn drive<F: Feed>(
     Ok(())
 }
 
-/// Ticks at least once, until the rings are empty.
+/// Runs ticks, at least one, until the packet rings are empty.
 ///
 /// A lagging outlet makes the loop hold packets back. `pause` then gives the outlet time.
 pub fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop), pause: &mut dyn FnMut()) {

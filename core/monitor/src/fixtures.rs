@@ -1,4 +1,4 @@
-//! A pipe, its coverage and its advice, and a loop, for tests.
+//! Fixtures for tests: a pipe, its coverage, its speed advice and a loop.
 
 use crate::entities::Mounted;
 use crate::messages::{Hidden, Outcome, PlacedPing};
@@ -16,6 +16,7 @@ use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::{Profile, shapes};
+use headrace_sampling::Target;
 use headrace_sampling::advice::{Advice, Advisor, Looks, Task};
 use headrace_sampling::head::{HeadSet, MAX_HEADS};
 use headrace_sampling::layout::HeadLayout;
@@ -33,7 +34,7 @@ pub(crate) fn pipe() -> Profile {
     shapes::circle(3.0).unwrap()
 }
 
-/// 30 m of that pipe.
+/// Pipe of 3 m radius and 30 m length.
 pub(crate) fn tunnel() -> TunnelDesign {
     let profile = pipe();
     let limits = WallLimits::new(profile.perimeter_m(), 1.0);
@@ -45,7 +46,7 @@ pub(crate) fn coverage() -> Coverage {
     let (perimeter_m, from_m, to_m) = (pipe().perimeter_m(), 0.0, 32.0);
     Coverage {
         store: SampleStore::new(StoreLayout { perimeter_m, from_m, to_m, cell_m: 0.25, capacity: 10_000 }),
-        sections: Sections::new(0.25, 0.5, from_m, to_m),
+        sections: Sections::new(0.25, Target::new(0.5), from_m, to_m),
         frontier: Frontier::default(),
         soundings: Soundings::new(GridLayout { perimeter_m, from_m, to_m, node_m: 0.5 }),
         unsure: None,
@@ -70,7 +71,7 @@ pub(crate) fn fix(x_m: f64, pass_error_m: f64) -> Fix {
     Fix { pose: pose(x_m), speed_mps: 0.1, relative, revisit: relative, tie: 0, settled: 0 }
 }
 
-/// A vehicle without heads, at 0.1 m/s in the centre of the pipe. Without a chainage it has no pose.
+/// A vehicle without heads, at 0.1 m/s in the centre of the pipe. Without the chainage `x_m` it has no pose.
 pub(crate) fn situation(x_m: Option<f64>) -> Situation {
     Situation {
         pose: x_m.map(pose),
@@ -85,11 +86,10 @@ pub(crate) fn situation(x_m: Option<f64>) -> Situation {
     }
 }
 
-/// A target of half a metre with two standard deviations, in a tunnel of 100 m.
+/// Target of half a metre at a confidence of two standard deviations, in a tunnel of 100 m.
 pub(crate) fn task() -> Task {
     Task {
-        target_m: 0.5,
-        confidence_sd: 2.0,
+        target: Target::new(0.5),
         length_m: 100.0,
         layout: HeadLayout::PhaseShift,
         sound_speed_mps: 1447.0,
@@ -97,12 +97,13 @@ pub(crate) fn task() -> Task {
     }
 }
 
-/// Advice for a vehicle without heads.
+/// Speed advice for a vehicle without heads.
 pub(crate) fn advice(of: &Situation) -> Advice {
     Advisor::new(&pipe(), task(), &[], &[]).advise(of, Swing::default(), None)
 }
 
-/// A return after a single step, from a head in the pipe's centre. The angle counts from the pipe's floor.
+/// A placed ping with a return after a single step, from a head in the pipe's centre. The angle counts from
+/// the pipe's floor.
 pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     let origin = pose(x_m).position;
     let (sin, cos) = math::sin_cos(angle_rad);
@@ -111,7 +112,7 @@ pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     PlacedPing { outcome: Outcome::Sample { point, arc_m }, ..pinged(x_m, angle_rad) }
 }
 
-/// A ping without a return within range, from a head in the pipe's centre.
+/// A placed ping without a return, aimed at wall within range, from a head in the pipe's centre.
 pub(crate) fn pinged(x_m: f64, angle_rad: f64) -> PlacedPing {
     PlacedPing {
         head: 0,
@@ -143,7 +144,7 @@ impl Decoder for Silent {
     }
 }
 
-/// A loop with a head and a depth sensor in the pipe.
+/// A loop with a head and a depth sensor, in a test pipe.
 pub(crate) fn armed() -> Loop {
     let navigation = DirectNavigation::new(pipe(), Site::default());
     let mut app = App::new(Mission::new(pipe(), 1.0));

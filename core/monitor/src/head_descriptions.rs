@@ -9,9 +9,10 @@ use headrace_sampling::head::HeadSet;
 pub struct HeadDescriptions {
     /// Source ids of the heads, by number of the head.
     names: Vec<String>,
-    /// Finer mode for all heads, if there is one.
+    /// Scan mode with a finer step for all heads, if there is one.
     finer: Option<ModeName>,
-    /// Range setting that reaches all wall from the tunnel's centre, m; `None` if the present setting does.
+    /// Range setting at which all heads reach all wall from the tunnel's centre, m; `None` if the present
+    /// setting does.
     longer_m: Option<f64>,
 }
 
@@ -20,7 +21,7 @@ pub struct HeadDescriptions {
 pub struct HeadSettings {
     /// Id of the head's source.
     pub name: String,
-    /// Finer mode, if there is one.
+    /// Scan mode with a finer step, if there is one.
     pub finer: Option<ModeName>,
     /// Range setting that reaches all wall from the tunnel's centre, m; `None` if the head's own setting
     /// does.
@@ -28,7 +29,7 @@ pub struct HeadSettings {
 }
 
 impl HeadDescriptions {
-    /// Descriptions of all heads, in the order of sources.
+    /// Descriptions of all heads, in the order of their sources.
     pub fn of(heads: impl Iterator<Item = HeadSettings>) -> Self {
         let heads: Vec<HeadSettings> = heads.collect();
         let first = heads.first().and_then(|head| head.finer);
@@ -52,23 +53,23 @@ impl HeadDescriptions {
         }
     }
 
-    /// Name of the finer mode, in a form that follows "in".
+    /// Name of the finer scan mode, in a form that follows "in".
     pub(super) fn finer_mode(&self) -> String {
         self.finer.map_or_else(|| "a finer mode".to_owned(), |mode| mode.as_str().to_uppercase())
     }
 
-    /// Instruction to set the finer mode.
+    /// Instruction to set the finer scan mode.
     pub(super) fn set_finer(&self) -> String {
         let heads = if self.finer.is_some() { "set the heads to" } else { "set" };
         format!("{heads} {}", self.finer_mode())
     }
 
-    /// Instruction to set the range that reaches more wall, if one is known.
+    /// Instruction to set the range at which the heads reach more wall, if one is known.
     pub(super) fn seeing_more(&self) -> Option<String> {
         self.longer_m.map(|_| format!("set {}", self.longer_range()))
     }
 
-    /// Name of the longer range, in a form that follows a verb or "with".
+    /// Name of the longer range setting, in a form that follows a verb or "with".
     pub(super) fn longer_range(&self) -> String {
         self.longer_m.map_or_else(|| "a longer range".to_owned(), |range_m| format!("a range of {range_m} m"))
     }
@@ -100,7 +101,7 @@ pub(crate) mod tests {
 
     /// A mode is named if all heads have it. A range is named if it is long enough for all heads.
     #[test]
-    fn settings_are_named_only_if_they_suit_all_heads() {
+    fn alternative_settings_are_named_only_if_they_suit_all_heads() {
         let head = |finer: &str, longer_m: f64| HeadSettings {
             name: String::new(),
             finer: Some(ModeName::new(finer)),

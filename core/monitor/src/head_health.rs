@@ -1,4 +1,4 @@
-//! Head health: whether a turning head detects the wall at all. The returns decide.
+//! Head health: whether a turning head detects the wall at all, as judged from its returns.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,17 +6,16 @@ use headrace_geometry::math::{self, TAU};
 
 /// Angle without a return after which a head is deaf, radians: a whole turn.
 ///
-/// Absorbing walls and side tunnels cover less than a turn.
+/// Absorbing walls and side tunnels suppress returns over less than a turn.
 const DEAF_RAD: f64 = TAU;
-/// Averaging angle for the share of returns that are off the design, radians.
+/// Averaging angle for the share of returns that are away from the design wall, radians.
 const ELSEWHERE_RAD: f64 = TAU / 2.0;
 /// A head is stuck if it returns a constant range over this angle, radians, while the deviation from the
 /// design varies by this much, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
-/// Share of returns off the design above which a head is deaf, and limit for the share of another head.
-///
-/// The first limit applies only if another head's share is below the second.
+/// Upper and lower share of returns away from the design wall. A head is deaf if its share is above the first
+/// value while another head's is below the second.
 const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 
 /// Health of a head; part of the loop's state.
@@ -26,11 +25,11 @@ pub struct HeadHealth {
     last_rad: f64,
     /// Angle turned since the last return, radians.
     unheard_rad: f64,
-    /// Angle turned with returns, radians; at most a turn.
+    /// Angle turned while returns came, radians; at most a turn.
     heard_rad: f64,
-    /// Share of the latest returns that are off the design.
+    /// Share of the latest returns that are away from the design wall.
     elsewhere: f64,
-    /// Successive returns with the same range.
+    /// Latest successive returns with the same range.
     same: SameRange,
 }
 
@@ -38,9 +37,9 @@ pub struct HeadHealth {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct SameRange {
     range_m: f64,
-    /// Angle turned during these returns, radians.
+    /// Angle that the head turned during these returns, radians.
     turned_rad: f64,
-    /// Least and largest deviation from the design during these returns, m.
+    /// Smallest and largest deviation from the design wall during these returns, m.
     off_m: [f64; 2],
 }
 
@@ -57,18 +56,18 @@ impl SameRange {
         };
     }
 
-    /// Whether the range is constant over half a turn although the wall's distance varies.
+    /// Whether the reported range is constant over half a turn although the wall's distance varies.
     fn is_stuck(&self) -> bool {
         self.turned_rad >= STUCK_RAD && self.off_m[1] - self.off_m[0] > STUCK_M
     }
 }
 
-/// A return of a head.
+/// A return of a head, compared with the design.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heard {
     /// Range that the head reports, m.
     pub range_m: f64,
-    /// Deviation of the return's place from the design, m.
+    /// Deviation of the return's place from the design wall, m.
     pub off_m: f64,
     /// Whether the return agrees with the design.
     pub is_wall: bool,
@@ -86,7 +85,7 @@ impl HeadHealth {
             return;
         };
         if self.hears_nothing() {
-            // After deafness all averages start again.
+            // When deafness ends, all averages start again.
             *self = Self { last_rad: angle_rad, ..Self::default() };
         }
         self.unheard_rad = 0.0;
@@ -114,7 +113,7 @@ impl HeadHealth {
             || self.elsewhere > most && others.any(|elsewhere| elsewhere < least)
     }
 
-    /// Share of the head's latest returns that are off the design, from 0 to 1.
+    /// Share of the head's latest returns that are away from the design wall, from 0 to 1.
     ///
     /// The share is 1 until a whole turn gave returns, and again after a whole turn without any.
     pub fn elsewhere(&self) -> f64 {
@@ -129,7 +128,8 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// Health of a head after this many pings, each of which detects the wall, something else, or nothing.
+    /// Health of a head after this many pings, each of which detects the wall, something other than the wall,
+    /// or nothing.
     fn hearing(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> HeadHealth {
         let mut hearing = HeadHealth::default();
         for ping in 0..pings {
@@ -145,7 +145,7 @@ mod tests {
         let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
-        // A single return ends deafness.
+        // A single return ends the head's deafness.
         let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
         // Three quarters of each turn give no return, as beside a side tunnel or an absorbing wall.
@@ -166,13 +166,13 @@ mod tests {
         assert!(!hears.is_deaf([hears.elsewhere()].into_iter()));
         let begins = hearing(100, |_| Some(true));
         assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "the other head isn't known yet");
-        // A rock or a niche over a third of the turn.
+        // A rock or a niche occupies a third of the turn.
         let rock = hearing(4000, |ping| Some(ping % 400 >= 130));
         assert!(!rock.is_deaf([hears.elsewhere()].into_iter()));
     }
 
     #[test]
-    fn constant_range_is_stuck_if_the_wall_distance_varies() {
+    fn head_with_constant_range_is_stuck_if_the_wall_distance_varies() {
         let stuck = |pings: u32, spread_m: f64| {
             let mut hearing = HeadHealth::default();
             for ping in 0..pings {
@@ -183,7 +183,8 @@ mod tests {
             hearing.is_deaf(std::iter::empty())
         };
         assert!(stuck(202, 0.4) && !stuck(199, 0.4));
-        // The wall's distance varies by less than the limit: in the centre of a round pipe, and near it.
+        // The wall's distance varies by less than the limit if the head is in the centre of a round pipe, or
+        // near it.
         assert!(!stuck(4000, 0.0) && !stuck(4000, 0.2));
     }
 }

@@ -12,20 +12,21 @@ const SAME_ANGLE_RAD: f64 = 1e-6;
 /// Minimum angle over which the turn rate is measured, radians. Until the head has turned that far, the whole
 /// angle so far is used.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
-/// Multiple of the usual step above which a step counts as several: pings were skipped.
+/// Multiple of the usual step between pings. A longer step counts as several steps, because pings were
+/// skipped.
 const LONG_STEP: f64 = 1.5;
 
-/// Multiples of the usual step, and of the angle expected at the turn rate, beyond which a head has restarted
-/// elsewhere.
+/// Multiples of the usual step, and of the angle expected at the turn rate. A step that exceeds both shows
+/// that the head has restarted at another angle.
 ///
-/// A head that has fallen behind its programmed angle takes steps of at most eight times its own.
+/// A head that lags behind its programmed angle catches up in steps of at most eight times the usual step.
 const ELSEWHERE_STEPS: f64 = 10.0;
 const ELSEWHERE_RATES: f64 = 4.0;
 
 /// Duration of a stall or silence after which the measurement of the turn rate restarts.
 const STANDING: DurNs = DurNs(1_000_000_000);
 
-/// Classification of a ping by the head's motion.
+/// Classification of a ping by the head's motion since the previous ping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turned {
     /// Whether the head has moved a single step since the previous ping.
@@ -48,7 +49,7 @@ pub struct MeasuredMotion {
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,
-    /// Total unsigned angle turned through, radians, and the two points from which the rate is measured.
+    /// Total unsigned angle turned through, radians. The rate is measured between two points, `anchors`.
     turned_rad: f64,
     anchors: [Option<(MonoNs, f64)>; 2],
     step_rad: Option<f64>,
@@ -91,7 +92,7 @@ impl MeasuredMotion {
         let step = math::wrap_signed(angle_rad - before, TAU);
         let size = step.abs();
         if size < SAME_ANGLE_RAD {
-            // The head has not turned, so `last` and the rate are unchanged.
+            // The head has not turned, so `last` and the turn rate are unchanged.
             let standing = at.since(last).as_secs_f64() > self.stands_after_s();
             return Turned { single_step: false, new_sweep: false, standing };
         }
@@ -140,14 +141,14 @@ impl MeasuredMotion {
         by_far || long && silence.0.abs() > STANDING.0
     }
 
-    /// Time at the same angle after which a head counts as stalled, seconds: four ping periods.
+    /// Time at the same angle after which a head counts as stalled, seconds. It is four ping periods.
     fn stands_after_s(&self) -> f64 {
         let ping_period_s = self.step_rad.zip(self.rate_radps()).map(|(step, rate)| step / rate.abs());
         ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)
     }
 
-    /// Keeps two anchors half a turn apart. The older one thus lies between half a turn and a whole turn
-    /// back.
+    /// Keeps the two anchors of the rate measurement half a turn apart. The older anchor thus lies between
+    /// half a turn and a whole turn back.
     fn move_anchors(&mut self, at: MonoNs) {
         match self.anchors {
             [Some((_, older)), None] if self.turned_rad - older >= RATE_SPAN_RAD => {
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn head_in_a_sector_reverses_at_its_ends() {
+    fn head_that_sweeps_a_sector_reverses_at_the_sector_ends() {
         let (track, turned) = run((0..500).map(|k| {
             let phase = f64::from(k % 200);
             if phase <= 100.0 { phase * 0.9 } else { (200.0 - phase) * 0.9 }
@@ -219,7 +220,7 @@ mod tests {
     }
 
     /// After a restart, or after somebody has turned the head by hand, earlier pings are no longer used. The
-    /// angle between the two places doesn't count as turned.
+    /// angle between the old and the new position doesn't count as turned.
     #[test]
     fn head_restart_at_a_distant_angle_does_not_count_as_turning() {
         for gap_ms in [20, 60, 1500, 60_000] {

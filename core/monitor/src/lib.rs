@@ -62,6 +62,8 @@ pub mod resources;
 pub mod result_stream;
 pub mod ring;
 pub mod run;
+pub mod section_judgement;
+pub mod section_row;
 pub mod smoothing_changes;
 pub mod source;
 pub mod stage;

@@ -31,90 +31,91 @@ pub enum LiveMessage {
     /// Sections were missed. If a run continues with another cause, the message is repeated from the first
     /// section with that cause.
     Flag {
-        /// Number of the run.
+        /// Number of the run of flagged sections.
         run: u32,
         /// Beginning of the stretch with this cause, m.
         from_m: f64,
-        /// Main cause.
+        /// Main cause of the miss.
         cause: Cause,
-        /// All causes.
+        /// All causes of the miss.
         causes: Causes,
         /// Figures for the text of the message.
         #[serde(skip)]
         missed: Missed,
     },
-    /// End of the last flagged run is known.
+    /// The end of the most recently flagged run is known.
     FlagEnds {
-        /// Number of the run.
+        /// Number of the run of flagged sections.
         run: u32,
-        /// Beginning.
+        /// Beginning of the run.
         from_m: f64,
-        /// End.
+        /// End of the run.
         to_m: f64,
         /// Metres of the run that fail.
         failed_m: f64,
     },
-    /// A missed stretch was passed again, and none of its sections fails any more.
+    /// The vehicle has driven through a missed stretch again, and none of its sections fails any more.
     Cleared {
         /// Number of the run that was flagged.
         run: u32,
-        /// Beginning.
+        /// Beginning of the cleared stretch.
         from_m: f64,
-        /// End.
+        /// End of the cleared stretch.
         to_m: f64,
     },
     /// A stretch without a verdict has begun.
     CannotSay(UnsureStretch),
-    /// End of a stretch without a verdict is known.
+    /// The end of a stretch without a verdict is known.
     CannotSayEnds(UnsureStretch),
-    /// Not all heads have passed the place where the vehicle began or turned back, and the vehicle is now
+    /// Some heads have not been at the place where the vehicle began or turned back, and the vehicle is now
     /// well away from it.
     NotInspected(UnsureStretch),
     /// An alert has changed.
     AlertChange {
-        /// Kind of change.
+        /// Kind of the alert's change.
         change: AlertChange,
-        /// The alert as it was at that time.
+        /// The alert as it was at the time of the change.
         alert: Box<ListedAlertJson>,
     },
     /// A note was added.
     Note(NoteJson),
-    /// Present coverage extent.
+    /// The coverage extent at present, with its metres by verdict.
     Way {
-        /// Beginning.
+        /// Beginning of the extent.
         from_m: f64,
-        /// End.
+        /// End of the extent.
         to_m: f64,
-        /// Metres by verdict.
+        /// Metres of the extent by verdict.
         metres: LiveMetres,
     },
 }
 
 /// Converts the loop's notices to live messages.
 ///
-/// A dive has one of these, and all its readers share the messages.
+/// A dive has one converter. All readers share its messages.
 #[derive(Debug, Default)]
 pub struct LiveMessages {
-    /// Last flagged run with its reported causes, until its end is reported.
+    /// Most recently flagged run with its reported causes, until its end is reported.
     run: Option<(RunId, Causes)>,
     /// Stretches reported as missed, as long as any of their sections fails.
     missed: Vec<ReportedMiss>,
     /// Last reported unsure stretch, until its end is reported.
     unsure: Option<Stretch>,
-    /// Whether that stretch was reported as one in which the error matters more than the hole.
+    /// Whether the unsure stretch was reported as one in which the error matters more than the hole.
     told_as_error: bool,
-    /// Stretches whose ends were reported.
+    /// Unsure stretches whose ends were reported.
     told: Vec<Stretch>,
-    /// Sections at an end of the coverage extent, kept until the vehicle is well away from them.
+    /// Sections at an end of the coverage extent. Their message is held back until the vehicle is well away
+    /// from them.
     at_ends: Option<Stretch>,
-    /// Last reported doubtful setting, and the number of its alert.
+    /// Number of the alert for the last reported doubtful setting, and that setting.
     setting: Option<(u32, SettingDoubt)>,
     way_told: Option<MonoNs>,
     /// End of the last tick whose messages were reported.
     played: Option<MonoNs>,
 }
 
-/// Sections reported as missed: from the first one that ever failed to the one after the last.
+/// A reported miss: index of the first section that ever failed, and index after the last one.
 #[derive(Debug, Clone, Copy)]
 struct ReportedMiss {
     run: RunId,
@@ -129,7 +130,8 @@ impl ReportedMiss {
 }
 
 impl LiveMessages {
-    /// Resets all state if the playback has stopped at another time than that of the last tick, after a jump.
+    /// Resets all state after a jump of the playback, which is recognised by a time other than the end of the
+    /// last tick.
     ///
     /// After a mere pause, the messages continue.
     pub fn stopped(&mut self, now: MonoNs) {
@@ -138,7 +140,7 @@ impl LiveMessages {
         }
     }
 
-    /// Processes a notice, and calls `tell` with the messages that follow from it.
+    /// Processes a notice, and calls `tell` with the messages that result.
     pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         match notice {
             Notice::Advice(_) => {}
@@ -158,7 +160,7 @@ impl LiveMessages {
         }
     }
 
-    /// Reports whatever the live state requires, after every tick.
+    /// Reports any messages that the live state requires, after every tick.
     pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         self.played = Some(dive.now());
         let Some(at) = state.at else { return };
@@ -172,7 +174,7 @@ impl LiveMessages {
             let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
             tell(LiveMessage::Way { from_m, to_m, metres: state.metres });
         }
-        // Diameter of a circle with the same perimeter.
+        // Diameter of the circle whose perimeter equals the tunnel's.
         let width_m = 2.0 * dive.mission().profile.perimeter_m() / TAU;
         if let (Some(ends), Some(x_m)) = (self.at_ends, state.chainage_m) {
             let off_m = (sections.bounds_m(ends.from).0 - x_m).max(x_m - sections.bounds_m(ends.to).0);
@@ -188,7 +190,8 @@ impl LiveMessages {
         self.close_unsure(sections, tell);
     }
 
-    /// Reports that another setting is doubtful than before. The alert goes on, so that there is no notice.
+    /// Reports that the doubtful setting has changed to another one. The alert stays active, so no notice
+    /// reports this change.
     fn tell_other_setting(&mut self, at: MonoNs, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let doubted = dive.view().alert_list().iter().rev().find_map(|alert| match alert.figures {
             Figures::Setting(doubt, _) if alert.state == AlertState::Active => Some((alert, doubt)),
@@ -204,7 +207,7 @@ impl LiveMessages {
 
     fn tell_ends(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(ends) = self.at_ends.take() else { return };
-        // Some sections may have been inspected since.
+        // Some of the sections at an end may have been inspected in the meantime.
         let still = (ends.from..ends.to).filter_map(|index| sections.unsure(index));
         let mut still = still.filter(|here| here.why == Unsure::NotInspected);
         let Some(mut all) = still.next() else { return };
@@ -219,7 +222,8 @@ impl LiveMessages {
 
     fn note_unsure(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let section_m = sections.section_m();
-        // A section at an end of the coverage extent is reported later, if it is still unsure then.
+        // A section at an end of the coverage extent is reported later, if it is still without a verdict
+        // then.
         let is_settled = sections.get(section).is_some_and(|section| section.settled);
         let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
         let Some(here) = sections.unsure(section).filter(lasts) else {
@@ -248,7 +252,7 @@ impl LiveMessages {
         if let Some(last) = &mut self.unsure
             && (is_told(last) || last.join(&here, section_m))
         {
-            // The first sections of a stretch may have a different reason than most of its sections.
+            // The first sections of an unsure stretch may have a different reason than most of its sections.
             if self.told_as_error && !last.is_mostly_error() {
                 self.told_as_error = false;
                 tell(LiveMessage::CannotSay(UnsureStretch::of(last, sections)));
@@ -267,9 +271,10 @@ impl LiveMessages {
         }
     }
 
-    /// Reports the end of the last flagged run once a section beyond the run has a verdict other than fail.
+    /// Reports the end of the most recently flagged run once a section beyond the run has a verdict other
+    /// than fail.
     fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
-        // An open section may still join the run.
+        // An open section, which may still get samples, may still join the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|(id, _)| sections.runs().get(id));
@@ -290,7 +295,7 @@ impl LiveMessages {
         let sections = &dive.view().coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
         match change {
-            // A part of a reported stretch is no new stretch.
+            // A run within a reported stretch is not a new stretch.
             RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
             RunChange::Raised => {
                 self.close_run(sections, tell);
@@ -326,7 +331,8 @@ impl LiveMessages {
         self.missed.push(whole);
     }
 
-    /// Reports the end of a missed stretch as it was reported, and then its parts without a verdict.
+    /// Reports that a missed stretch is cleared, with the bounds reported before. Then reports its parts
+    /// without a verdict.
     fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
         let Some(told) = self.missed.get(at).copied() else { return };
@@ -366,7 +372,7 @@ fn alert_change(change: AlertChange, alert: &ListedAlert, at: MonoNs, dive: &Loo
     LiveMessage::AlertChange { change, alert: Box::new(alert.json(&dive.view().surroundings(), at)) }
 }
 
-/// The stretch with the present state of its sections, but with the ends that were reported.
+/// The reported unsure stretch with the present state of its sections, but with the ends that were reported.
 ///
 /// If no section is unsure any more, returns the stretch as it was reported.
 fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
@@ -375,7 +381,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     let Some(mut now) = each.next() else { return *told };
     (now.from, now.to) = (told.from, told.to);
     for here in each {
-        // All sections are within these bounds.
+        // The bounds already include all sections, so joining them succeeds.
         if !now.join(&here, sections.section_m()) {
             break;
         }
@@ -383,7 +389,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     now
 }
 
-/// Message for a run, beginning at one of its sections.
+/// Message that reports a run as missed, beginning at one of its sections.
 fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> LiveMessage {
     let sections = &dive.view().coverage().sections;
     let from_m = sections.bounds_m(section).0;
@@ -393,7 +399,7 @@ fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) ->
         back_to_m: sections.back_to_m(from_m),
         figures: evidence.into(),
         hole_arc_m: hole.arc_m,
-        target_m: sections.target_m(),
+        target_m: sections.target().max_hole_m,
         v_max_mps: dive.view().live_state().v_max_mps().unwrap_or(0.0),
     };
     LiveMessage::Flag { run: id.0, from_m, cause: evidence.cause, causes: evidence.causes, missed }
@@ -408,7 +414,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pause_keeps_reported_stretches_and_jump_drops_them() {
+    fn playback_pause_keeps_reported_stretches_and_playback_jump_drops_them() {
         let missed = ReportedMiss { run: RunId(1), from: 0, to: 4 };
         let mut messages =
             LiveMessages { missed: vec![missed], played: Some(MonoNs(5)), ..LiveMessages::default() };

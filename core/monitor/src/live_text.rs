@@ -11,23 +11,23 @@ use headrace_coverage::Verdict;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
-/// A line for the pilot.
+/// A line of text for the pilot.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PilotLine {
     /// Place: one stationing, or two for a stretch.
     pub place: String,
-    /// Speed; empty if it isn't shown.
+    /// Speed of the vehicle; empty if it isn't shown.
     pub speed: String,
     /// Parts of the problem, most important part first. A narrow screen leaves out the last parts.
     pub what: Vec<String>,
     /// Action to take; empty if there is none.
     pub action: String,
-    /// Colour, if any.
+    /// Colour of the line, if any.
     pub lamp: Option<Lamp>,
 }
 
 impl PilotLine {
-    /// The whole line.
+    /// The whole line as text.
     pub fn text(&self) -> String {
         let mut text = format!("{:<9}  ", self.place);
         if !self.speed.is_empty() {
@@ -42,8 +42,8 @@ impl PilotLine {
         text
     }
 
-    /// The line broken to at most `columns`. Continuation lines are indented to where the text of the first
-    /// line begins.
+    /// The pilot's line, broken into lines of at most `columns` characters. Continuation lines are indented
+    /// to the beginning of the first line's text.
     pub fn broken(&self, columns: usize) -> Vec<String> {
         let whole = self.text();
         if whole.chars().count() <= columns {
@@ -67,7 +67,7 @@ impl PilotLine {
         lines
     }
 
-    /// As much of a status as fits into `columns`.
+    /// As much of a status line as fits into `columns` characters.
     ///
     /// The last parts are left out first, then the speed, then the reason if there is an action. A line that
     /// is still too long is cut off.
@@ -77,11 +77,11 @@ impl PilotLine {
         while is_wide(&line) && line.what.len() > 1 {
             line.what.pop();
         }
-        // The condition matters more than the speed.
+        // The condition matters more to the pilot than the speed.
         if is_wide(&line) {
             line.speed.clear();
         }
-        // The action matters more than the reason.
+        // The action matters more to the pilot than the reason.
         if is_wide(&line)
             && !line.action.is_empty()
             && let Some(what) = line.what.first_mut()
@@ -105,14 +105,14 @@ pub fn status_line(
 ) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
-    // Slightly over the limit, within the measurement error, the condition is `Good`.
+    // If the speed exceeds the limit by less than the measurement error, the condition is `Good`.
     let is_over = matches!(condition, Condition::TooFast | Condition::Over | Condition::TurnUnsure);
     let decimals = if is_over { speed_decimals(state.speed_mps, state.v_max_mps()) } else { 2 };
     let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
     let what = condition_text(condition, state, &v_max, (profile, heads));
     let action = match condition {
         _ if state.asks_to_stand() => format!("{STAND_STILL} {} s", state.stand_s),
-        // The text states v_max already.
+        // The text of the condition states v_max already.
         Condition::Good => String::new(),
         _ => condition_words(condition).action_text(&v_max),
     };
@@ -154,7 +154,7 @@ pub fn status_line(
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }
 
-/// Condition with its explanation. `v_max` is v_max with its unit.
+/// Text of a condition with its explanation. `v_max` is the text of v_max with its unit.
 fn condition_text(
     condition: Condition,
     state: &LiveState,
@@ -174,7 +174,7 @@ fn condition_text(
         Condition::NoSpeed => no_speed_text(state, profile, heads),
         Condition::TurnFails | Condition::TurnUnsure => turn_text(words.name, state),
         Condition::CannotSay(PositionDoubt::Spread) => {
-            format!("{}: position ±{:.2} m", words.name, state.confidence_sd * state.pass_sd_m)
+            format!("{}: position ±{:.2} m", words.name, state.target.error_m(state.pass_sd_m))
         }
         Condition::Good => format!("ok up to {v_max}"),
         Condition::NoData
@@ -186,7 +186,7 @@ fn condition_text(
     }
 }
 
-/// Number of decimals with which the present speed and the limit read differently.
+/// Number of decimals needed to tell the present speed from the limit.
 ///
 /// A speed that reads like the limit would not seem too fast.
 fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
@@ -225,11 +225,11 @@ fn losses_text(state: &LiveState) -> Option<String> {
     state.lost_share().map(|share| format!("{:.0} % of returns lost", 100.0 * share))
 }
 
-/// Forecast T of the present turn, and the target.
+/// Text of the spacing T forecast for the present turn, and of the target.
 fn forecast_text(state: &LiveState) -> Option<String> {
     let advice = state.advice.as_ref().filter(|_| state.v_max_mps().is_some())?;
     Some(match advice.predicted_t_m {
-        Some(t_m) => format!("turn {t_m:.2} m (limit {:.2})", state.target_m),
+        Some(t_m) => format!("turn {t_m:.2} m (limit {:.2})", state.target.max_hole_m),
         None => "turn: unseen wall".to_owned(),
     })
 }
@@ -249,12 +249,13 @@ pub fn metres_text(metres: &LiveMetres) -> String {
     core::iter::once(passed).chain(parts).collect::<Vec<_>>().join(", ")
 }
 
-/// Length of a part of a stretch, m, as text. The text is empty if the part is empty or the whole stretch.
+/// Length of a part of a stretch, m, as text such as ", 1.25 m of it". The text is empty if the part is empty
+/// or the whole stretch.
 pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
     if part_m <= 0.0 || part_m > whole_m - 1e-6 { String::new() } else { format!(", {part_m:.2} m of it") }
 }
 
-/// Line for a live message.
+/// Line of text for a live message.
 pub fn message_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescriptions) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,
@@ -329,9 +330,9 @@ fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
 }
 
 impl LiveMessage {
-    /// Whether the message's line adds something to the status and the other lines.
+    /// Whether the message's line tells the pilot something that the status line and the other lines don't.
     ///
-    /// Of the changes of alerts, these add something: acknowledgements, remaining resources, doubts about
+    /// Among changes of alerts, these add something: acknowledgements, remaining resources, doubts about
     /// sensors, settings and the dive as a whole, and ends that no other line shows.
     pub fn adds_line(&self) -> bool {
         let Self::AlertChange { change, alert } = self else { return true };

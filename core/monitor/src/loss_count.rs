@@ -7,21 +7,21 @@ use super::head_health::{HeadHealth, Heard};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::losses::LossRate;
 
-/// Number of angle bins. A bin is finer than the step of any head.
+/// Number of angle bins per turn. A bin is finer than the step of any head.
 const BINS: usize = 2048;
 const WORDS: usize = BINS / 64;
-/// Number of pings at which the counts are halved.
+/// Number of pings at which the counts are halved, so that old pings lose weight.
 const WINDOW: u32 = 4096;
-/// Minimum number of pings for a share. With fewer, a single loss would count too much.
+/// Minimum divisor, in pings, of a loss share. With fewer pings, a single loss would count too much.
 const LEAST: u32 = 100;
-/// Weight of the overall share of losses in the share of losses after a lost ping, in pings. It matters while
-/// lost pings are few.
+/// Weight of the overall loss share, in pings, in the estimate of the loss share after a lost ping. It
+/// matters while few pings are lost.
 const USUAL: f64 = 50.0;
 /// Share of lost pings above which a head is nearly deaf. Hardly any angle then gives a return in two
 /// successive turns.
 const NEARLY_ALL: f64 = 0.75;
 
-/// Number of pings, and how many of them were lost.
+/// Number of pings, and how many of them gave no return.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Count {
     all: u32,
@@ -42,7 +42,7 @@ impl Count {
     }
 }
 
-/// One bit per angle.
+/// One bit per angle bin.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Angles([u64; WORDS]);
 
@@ -59,17 +59,17 @@ impl Angles {
     }
 }
 
-/// Losses of one head; part of the loop's state.
+/// Returns that one head loses by chance; part of the loop's state.
 ///
 /// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
 /// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such returns are not lost by
-/// chance, neither the first nor the last of them.
+/// chance, and none of them is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
     /// Whether the wall was detected at each angle in the last turn, and in the turn before that.
     heard: Angles,
     heard_before: Angles,
-    /// Whether the ping before the last one at each angle was lost.
+    /// For each angle: whether the ping just before the last ping at that angle was lost.
     followed_lost: Angles,
     /// Counts of all pings at wall within range, of the counted pings, and of the counted pings that followed
     /// a lost ping.
@@ -91,7 +91,8 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping a turn ago is counted: the wall was detected before and after it.
+            // The ping a turn ago counts, because the head detected the wall at this angle both before and
+            // after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {
@@ -121,7 +122,7 @@ impl LossCount {
         &self.hearing
     }
 
-    /// Upper bound of the random losses. All losses count until enough pings have been counted.
+    /// Upper bound of the rate of random losses. All lost pings count until enough pings have been counted.
     pub fn at_most(&self) -> LossRate {
         if self.by_chance.all >= LEAST {
             self.rate()
@@ -130,7 +131,7 @@ impl LossCount {
         }
     }
 
-    /// Shares of returns lost by chance. For a nearly deaf head all losses count.
+    /// Rate at which returns are lost by chance. For a nearly deaf head all lost pings count.
     pub fn rate(&self) -> LossRate {
         let deaf = ((self.any.share() - NEARLY_ALL) / (1.0 - NEARLY_ALL)).max(0.0);
         let share = self.by_chance.share();
@@ -146,7 +147,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// Counts of a head that turns for this many pings and loses those for which `is_lost` holds.
+    /// Loss rate of a head that turns for this many pings and loses those for which `is_lost` holds.
     fn turned(pings: u32, is_lost: impl Fn(u32) -> bool) -> LossRate {
         let mut count = LossCount::default();
         for ping in 0..pings {
@@ -186,8 +187,8 @@ mod tests {
             assert!((share - expected).abs() < 0.03, "{in_hundred}: {share}");
             assert!((after_lost - expected).abs() < 0.08, "{in_hundred}: {after_lost}");
         }
-        // Losses come in pairs. After the first loss of a pair the next ping is lost, too; after the second
-        // the usual rate applies.
+        // Losses come in pairs: the ping after the first loss of a pair is lost, too. After the second loss,
+        // the usual loss rate applies again.
         let pairs = turned(24_000, |ping| chance(ping / 2, 10));
         assert!((pairs.share - 0.1).abs() < 0.03 && (pairs.after_lost - 0.55).abs() < 0.1, "{pairs:?}");
     }
@@ -201,19 +202,19 @@ mod tests {
             }
             count.at_most()
         };
-        // 280 of the 400 pings of a turn are detected. An angle counts from its third detection on.
+        // In each turn, 280 of the 400 pings detect the wall. An angle counts from its third detection on.
         let early = at_most(0..1000);
         assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
         assert_eq!(at_most(1000..1100), LossRate::default());
     }
 
     #[test]
-    fn wall_without_returns_in_successive_turns_is_no_random_loss() {
+    fn losses_at_one_angle_in_successive_turns_are_not_random() {
         let grazing = turned(8000, |ping| ping % 400 < 120);
         assert!(grazing.share <= 0.0, "{grazing:?}");
         let both = turned(8000, |ping| ping % 400 < 120 || chance(ping, 5));
         assert!((both.share - 0.05).abs() < 0.02, "{both:?}");
-        // Side tunnels, each passed for three turns.
+        // Pings at side tunnels give no return. Each side tunnel is in view for three turns.
         let tunnels = turned(24_000, |ping| ping / 400 % 6 > 2 && ping % 400 < 60);
         assert!(tunnels.share <= 0.0, "{tunnels:?}");
     }
@@ -222,7 +223,7 @@ mod tests {
     fn loss_rate_of_a_deaf_head_exceeds_90_percent() {
         let deaf = turned(24_000, |ping| ping >= 4000);
         assert!(deaf.share > 0.9 && deaf.after_lost > 0.9, "{deaf:?}");
-        // A few losses in the second turn hardly count.
+        // The few losses in the second turn hardly change the rate.
         assert!(turned(410, |ping| ping >= 405).share < 0.03);
         assert_eq!(turned(300, |_| false), LossRate::default());
     }

@@ -8,10 +8,10 @@ use headrace_sensor::reading::{MAX_SOURCES, Packet, SourceId};
 
 /// Maximum number of packets per tick. Further packets wait for the next tick.
 pub const MAX_TICK_PACKETS: usize = 4096;
-/// Maximum bytes per tick.
+/// Maximum bytes of packets per tick.
 pub const MAX_TICK_BYTES: usize = 256 * 1024;
 
-/// Packets of this tick, in the order of consumption.
+/// Packets of the current tick, in the order of consumption.
 #[derive(Debug, Default, Resource)]
 pub struct Inbox {
     packets: Vec<Received>,
@@ -29,22 +29,22 @@ struct Received {
 }
 
 impl Inbox {
-    /// An inbox with room for any tick. Allocates: all memory of the lists.
+    /// Creates a packet list with room for a tick of any size. Allocates: all memory of the lists.
     pub(super) fn with_room() -> Self {
         Self {
             packets: Vec::with_capacity(MAX_TICK_PACKETS),
             bytes: Vec::with_capacity(MAX_TICK_BYTES),
-            // One for each sensor, and one for the console.
+            // One header slot for each sensor, and one for the console.
             heads: Vec::with_capacity(MAX_SOURCES + 1),
         }
     }
 
-    /// Number of bytes of the packets.
+    /// Total size of the packets, bytes.
     pub(super) fn byte_len(&self) -> usize {
         self.bytes.len()
     }
 
-    /// Packets in order.
+    /// Packets of the tick, in order.
     pub fn iter(&self) -> impl Iterator<Item = (SourceId, Packet<'_>)> {
         self.packets.iter().map(|packet| {
             let bytes = self.bytes.get(packet.from..packet.to).unwrap_or_default();
@@ -52,12 +52,12 @@ impl Inbox {
         })
     }
 
-    /// Number of packets.
+    /// Number of packets of the tick.
     pub fn len(&self) -> usize {
         self.packets.len()
     }
 
-    /// Whether there are no packets.
+    /// Whether the tick has no packets.
     pub fn is_empty(&self) -> bool {
         self.packets.is_empty()
     }
@@ -69,7 +69,7 @@ impl Inbox {
         self.packets.clear();
         self.bytes.clear();
         self.heads.clear();
-        // A ring is looked at again only when its first packet has been taken.
+        // A ring is looked at again only once its first packet has been taken.
         self.heads.extend(readers.iter().map(PortReader::peek));
         let limit = allowance_bytes.min(MAX_TICK_BYTES);
         while self.packets.len() < MAX_TICK_PACKETS {
@@ -92,7 +92,7 @@ impl Inbox {
     }
 }
 
-/// Source with the earliest next packet.
+/// The source whose next packet is the earliest.
 fn first(heads: &[Option<PacketHeader>]) -> Option<(u16, PacketHeader)> {
     (0_u16..)
         .zip(heads)
@@ -116,7 +116,7 @@ mod tests {
     }
 
     proptest! {
-        /// The order is the same wherever the stream is cut into ticks.
+        /// The packet order is the same wherever the stream is cut into ticks.
         #[test]
         fn packet_order_does_not_depend_on_ticks(
             packets in proptest::collection::vec((0u64..200, 0u16..4), 1..80),

@@ -16,28 +16,29 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SourceId};
 
 /// A reading with its source and times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Source of the reading.
+    /// Source that delivered the reading.
     pub source: SourceId,
     /// Receive time of the reading's packet.
     pub received: MonoNs,
     /// Time for which the reading is valid.
     pub valid_at: MonoNs,
-    /// Value.
+    /// Value of the reading.
     pub reading: Reading,
 }
 
-/// Doubts that navigation reports at an update.
+/// Doubts about sensors and settings that navigation reports at an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Doubts {
     /// Doubt about the cable counter; `None` while the counter is trusted.
     pub cable: Option<CableDoubt>,
-    /// Setting that is likely wrong.
+    /// Vehicle file setting that is likely wrong.
     pub setting: Option<SettingDoubt>,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s.
     pub stand_s: u32,
@@ -52,33 +53,25 @@ pub enum Outcome {
     Sample {
         /// End point of the beam.
         point: Point3<Tunnel>,
-        /// Its arc length, m.
+        /// Arc length of the end point, m.
         arc_m: f64,
     },
-    /// No sample, for this reason. The aim is the point at which the beam meets the design, if it is known.
-    Lost(Loss, Option<Aim>),
-    /// A return without a fix, with the reason for the missing fix.
+    /// No sample, for this reason. The aim is the point at which the beam meets the design profile, if it is
+    /// known.
+    Lost(Loss, Option<WallPoint>),
+    /// A return that can't be placed, with the reason for the missing fix.
     Unplaced(NoFix),
 }
 
-/// Whether the vehicle occludes a beam, by the geometry of the vehicle.
+/// Whether the vehicle occludes a beam, according to the vehicle's geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Hidden {
-    /// Not occluded.
+    /// The beam is not occluded.
     No,
     /// The beam passes close to the vehicle. A return is possible.
     Beside,
-    /// Occluded.
+    /// The beam is occluded.
     Yes,
-}
-
-/// Point at which a beam meets the design profile.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Aim {
-    /// Chainage, m.
-    pub x_m: f64,
-    /// Arc length, m.
-    pub arc_m: f64,
 }
 
 /// A georeferenced ping.
@@ -90,13 +83,13 @@ pub struct PlacedPing {
     pub received: MonoNs,
     /// Time of validity of the ping.
     pub valid_at: MonoNs,
-    /// Fix at that time.
+    /// Fix at the ping's time of validity.
     pub fix: Option<Fix>,
     /// Chainages at which the head places samples at this attitude; `None` without a fix.
     pub reach: Option<Reach>,
     /// Whether the head has moved a single step since its previous ping.
     pub single_step: bool,
-    /// Whether a new sweep has begun.
+    /// Whether a new sweep of the head has begun with this ping.
     pub new_sweep: bool,
     /// Whether the head is stalled.
     pub standing: bool,
@@ -108,38 +101,39 @@ pub struct PlacedPing {
     pub hidden: Hidden,
     /// Longest range at the head's setting, m.
     pub longest_m: f64,
-    /// Source of the packet.
+    /// Source of the ping's packet.
     pub source: SourceId,
     /// Position of the head; `None` without a fix.
     pub origin: Option<Point3<Tunnel>>,
 }
 
-/// Situation at an update, a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD).
+/// Situation at an advice update, which takes place at every multiple of
+/// [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Update {
     /// Time of the update.
     pub at: MonoNs,
-    /// Vehicle and heads at that time.
+    /// Situation of the vehicle and its heads at the update.
     pub situation: Situation,
-    /// Doubts of navigation.
+    /// Doubts that navigation reports.
     pub doubts: Doubts,
-    /// Fix, or the reason for which there is none.
+    /// Fix at the update, or the reason for which there is none.
     pub fix: Result<Fix, NoFix>,
-    /// Standard deviations of the pose.
+    /// Standard deviations of the vehicle's pose.
     pub sd: Option<PoseSd>,
 }
 
-/// A ping or an update, placed in the tunnel.
+/// A ping or an advice update, placed in the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "the list is filled once and read once per tick")]
 pub enum Placement {
-    /// A ping.
+    /// A placed ping.
     Ping(PlacedPing),
-    /// An update.
+    /// An advice update.
     Update(Update),
 }
 
-/// A placement and its place among the tick's readings.
+/// A placed ping or update, and its position among the tick's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedItem {
     /// Index of the ping's reading. For an update: index of the first reading after it.
@@ -153,47 +147,48 @@ pub struct PlacedItem {
 pub struct Standing {
     /// Metres of the coverage extent by verdict.
     pub metres: LiveMetres,
-    /// Last judged unsure stretch.
+    /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
-    /// Whether all wall that the heads see here has passed.
+    /// Whether every part of the wall visible to the heads here has the verdict pass.
     pub passed: bool,
-    /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
+    /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
+    /// way there.
     pub back_to_m: Option<f64>,
-    /// Observations that hold.
+    /// Observations about the dive that hold at the update.
     pub(crate) observations: ActiveObservations,
 }
 
-/// A result for the outlets.
+/// A result that outlets are notified of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "copied into preallocated room; a box would allocate")]
 pub enum Notice {
     /// A section's verdict, hole or flag has changed.
     Section {
-        /// Index of the section.
+        /// Index of the changed section.
         section: i64,
-        /// Timestamp, in data time.
+        /// Time of the change, in data time.
         at: MonoNs,
-        /// Kind of change.
+        /// Kind of the section's change.
         change: Judgement,
     },
     /// A run of flagged sections has changed.
     Run {
-        /// Its number.
+        /// Number of the run.
         id: RunId,
-        /// Timestamp, in data time.
+        /// Time of the change, in data time.
         at: MonoNs,
-        /// Kind of change.
+        /// Kind of the run's change.
         change: RunChange,
     },
-    /// Speed advice.
+    /// Speed advice at an update.
     Advice(AdviceEntry),
     /// An alert of the list has changed.
     Listed {
-        /// Kind of change.
+        /// Kind of the alert's change.
         change: AlertChange,
-        /// Timestamp, in data time.
+        /// Time of the change, in data time.
         at: MonoNs,
-        /// The alert as it was at that time.
+        /// The alert as it was at the time of the change.
         alert: ListedAlert,
     },
     /// A note was added.

@@ -22,21 +22,21 @@ pub struct Spoken {
 /// A note, or a mark without a text.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Note {
-    /// Number from 1.
+    /// Number of the note, from 1.
     pub number: u32,
-    /// Time.
+    /// Time of the note.
     pub at: MonoNs,
-    /// Author.
+    /// Author of the note.
     pub by: Who,
-    /// Text; empty for a mark.
+    /// Text of the note; empty for a mark.
     pub text: NoteText,
     /// Recording of a voice note, which has no text.
     pub voice: Option<Spoken>,
-    /// Place of the vehicle at the last update, m; `None` without a position.
+    /// Chainage of the vehicle at the last update, m; `None` without a position.
     pub chainage_m: Option<f64>,
 }
 
-/// All notes.
+/// All notes of a dive.
 #[derive(Debug, Resource)]
 pub struct Notes {
     notes: Vec<Note>,
@@ -46,7 +46,7 @@ pub struct Notes {
 stateful!(Notes { state: taken; lists: notes; });
 
 impl Default for Notes {
-    /// Allocates: at startup, all memory of the list.
+    /// Creates an empty list of notes. Allocates: at startup, all memory of the list.
     fn default() -> Self {
         Self { notes: Vec::with_capacity(MOST_NOTES), taken: 0 }
     }

@@ -12,7 +12,8 @@ use super::messages::Notice;
 use super::outlet::Outlet;
 use super::view::DiveView;
 
-/// Copies every notice into a queue. If the queue is full, the oldest notice is dropped and counted.
+/// Outlet that copies every notice into a queue. If the queue is full, the oldest notice is dropped and
+/// counted.
 pub struct NoticeOutlet {
     queue: Arc<Shared>,
 }

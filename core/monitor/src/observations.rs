@@ -11,20 +11,20 @@ use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_sensor::reading::SourceId;
 
-/// Kind of observation. The numbers are recorded in logs.
+/// Kind of observation about the dive as a whole. The numbers are recorded in logs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum ObservedKind {
     /// Samples fall beyond either end of the tunnel.
     OutsideTunnel,
     /// Most samples of a section deviate from the design profile by more than the contradiction limit.
     ProfileContradicted,
-    /// Successive returns of a head disagree: they are noise.
+    /// Successive returns of a head disagree, so they are noise.
     HeadScattered,
     /// A head's range stays constant although it must change at the vehicle's place.
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
-    /// The cable counter differs from the inertial unit or from a velocity log: one of them is wrong.
+    /// The cable counter differs from the inertial unit or from a velocity log, so one of them is wrong.
     CableDoubted,
     /// Ranges contradict a setting of the vehicle file.
     SettingDoubted,
@@ -37,7 +37,7 @@ const HEAD_KINDS: usize = 3;
 pub(crate) const MOST_OBSERVATIONS: usize = ObservedKind::ALL.len() + 1 - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
 
 impl ObservedKind {
-    /// All kinds.
+    /// All kinds of observations.
     pub(crate) const ALL: [Self; 7] = [
         Self::OutsideTunnel,
         Self::ProfileContradicted,
@@ -48,7 +48,7 @@ impl ObservedKind {
         Self::SettingDoubted,
     ];
 
-    /// Observation of a distrusted head, and its figure, m.
+    /// Observation about a distrusted head, and the figure that led to the distrust, m.
     pub(crate) fn of_distrust(why: Distrust) -> (Self, f64) {
         match why {
             Distrust::Scattered(jump_m) => (Self::HeadScattered, jump_m),
@@ -58,13 +58,22 @@ impl ObservedKind {
     }
 }
 
+/// An occurrence of an observation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Occurrence {
+    /// Chainage, m.
+    pub x_m: f64,
+    /// Deviation, m; see [`Occurrences::worst_m`].
+    pub off_m: f64,
+}
+
 /// Occurrences of an observation over the whole dive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Occurrences {
     /// Number of occurrences.
     ///
     /// An occurrence is a sample outside the tunnel, a judgement of a contradicting section, the beginning of
-    /// distrust in a head or the cable counter, or another doubtful setting.
+    /// distrust in a head or the cable counter, or a change of the doubtful setting.
     pub count: u64,
     /// Chainage of the first occurrence, m.
     pub first_m: f64,
@@ -76,27 +85,27 @@ pub struct Occurrences {
     pub worst_m: f64,
 }
 
-/// An observation with its occurrences.
+/// An observation with its occurrences so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Observation {
     pub(crate) kind: ObservedKind,
     /// The distrusted head, or the velocity log that the cable counter differs from.
     pub(crate) source: Option<SourceId>,
-    /// Time at which the latest occurrence began.
+    /// Time at which the latest occurrence of the observation began.
     pub(crate) latest: MonoNs,
     pub(crate) occurrences: Occurrences,
-    /// Doubtful setting, as last judged.
+    /// Doubtful setting, as judged most recently.
     setting: Option<SettingDoubt>,
 }
 
-/// All observations of a dive.
+/// All observations of a dive, by kind and head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub(crate) struct Observations([Option<Observation>; MOST_OBSERVATIONS]);
 
 impl Observations {
-    /// Records an occurrence at a chainage with its deviation, m. Returns true for the first one.
-    pub(crate) fn note(&mut self, kind: ObservedKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
-        self.note_of(None, kind, at, x_m, off_m)
+    /// Records an occurrence of an observation. Returns true for the first occurrence.
+    pub(crate) fn note(&mut self, kind: ObservedKind, at: MonoNs, occurrence: Occurrence) -> bool {
+        self.note_of(None, kind, at, occurrence)
     }
 
     /// Records an occurrence that concerns a head, or the velocity log that the cable counter differs from.
@@ -107,8 +116,7 @@ impl Observations {
         source: Option<SourceId>,
         kind: ObservedKind,
         at: MonoNs,
-        x_m: f64,
-        off_m: f64,
+        Occurrence { x_m, off_m }: Occurrence,
     ) -> bool {
         let is_it = |known: &Observation| known.kind == kind && known.source == source;
         let Some(slot) = self.0.iter_mut().find(|slot| slot.as_ref().is_none_or(is_it)) else { return false };
@@ -126,33 +134,32 @@ impl Observations {
     /// Records a lasting occurrence that began at `since`. Later calls for the same occurrence don't count
     /// again.
     ///
-    /// Returns true when the first occurrence is first recorded.
+    /// Returns true only when the first occurrence is recorded.
     pub(crate) fn note_lasting(
         &mut self,
         source: Option<SourceId>,
         kind: ObservedKind,
         since: MonoNs,
-        x_m: f64,
-        off_m: f64,
+        occurrence: Occurrence,
     ) -> bool {
         match self.get_mut(kind, source) {
             Some(known) if known.latest == since => {
-                known.occurrences.worst_m = known.occurrences.worst_m.max(off_m);
+                known.occurrences.worst_m = known.occurrences.worst_m.max(occurrence.off_m);
                 false
             }
-            _ => self.note_of(source, kind, since, x_m, off_m),
+            _ => self.note_of(source, kind, since, occurrence),
         }
     }
 
     /// Records a doubtful setting, found at a chainage, m.
     ///
-    /// If another setting becomes the likeliest, counts an occurrence and returns true.
+    /// If another setting becomes the one that is most likely wrong, counts an occurrence and returns true.
     pub(crate) fn note_setting(&mut self, at: MonoNs, x_m: f64, doubt: &SettingDoubt) -> bool {
         let kind = ObservedKind::SettingDoubted;
         let known = self.get_mut(kind, None).and_then(|known| known.setting);
         let is_new = known.is_none_or(|known| !known.is_of_same(doubt));
         if is_new {
-            self.note(kind, at, x_m, 0.0);
+            self.note(kind, at, Occurrence { x_m, off_m: 0.0 });
         }
         if let Some(known) = self.get_mut(kind, None) {
             known.setting = Some(*doubt);
@@ -164,7 +171,7 @@ impl Observations {
         self.0.iter_mut().flatten().find(|known| known.kind == kind && known.source == source)
     }
 
-    /// All observations.
+    /// All observations made so far.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Observation> {
         self.0.iter().flatten()
     }

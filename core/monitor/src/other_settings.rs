@@ -1,4 +1,4 @@
-//! Effect of other head settings: a finer step or a longer range.
+//! Predicted effect of alternative head settings: a finer step or a longer range.
 //!
 //! With either, a turn takes longer. The prediction of a section's hole allows for that.
 
@@ -16,7 +16,7 @@ use headrace_sampling::spacing::speed_for_target_mps;
 use headrace_sensor::device::Device;
 use headrace_vehicle::Mission;
 
-/// Longest range setting tried, m. Settings are tried in whole metres.
+/// Longest range setting that the search tries, m. Settings are tried in whole metres.
 const LONGEST_M: u32 = 200;
 /// Steps that differ by at most this angle count as equal, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
@@ -44,8 +44,8 @@ impl HeadSpecification {
         }
     }
 
-    /// Among the modes with a finer step, the one that allows the fastest speed. If none meets the target:
-    /// the finest one.
+    /// Among the scan modes with a finer step, the one that allows the highest speed. If none meets the
+    /// target: the finest one.
     ///
     /// `t_y_m` converts a step of the head, radians, to the step along the wall, m.
     fn finer(&self, target_m: f64, t_y_m: impl Fn(f64) -> f64) -> Option<&HeadMode> {
@@ -61,7 +61,8 @@ impl HeadSpecification {
         fastest.map(|(mode, _)| mode).or_else(finest)
     }
 
-    /// Wall as seen with the vehicle level in the tunnel's centre; `None` if the head is outside then.
+    /// Wall as seen by the head with the vehicle level in the tunnel's centre; `None` if the head is outside
+    /// the profile then.
     fn ring_in_the_middle(&self, profile: &Profile, rays: u32) -> Option<Ring> {
         let [y, z] = profile.reference();
         let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -69,7 +70,8 @@ impl HeadSpecification {
     }
 }
 
-/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the modes at that setting.
+/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's scan modes at
+/// that setting.
 ///
 /// The setting is the head's own or a longer one. `None` if no setting reaches all wall.
 fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(f64, Vec<HeadMode>)> {
@@ -84,7 +86,8 @@ fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(
     longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
-/// Largest ratios among the heads: the head with the largest change decides for the vehicle.
+/// Largest ratios of step and turn period, alternative to present setting. The head with the largest change
+/// decides for the vehicle.
 pub(super) fn of_heads(world: &mut World, profile: &Profile, target_m: f64) -> OtherSettings {
     let mut heads = world.query::<&HeadSpecification>();
     let farthest_m = profile.farthest_m(profile.reference());
@@ -104,8 +107,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    // The steps assume perpendicular beams. The samples of the trial show whether the mode is also fine
-    // enough in corners.
+    // The steps computed above assume perpendicular beams. The samples of the trial show whether the mode is
+    // also fine enough in corners.
     let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),
@@ -143,14 +146,14 @@ mod tests {
     }
 
     #[test]
-    fn mode_with_the_fastest_speed_is_chosen_with_its_turn_period() {
+    fn predicted_turn_period_is_that_of_the_mode_allowing_the_highest_speed() {
         // At 6 m from the wall, 0.9 degrees are 0.094 m, and 0.6 degrees are 0.063 m.
         let at = |target_m: f64| of_head(&head(2.4, None), 6.0, target_m);
         let roomy = at(0.2);
         assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
         let close = at(0.1);
         assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
-        // No mode meets the target, so the finest one is chosen.
+        // No mode meets the target, so the mode with the finest step is chosen.
         assert_eq!(at(0.01), close);
         let finest = of_head(&head(0.6, None), 6.0, 0.2);
         assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));
@@ -168,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn longer_range_has_the_turn_period_of_its_mode() {
+    fn longer_range_uses_the_turn_period_of_the_mode_at_that_range() {
         let far = vec![mode("fast", 0.9, 10.0), mode("fastest", 2.4, 6.0)];
         assert!((of_head(&head(2.4, Some((12.0, far.clone()))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
         assert!((of_head(&head(0.9, Some((12.0, far))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);

@@ -1,4 +1,4 @@
-//! Alternatives: verdicts on the samples of a dive for other targets and section lengths.
+//! Verdicts that the samples of a dive would have for other targets and section lengths.
 
 use headrace_coverage::Verdict;
 use serde::Serialize;
@@ -8,24 +8,24 @@ use super::run::Loop;
 /// Metres by verdict, for another target or another section length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OtherTargetReport {
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
     /// Metres of sections that would pass.
     pub pass_m: f64,
-    /// Metres that would fail.
+    /// Metres of sections that would fail.
     pub fail_m: f64,
-    /// Metres undecided within the error of the hole.
+    /// Metres of sections that would be undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// Metres that would still be open.
+    /// Metres of sections that would still be open.
     pub open_m: f64,
-    /// Metres that not all heads would have passed.
+    /// Metres of sections where some heads would not have been.
     pub not_inspected_m: f64,
 }
 
 impl Loop {
-    /// Present verdicts for another target, as section index and verdict.
+    /// Verdicts that the sections would have at present for another target, as section index and verdict.
     ///
     /// Only sections whose hole has been measured are included.
     pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {

@@ -1,4 +1,4 @@
-//! Outlets: readers of each tick's results, such as a recorder.
+//! Outlets: readers of each tick's results, such as a log recorder.
 
 use super::view::DiveView;
 
@@ -6,8 +6,9 @@ use super::view::DiveView;
 pub trait Outlet: Send {
     /// Publishes the results of the last tick.
     ///
-    /// Returns the number of bytes of packets that the next tick may consume: [`MAX_TICK_BYTES`] if the outlet
-    /// has room for any tick. With several outlets the least number counts. Must not allocate.
+    /// Returns the number of bytes of packets that the next tick may consume: [`MAX_TICK_BYTES`] if the
+    /// outlet has room for a tick of any size. With several outlets the least number counts. Must not
+    /// allocate.
     ///
     /// [`MAX_TICK_BYTES`]: super::merge::MAX_TICK_BYTES
     fn publish(&mut self, dive: &DiveView<'_>) -> usize;

@@ -17,13 +17,13 @@ use headrace_fusion::NoFix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::Reason;
 
-/// First lines of the file.
+/// First lines of the generated TypeScript file.
 const HEADER: &str =
     "// Words for the codes of the feed. Generated from core/monitor/src/words.rs; renew it with
 // HEADRACE_RENEW_WORDS=1 cargo test -p headrace_tests --test page words
 ";
 
-/// All conditions, with any figures.
+/// One example of each condition, with arbitrary figures.
 const CONDITIONS: [Condition; 14] = [
     Condition::NoData,
     Condition::Old(DurNs(0)),
@@ -53,7 +53,7 @@ const SENSOR_STATES: [SensorState; 7] = [
 const PRIORITIES: [Priority; 4] =
     [Priority::EmergencyAlarm, Priority::Alarm, Priority::Warning, Priority::Caution];
 
-/// Text of the file.
+/// Text of the TypeScript file.
 pub fn table() -> String {
     let conditions = CONDITIONS.map(|condition| (condition.as_str(), condition_object(condition)));
     let mut positions = entries(NoFix::ALL, NoFix::as_str, missing_words);
@@ -83,7 +83,7 @@ pub fn table() -> String {
     .concat()
 }
 
-/// Code and literal of each value.
+/// Code and TypeScript literal of each enum value.
 fn entries<T: Copy, const N: usize>(
     all: [T; N],
     code: fn(T) -> &'static str,
@@ -109,7 +109,7 @@ fn note_words(voice: Option<Spoken>) -> String {
     NoteJson::from(&Note { number: 1, at: MonoNs(0), by, text, voice, chainage_m: None }).words()
 }
 
-/// Constant object with a value for each code.
+/// TypeScript constant: an object with a word for each code.
 fn object(name: &str, comment: &str, entries: &[(&str, String)]) -> String {
     let lines: Vec<String> = entries.iter().map(|(code, value)| format!("  {code}: {value},\n")).collect();
     format!("\n/** {comment}. */\nexport const {name} = {{\n{}}} as const;\n", lines.concat())
@@ -119,7 +119,7 @@ fn constant(name: &str, comment: &str, words: &str) -> String {
     format!("\n/** {comment}. */\nexport const {name} = {};\n", quoted(words))
 }
 
-/// A text as a literal, which is the same in Rust and TypeScript for texts without control characters.
+/// A text as a string literal, which is the same in Rust and TypeScript for texts without control characters.
 fn quoted(text: &str) -> String {
     format!("{text:?}")
 }

@@ -19,19 +19,19 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 pub struct Part<S> {
     pub(super) world: World,
     stages: Vec<Systems<S>>,
-    /// Entities whose components are state, in snapshot order.
+    /// Entities whose components are part of the saved state, in snapshot order.
     pub(super) entities: Vec<Entity>,
     state: Vec<StateKind>,
 }
 
-/// Systems of a stage.
+/// Systems of a stage, with their schedule.
 struct Systems<S> {
     stage: S,
     schedule: Schedule,
     is_empty: bool,
 }
 
-/// A kind of state: name, type of the resource or component, and functions to save and restore it.
+/// A kind of saved state: name, type of the resource or component, and functions to save and restore it.
 struct StateKind {
     kind: TypeId,
     name: &'static str,
@@ -77,7 +77,7 @@ impl<S: Stage> Part<S> {
         });
     }
 
-    /// Makes a component of the entities state.
+    /// Registers a component of the entities as state, which snapshots contain.
     pub(super) fn add_component_state<T: Component<Mutability = Mutable> + Stateful>(
         &mut self,
         name: &'static str,
@@ -106,7 +106,7 @@ impl<S: Stage> Part<S> {
         self.schedule(stage).add_systems(systems.in_set(Order::Within));
     }
 
-    /// Adds systems that run when a stage has finished, such as measurements of it.
+    /// Adds systems that run when a stage has finished, such as systems that measure its run time.
     pub fn add_systems_after<M>(&mut self, stage: S, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
         self.schedule(stage).add_systems(systems.in_set(Order::After));
     }
@@ -124,7 +124,7 @@ impl<S: Stage> Part<S> {
         &mut systems.schedule
     }
 
-    /// Builds the schedules.
+    /// Builds the schedules, and runs them once without input, because the first run allocates.
     ///
     /// Errors: the order of two systems that share data is ambiguous.
     pub(super) fn initialize(&mut self) -> Result<(), PluginError> {
@@ -133,19 +133,21 @@ impl<S: Stage> Part<S> {
             let built = schedule.initialize(world);
             let why = |error| PluginError::Schedule { why: format!("stage {stage:?}: {error:?}") };
             built.map(|_| ()).map_err(why)
-        })
+        })?;
+        S::ALL.iter().for_each(|stage| self.run(*stage));
+        Ok(())
     }
 
     /// Runs the systems of a stage.
     pub(super) fn run(&mut self, stage: S) {
         let Self { world, stages, .. } = self;
-        // An empty schedule takes time, too.
+        // Empty schedules are skipped, because running them takes time, too.
         if let Some(systems) = stages.iter_mut().find(|other| other.stage == stage && !other.is_empty) {
             systems.schedule.run(world);
         }
     }
 
-    /// Saves the state.
+    /// Saves the state to a snapshot.
     pub(super) fn save(&self, to: &mut Saver) {
         for state in &self.state {
             to.part(state.name);
@@ -153,9 +155,9 @@ impl<S: Stage> Part<S> {
         }
     }
 
-    /// Restores the state.
+    /// Restores the state from a snapshot.
     ///
-    /// Errors: the snapshot is of another vehicle or version.
+    /// Errors: the snapshot comes from another vehicle or version.
     pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
         let Self { world, entities, state, .. } = self;
         state.iter().try_for_each(|state| {
@@ -167,9 +169,10 @@ impl<S: Stage> Part<S> {
 
 #[cfg(test)]
 impl<S: Stage> Part<S> {
-    /// Panics unless resources and components of the entities are either state or among the given types.
+    /// Panics unless each resource and each component of the entities is either state or among the given
+    /// types.
     ///
-    /// The given types must be constant since arming, or set in each tick.
+    /// The given types must be constant after arming, or set anew in each tick.
     pub(super) fn has_state_but_for(&self, others: &[TypeId]) {
         let mut bare = World::new();
         schedule().run(&mut bare);
@@ -189,7 +192,7 @@ impl<S: Stage> Part<S> {
     }
 }
 
-/// Empty schedule: single-threaded, with an ambiguous order of systems as an error.
+/// Empty, single-threaded schedule that reports an ambiguous order of systems as an error.
 fn schedule() -> Schedule {
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());

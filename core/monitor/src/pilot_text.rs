@@ -5,7 +5,7 @@
 
 use super::advice_log::AdviceEntry;
 use super::head_descriptions::HeadDescriptions;
-use super::observations::ObservedKind;
+use super::observations::{ObservedKind, Occurrence};
 use super::words::{condition_words, limit_words};
 use crate::live_state::condition::Condition;
 use crate::live_state::state::LEAST_MPS;
@@ -33,12 +33,12 @@ pub fn clock_text(profile: &Profile, arc_m: f64) -> String {
     clock.strip_suffix(":00").map_or(clock.clone(), |hour| format!("{hour} o'clock"))
 }
 
-/// Figures from the evidence of a fail, for the text of its causes.
+/// Figures from the evidence of a failed section, for the text of its causes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CauseFigures {
-    /// Causes that explain the fail together.
+    /// Causes that together explain the failed section.
     pub causes: Causes,
-    /// Speed along the tunnel, m/s.
+    /// Speed of the vehicle along the tunnel, m/s.
     pub speed_mps: f64,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
@@ -46,7 +46,7 @@ pub struct CauseFigures {
     pub middle_t_y_m: f64,
     /// Share of pings that gave no return.
     pub missing_share: f64,
-    /// Advice for passing the stretch again, with the heads as scheduled.
+    /// Speed advice for passing the stretch again, with the heads as scheduled.
     pub again: Again,
     /// Distance that the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
@@ -64,8 +64,8 @@ impl From<&Evidence> for CauseFigures {
 }
 
 impl CauseFigures {
-    /// Figures of a run. For each cause that the text names, the figures come from the section that
-    /// represents the cause.
+    /// Figures of a run of failed sections. For each cause that the text names, the figures come from the
+    /// section that represents the cause.
     pub fn of_run(sections: &Sections, run: &Run) -> Option<Self> {
         let causes = run.named();
         let main = Self::from(&sections.evidence_of(run, run.cause)?);
@@ -78,7 +78,7 @@ impl CauseFigures {
         Some(figures)
     }
 
-    /// Copies the figures that a cause's text needs from the evidence.
+    /// Copies from the evidence the figures that a cause's text needs.
     fn take(&mut self, cause: Cause, from: &Evidence) {
         match cause {
             Cause::TooFast | Cause::Phase => self.speed_mps = from.speed_mps,
@@ -98,8 +98,8 @@ impl CauseFigures {
 
     /// Speed for passing the stretch again, m/s. `v_max_mps` is the speed advised now.
     ///
-    /// If the heads have to be mended or set first, it is the stretch's own speed with the heads as
-    /// scheduled. Otherwise it is the lower of that speed and `v_max_mps`.
+    /// If the heads have to be mended or set first, it is the speed computed for the stretch with the heads
+    /// as scheduled. Otherwise it is the lower of that speed and `v_max_mps`.
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
         let mended =
             [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];
@@ -113,12 +113,12 @@ impl CauseFigures {
         }
     }
 
-    /// Actions against the causes.
+    /// Actions against the causes of the miss.
     pub fn actions(&self) -> Vec<Action> {
         Action::against(self.causes.iter(), self.again.is_beyond_speed)
     }
 
-    /// Main cause.
+    /// Main cause of the miss.
     pub fn cause(&self) -> Cause {
         self.causes.iter().next().unwrap_or(Cause::Unknown)
     }
@@ -157,8 +157,8 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions
 /// Text of the actions for a missed stretch, as in [`action_text`]. If there are several actions, the first
 /// two are named.
 ///
-/// An action that is needed before the vehicle goes back comes first. The action "slower" is given by the
-/// speed.
+/// An action that is needed before the vehicle goes back comes first. The action "slower" is expressed by the
+/// stated speed.
 pub fn actions_text(
     actions: &[Action],
     back_to_m: f64,
@@ -169,7 +169,7 @@ pub fn actions_text(
     if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
         two.reverse();
     }
-    // The stated speed covers this action, or the first action states that slower won't help.
+    // Either the stated speed covers this action, or the first action already states that slower won't help.
     if let [first, Action::Slower] = two.as_slice()
         && (at_most_mps > 0.0 || matches!(first, Action::FinerMode | Action::HigherGain))
     {
@@ -180,7 +180,7 @@ pub fn actions_text(
     others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second, heads)))
 }
 
-/// Text of an action that follows another one.
+/// Text of an action that follows another action in a sentence.
 fn short_text(action: Action, heads: &HeadDescriptions) -> String {
     let text = match action {
         Action::Slower => "slower",
@@ -204,17 +204,18 @@ fn short_text(action: Action, heads: &HeadDescriptions) -> String {
 pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadDescriptions) -> String {
     let back = format!("go back to {}", station(back_to_m));
     let text = match action {
-        // No speed is stated: it would apply to the present mode and range setting only.
+        // No speed is stated, because the known speed applies only to the present mode and range setting.
         Action::FinerMode => return format!("slower won't help: {}, then {back}", heads.set_finer()),
         Action::LongerRange => return format!("set {}, then {back}", heads.longer_range()),
-        // A speed is stated because it helps in other parts of the stretch.
+        // A speed is stated, because a lower speed helps in other parts of the stretch.
         Action::HigherGain if at_most_mps > 0.0 => format!("{back}, then with a higher gain,"),
         Action::HigherGain => return "slower won't help, a higher gain may".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
-        // The exact speed is stated: below it, heads apart along the hull are out of phase again.
+        // The exact speed is stated, because below it heads at different places along the hull are out of
+        // phase again.
         Action::InPhase if at_most_mps > 0.0 => {
             return format!("{back}, then with the heads in phase, at {at_most_mps:.2} m/s");
         }
@@ -271,27 +272,27 @@ pub(super) fn speed_text(what: &str, mps: f64) -> String {
     if mps > 0.0 { format!("{what} {mps:.2} m/s") } else { String::new() }
 }
 
-/// Ratio of speeds above which a faster mode is displayed.
+/// Minimum ratio of a faster mode's speed to the present v_max for the mode to be displayed.
 const GAIN: f64 = 1.1;
 
-/// A missed stretch.
+/// Figures of a missed stretch, for its text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
     /// Beginning of the stretch, m.
     pub start_m: f64,
     /// Chainage to which the vehicle has to go back, m.
     pub back_to_m: f64,
-    /// Causes with their figures.
+    /// Causes of the miss with their figures.
     pub figures: CauseFigures,
     /// Arc length of the stretch's largest hole, m.
     pub hole_arc_m: f64,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Speed advised now, m/s; zero if none is advised.
     pub v_max_mps: f64,
 }
 
-/// Text of a flag: location, cause and action.
+/// Text of a missed stretch: location, cause and action.
 pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadDescriptions) -> String {
     let Missed { start_m, back_to_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
     format!(
@@ -303,23 +304,22 @@ pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadDescriptions) -
     )
 }
 
-/// Text for a stretch that was passed again and is no longer flagged.
+/// Text for a stretch that the vehicle has driven through again and that is no longer flagged.
 pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an observation that a log has in `judgements`; `None` if no kind has this number.
+/// Text of an observation that a log has in `judgements`; `None` if no kind of observation has this number.
 ///
-/// `x_m` is the chainage, m; `off_m` the deviation, m; `head` the head or velocity log, if it names one.
-pub fn recorded_observation_text(kind: u64, head: &str, x_m: f64, off_m: f64) -> Option<String> {
+/// `head` is the head or velocity log, if the observation names one.
+pub fn recorded_observation_text(kind: u64, head: &str, occurrence: Occurrence) -> Option<String> {
     let kind = ObservedKind::ALL.into_iter().find(|known| *known as u64 == kind)?;
-    Some(observation_text(kind, head, x_m, off_m))
+    Some(observation_text(kind, head, occurrence))
 }
 
-/// Text of an observation at a chainage, m. `off_m` is the deviation, m; `head` is the head or velocity log,
-/// if the observation names one.
-pub(super) fn observation_text(kind: ObservedKind, head: &str, x_m: f64, off_m: f64) -> String {
-    let x = station(x_m);
+/// Text of an observation. `head` is the head or velocity log, if the observation names one.
+pub(super) fn observation_text(kind: ObservedKind, head: &str, occurrence: Occurrence) -> String {
+    let (x, off_m) = (station(occurrence.x_m), occurrence.off_m);
     match kind {
         ObservedKind::OutsideTunnel => {
             format!("ch {x}  samples {off_m:.2} m outside the tunnel: check the tether's zero")
@@ -376,13 +376,13 @@ pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String
 /// Figures for the text of an advice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceFigures {
-    /// Present speed, m/s.
+    /// Present speed of the vehicle, m/s.
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s; zero if there is none.
     pub v_max_mps: f64,
-    /// Limiting factor.
+    /// Factor that limits the speed.
     pub reason: Reason,
-    /// Whether the present turn will exceed the target.
+    /// Whether the present turn of the heads will exceed the target.
     pub will_exceed: bool,
     /// Phase error of the heads, radians.
     pub phase_error_rad: f64,
@@ -401,7 +401,7 @@ impl From<&AdviceEntry> for AdviceFigures {
 }
 
 impl AdviceFigures {
-    /// Figures of advice at a speed, m/s.
+    /// Figures of speed advice at the present speed, m/s.
     pub fn of(advice: &Advice, speed_mps: f64) -> Self {
         Self {
             speed_mps,
@@ -416,7 +416,7 @@ impl AdviceFigures {
     }
 }
 
-/// Text of advice, with its figures.
+/// Text of the speed advice, with its figures.
 pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadDescriptions) -> String {
     let no_speed = condition_words(Condition::NoSpeed);
     let (no_help, limit) = (no_speed.name, limit_words(advice.reason));
@@ -491,7 +491,8 @@ mod tests {
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25, &two()),
             "go back to 1+240.50, then at most 0.25 m/s; and again, rolled left, then right"
         );
-        // A speed helps in other parts of the stretch, so the text doesn't state that slower won't help.
+        // A lower speed helps in other parts of the stretch, so the text doesn't state that slower won't
+        // help.
         let lossy = [Action::HigherGain, Action::Slower];
         assert_eq!(
             actions_text(&lossy, 1240.5, 0.25, &two()),

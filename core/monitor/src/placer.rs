@@ -36,22 +36,22 @@ use sound_speed::SoundSpeed;
 /// Capacity for the readings of one tick. The shortest frame of any device has over ten bytes.
 pub(super) const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
 
-/// Part of the loop from packets to placed pings.
+/// Part of the loop that converts packets to placed pings.
 pub struct Placer {
     part: Part<PlaceStage>,
     readers: Vec<PortReader>,
 }
 
-/// Results of the placer for a tick. The other parts read nothing else of it.
+/// Results of the placer for a tick. The other parts of the loop read no other data of the placer.
 ///
-/// The lists are reused from tick to tick. Those of [`Placed::default`] grow as needed.
+/// The lists are reused from tick to tick. In a default value they grow as needed.
 #[derive(Debug, Default)]
 pub struct Placed {
-    /// Packets, in the order of consumption.
+    /// Packets of the tick, in the order of consumption.
     pub inbox: Inbox,
-    /// Readings, in order.
+    /// Readings of the tick, in order.
     pub events: Vec<Event>,
-    /// Pings and updates, in order.
+    /// Placed pings and updates of the tick, in order.
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
     pub(super) commands: Commands,
@@ -61,12 +61,12 @@ pub struct Placed {
     pub health: Vec<SensorHealth>,
     /// Traffic of the operator's input so far.
     pub(super) console: ConsoleCounts,
-    /// Poses at the updates.
+    /// Result stream of the vehicle's poses at the updates.
     pub(super) poses: ResultStream,
 }
 
 impl Placed {
-    /// Pings, in order.
+    /// Placed pings of the tick, in order.
     pub fn pings(&self) -> impl Iterator<Item = &PlacedPing> {
         self.items.iter().filter_map(|item| match &item.placement {
             Placement::Ping(ping) => Some(ping),
@@ -74,7 +74,7 @@ impl Placed {
         })
     }
 
-    /// Updates, in order.
+    /// Updates of the tick, in order.
     pub fn updates(&self) -> impl Iterator<Item = &Update> {
         self.items.iter().filter_map(|item| match &item.placement {
             Placement::Update(update) => Some(update),
@@ -93,7 +93,7 @@ impl Placed {
         spans.reduce(|(first, last), (from, to)| (first.min(from), last.max(to)))
     }
 
-    /// A tick without packets after this one.
+    /// Returns the placer's results for an empty tick that follows this tick.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut poses = self.poses.clone();
         poses.next_tick();
@@ -102,7 +102,7 @@ impl Placed {
     }
 }
 
-/// The tick's [`Placed`] in a world that reads it.
+/// Resource by which another world reads the tick's [`Placed`].
 #[derive(Debug, Default, Resource)]
 pub struct PlacedTick(pub(super) Arc<Placed>);
 
@@ -128,7 +128,7 @@ impl Placer {
             poses.0.keep();
         }
         part.insert_state("poses", poses);
-        // Placed has these lists during a tick.
+        // During a tick, these lists are swapped with those of `Placed`.
         part.insert_resource(Inbox::default());
         part.insert_resource(Events::default());
         part.insert_resource(PlacedList::default());
@@ -153,10 +153,17 @@ impl Placer {
         let Self { part, readers } = self;
         part.world.resource_mut::<Poses>().0.next_tick();
         part.world.resource_mut::<Inbox>().fill(readers, allowance_bytes);
-        for stage in PlaceStage::ALL {
-            part.run(*stage);
+        if part.world.resource::<Inbox>().is_empty() {
+            self.swap_lists(into);
+            into.events.clear();
+            into.items.clear();
+            into.commands.0.clear();
+        } else {
+            for stage in PlaceStage::ALL {
+                part.run(*stage);
+            }
+            self.swap_lists(into);
         }
-        self.swap_lists(into);
         self.report(into);
         debug_assert!(
             into.items.is_sorted_by_key(|item| item.event),
@@ -169,7 +176,7 @@ impl Placer {
         debug_assert!(into.commands.0.is_sorted_by_key(|command| command.before), "commands are in order");
     }
 
-    /// Results before the next tick, with room for any tick. Allocates: all memory of the lists.
+    /// Results before the next tick, with room for a tick of any size. Allocates: all memory of the lists.
     pub(super) fn placed_with_room(&self) -> Placed {
         let mut placed = Placed {
             inbox: Inbox::with_room(),
@@ -190,7 +197,7 @@ impl Placer {
         core::mem::swap(&mut *world.resource_mut::<Commands>(), &mut with.commands);
     }
 
-    /// Copies the state that other parts read.
+    /// Copies the state that other parts of the loop read.
     pub(super) fn report(&self, into: &mut Placed) {
         let world = &self.part.world;
         let entities = world.resource::<VehicleEntities>();
@@ -206,7 +213,7 @@ impl Placer {
         self.readers.iter().any(|reader| reader.peek().is_some())
     }
 
-    /// Copies the state of another loop's placer.
+    /// Copies the state of the placer of another loop.
     ///
     /// Errors: the other placer has other sensors or another navigation. This placer must not be used
     /// afterwards.
@@ -230,7 +237,7 @@ impl Placer {
         }
     }
 
-    /// Navigation of the vehicle.
+    /// Navigation state of the vehicle.
     pub(super) fn navigation(&self) -> &dyn Navigation {
         let vehicle = self.part.world.entity(self.part.world.resource::<VehicleEntities>().vehicle);
         #[expect(clippy::expect_used, reason = "arming adds it, and nothing removes it")]
@@ -248,7 +255,7 @@ impl Placer {
         self.part.world.resource::<SoundSpeed>().span_mps()
     }
 
-    /// A resource of a plugin.
+    /// A resource that a plugin has added.
     pub fn resource<T: Resource>(&self) -> Option<&T> {
         self.part.resource()
     }
@@ -272,9 +279,9 @@ mod tests {
     use super::*;
     use crate::entities::{Head, HiddenAngles, Mounted};
     use crate::fixtures::armed;
-    use crate::resources::{Target, TunnelDesign};
+    use crate::resources::{Plan, TunnelDesign};
 
-    /// Other resources and components are constant since arming, or set in each tick.
+    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let (placer, _) = armed().split().unwrap();
@@ -282,7 +289,7 @@ mod tests {
             TypeId::of::<Head>(),
             TypeId::of::<HiddenAngles>(),
             TypeId::of::<Mounted>(),
-            TypeId::of::<Target>(),
+            TypeId::of::<Plan>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<VehicleEntities>(),
             TypeId::of::<Commands>(),

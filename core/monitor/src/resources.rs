@@ -15,14 +15,15 @@ use headrace_geometry::site::Site;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 use headrace_sampling::layout::HeadLayout;
 
 /// The tunnel as designed, and the water in it.
 #[derive(Debug, Clone, Resource)]
 pub struct TunnelDesign {
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub profile: Profile,
-    /// Water, gravity, levels.
+    /// Water properties, gravity and levels of the site.
     pub site: Site,
     /// Length of the tunnel, m.
     pub length_m: f64,
@@ -33,7 +34,7 @@ pub struct TunnelDesign {
 }
 
 impl TunnelDesign {
-    /// Chainages that a head reaches.
+    /// Range of chainages that a head's beams reach.
     ///
     /// The samples lie in the plane across the head's axis. If the head is tilted, this plane extends over some
     /// chainage.
@@ -53,33 +54,33 @@ impl TunnelDesign {
     }
 }
 
-/// Coverage target.
+/// Target and settings by which the driving of a dive is judged.
 #[derive(Debug, Clone, Copy, Resource)]
-pub struct Target {
-    /// Target T, m.
-    pub target_m: f64,
-    /// Arrangement of the heads: phase shift or sector offset.
+pub struct Plan {
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
+    /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
     /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
-    /// Effect of other head settings.
+    /// Predicted effect of alternative head settings.
     pub(super) other: OtherSettings,
 }
 
 /// Coverage of the wall: the samples, the verdicts, and the data from which the verdicts are formed.
 #[derive(Debug, Resource)]
 pub struct Coverage {
-    /// Samples.
+    /// Samples on the wall.
     pub store: SampleStore,
-    /// Verdicts.
+    /// Sections of the tunnel with their verdicts.
     pub sections: Sections,
-    /// Chainages at which samples may still land.
+    /// Chainages at which samples of the present course may still land.
     pub frontier: Frontier,
     /// Samples by node of a square grid.
     pub soundings: Soundings,
-    /// Last judged unsure stretch.
+    /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
-    /// Latest missing samples.
+    /// Most recent missing samples: points where a sample was expected but not obtained.
     pub lacks: MissingSamples,
 }
 
@@ -102,9 +103,9 @@ impl Stateful for Finder {
 /// Result streams of the surveyor.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
-    /// Placed pings.
+    /// Result stream of the placed pings.
     pub pings: ResultStream,
-    /// Judgements.
+    /// Result stream of the section judgements.
     pub judgements: ResultStream,
 }
 
@@ -120,33 +121,33 @@ impl Digests {
 /// Counts of pings over the whole dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub struct Tally {
-    /// Samples on the wall.
+    /// Number of samples on the wall.
     pub samples: u64,
-    /// Pings without a return although the wall was within range, or without a fix.
+    /// Number of pings without a return although the wall was within range, or without a fix.
     pub missing: u64,
-    /// Pings without a return because the wall was out of range.
+    /// Number of pings without a return because the wall was out of range.
     pub out_of_range: u64,
-    /// Pings that the vehicle occluded.
+    /// Number of pings that the vehicle occluded.
     pub occluded: u64,
-    /// Returns without a fix.
+    /// Number of returns without a fix.
     pub unplaced: u64,
-    /// Returns without a fix by reason, in the order of [`NoFix::ALL`].
+    /// Number of returns without a fix by reason, in the order of [`NoFix::ALL`].
     pub lacking: [u64; NoFix::ALL.len()],
-    /// Pings without a fix, with or without a return.
+    /// Number of pings without a fix, with or without a return.
     pub without_fix: u64,
-    /// Samples outside the store's extent.
+    /// Number of samples outside the sample store's extent.
     pub outside: u64,
-    /// Samples not stored for lack of room.
+    /// Number of samples not stored for lack of room.
     pub not_stored: u64,
-    /// Returns that were not accepted as wall.
+    /// Number of returns that were not accepted as wall.
     pub doubtful: u64,
 }
 
-/// The current tick.
+/// Number and end time of the current tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TickTime {
-    /// Number from zero.
+    /// Number of the tick, from zero.
     pub index: u64,
-    /// End of the tick's time.
+    /// End time of the tick.
     pub now: MonoNs,
 }

@@ -10,7 +10,7 @@ use headrace_geometry::snapshot::stateful;
 /// Capacity of a stream per tick, words. Words beyond it are hashed, but they are not kept and count as lost.
 const MAX_TICK_WORDS: usize = 1 << 16;
 
-/// Kind of a record.
+/// Kind of a record in a result stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordKind {
     /// A ping that gave a sample.
@@ -21,9 +21,9 @@ pub enum RecordKind {
     Section = 3,
     /// A changed run of sections.
     Run = 4,
-    /// Advice.
+    /// Speed advice.
     Advice = 5,
-    /// A pose of the vehicle.
+    /// A pose of the vehicle at an update.
     Pose = 6,
     /// An update without a fix.
     NoPose = 7,
@@ -31,11 +31,11 @@ pub enum RecordKind {
     Alert = 8,
     /// A ping whose return was not accepted as wall.
     Doubtful = 9,
-    /// The live state.
+    /// The live state at an update.
     State = 10,
     /// A change of an alert of the list.
     AlertChange = 11,
-    /// A note.
+    /// A note of the crew.
     Note = 12,
     /// A voice note. The record is repeated once the note's recording is in the log.
     Voice = 13,
@@ -50,7 +50,86 @@ pub enum WordKind {
     Number,
 }
 
-/// Words of a section.
+/// Words of a sample, and of a doubtful return.
+const SAMPLE: [(&str, WordKind); 7] = [
+    ("received_ns", WordKind::Integer),
+    ("source", WordKind::Integer),
+    ("outcome", WordKind::Integer),
+    ("x_m", WordKind::Number),
+    ("y_m", WordKind::Number),
+    ("z_m", WordKind::Number),
+    ("arc_m", WordKind::Number),
+];
+/// Words of a ping without a sample.
+const NO_SAMPLE: [(&str, WordKind); 4] = [
+    ("received_ns", WordKind::Integer),
+    ("source", WordKind::Integer),
+    ("outcome", WordKind::Integer),
+    ("reason", WordKind::Integer),
+];
+/// Words of advice.
+const ADVICE: [(&str, WordKind); 11] = [
+    ("at_ns", WordKind::Integer),
+    ("v_max_mps", WordKind::Number),
+    ("reason", WordKind::Integer),
+    ("will_exceed", WordKind::Integer),
+    ("phase_error_rad", WordKind::Number),
+    ("t_y_m", WordKind::Number),
+    ("unseen_width_m", WordKind::Number),
+    ("unseen_arc_m", WordKind::Number),
+    ("remedy", WordKind::Integer),
+    ("remedy_mode", WordKind::Integer),
+    ("remedy_mode_rest", WordKind::Integer),
+];
+/// Words of a pose.
+const POSE: [(&str, WordKind); 13] = [
+    ("at_ns", WordKind::Integer),
+    ("x_m", WordKind::Number),
+    ("y_m", WordKind::Number),
+    ("z_m", WordKind::Number),
+    ("w", WordKind::Number),
+    ("i", WordKind::Number),
+    ("j", WordKind::Number),
+    ("k", WordKind::Number),
+    ("speed_mps", WordKind::Number),
+    // Present only if navigation provides standard deviations.
+    ("along_sd_m", WordKind::Number),
+    ("place_sd_m", WordKind::Number),
+    ("tilt_sd_rad", WordKind::Number),
+    ("yaw_sd_rad", WordKind::Number),
+];
+/// Words of the live state.
+const STATE: [(&str, WordKind); 19] = [
+    ("at_ns", WordKind::Integer),
+    ("position", WordKind::Integer),
+    ("chainage_m", WordKind::Number),
+    ("pass_sd_m", WordKind::Number),
+    ("stand_s", WordKind::Integer),
+    ("speed_mps", WordKind::Number),
+    ("v_max_mps", WordKind::Number),
+    ("reason", WordKind::Integer),
+    ("predicted_t_m", WordKind::Number),
+    ("pass_m", WordKind::Number),
+    ("fail_m", WordKind::Number),
+    ("cannot_say_m", WordKind::Number),
+    ("open_m", WordKind::Number),
+    ("not_inspected_m", WordKind::Number),
+    ("unsure", WordKind::Integer),
+    ("unsure_from", WordKind::Integer),
+    ("unsure_to", WordKind::Integer),
+    ("alerts", WordKind::Integer),
+    ("turning", WordKind::Integer),
+];
+/// Words of the first occurrence of an observation.
+const ALERT: [(&str, WordKind); 5] = [
+    ("at_ns", WordKind::Integer),
+    ("kind", WordKind::Integer),
+    ("x_m", WordKind::Number),
+    ("off_m", WordKind::Number),
+    // Present only if the observation names a source.
+    ("source", WordKind::Integer),
+];
+/// Names and types of the words in a judged section's record.
 const SECTION: [(&str, WordKind); 17] = [
     ("at_ns", WordKind::Integer),
     ("section", WordKind::Integer),
@@ -61,7 +140,7 @@ const SECTION: [(&str, WordKind); 17] = [
     ("cause", WordKind::Integer),
     ("hole_x_m", WordKind::Number),
     ("hole_arc_m", WordKind::Number),
-    // The words from here on are present only if the section has a cause.
+    // The following words are present only if the section has a cause.
     ("speed_mps", WordKind::Number),
     ("t_y_m", WordKind::Number),
     ("middle_t_y_m", WordKind::Number),
@@ -69,11 +148,11 @@ const SECTION: [(&str, WordKind); 17] = [
     ("swing_m", WordKind::Number),
     ("silent_heads", WordKind::Integer),
     ("causes", WordKind::Integer),
-    // Present only if lost returns need a lower speed.
+    // Present only if lost returns reduce the speed.
     ("with_losses_mps", WordKind::Number),
 ];
 
-/// Words of a change of an alert.
+/// Names and types of the words in an alert change's record.
 const ALERT_CHANGE: [(&str, WordKind); 16] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -92,7 +171,7 @@ const ALERT_CHANGE: [(&str, WordKind); 16] = [
     ("x_m", WordKind::Number),
     ("figure", WordKind::Number),
 ];
-/// Words of a voice note.
+/// Names and types of the words in a voice note's record.
 const VOICE: [(&str, WordKind); 7] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -102,7 +181,7 @@ const VOICE: [(&str, WordKind); 7] = [
     ("id", WordKind::Integer),
     ("seconds", WordKind::Integer),
 ];
-/// Words of a note. The words of its text follow.
+/// Names and types of the words in a note's record. The words of the note's text follow.
 const NOTE: [(&str, WordKind); 5] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -128,12 +207,12 @@ impl RecordKind {
         Self::Voice,
     ];
 
-    /// Kind with this number.
+    /// Record kind with this number.
     pub fn of(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| *kind as u8 == number)
     }
 
-    /// Name of the kind.
+    /// Name of the record kind.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Sample => "sample",
@@ -152,96 +231,34 @@ impl RecordKind {
         }
     }
 
-    /// Name and type of the word at `place`.
+    /// Name and type of the record's word at index `place`.
     pub fn field(self, place: usize) -> (&'static str, WordKind) {
-        use WordKind::{Integer, Number};
-        let fields: &[(&str, WordKind)] = match self {
-            Self::Sample | Self::Doubtful => &[
-                ("received_ns", Integer),
-                ("source", Integer),
-                ("outcome", Integer),
-                ("x_m", Number),
-                ("y_m", Number),
-                ("z_m", Number),
-                ("arc_m", Number),
-            ],
-            Self::NoSample => {
-                &[("received_ns", Integer), ("source", Integer), ("outcome", Integer), ("reason", Integer)]
-            }
+        // All words beyond the last field have the same name and type. They are the speeds that alternative
+        // modes allow (advice), the time of each source's last reading (live state), or the text (note).
+        let beyond = match self {
+            Self::Advice => ("alternative_v_max_mps", WordKind::Number),
+            Self::State => ("heard_ns", WordKind::Integer),
+            Self::Note => ("text", WordKind::Integer),
+            _ => ("beyond the last field", WordKind::Number),
+        };
+        self.fields().get(place).copied().unwrap_or(beyond)
+    }
+
+    fn fields(self) -> &'static [(&'static str, WordKind)] {
+        match self {
+            Self::Sample | Self::Doubtful => &SAMPLE,
+            Self::NoSample => &NO_SAMPLE,
             Self::Section => &SECTION,
-            Self::Run => &[("id", Integer), ("change", Integer)],
-            Self::Advice => &[
-                ("at_ns", Integer),
-                ("v_max_mps", Number),
-                ("reason", Integer),
-                ("will_exceed", Integer),
-                ("phase_error_rad", Number),
-                ("t_y_m", Number),
-                ("unseen_width_m", Number),
-                ("unseen_arc_m", Number),
-                ("remedy", Integer),
-                ("remedy_mode", Integer),
-                ("remedy_mode_rest", Integer),
-            ],
-            Self::Pose => &[
-                ("at_ns", Integer),
-                ("x_m", Number),
-                ("y_m", Number),
-                ("z_m", Number),
-                ("w", Number),
-                ("i", Number),
-                ("j", Number),
-                ("k", Number),
-                ("speed_mps", Number),
-                // Present only if navigation provides standard deviations.
-                ("along_sd_m", Number),
-                ("place_sd_m", Number),
-                ("tilt_sd_rad", Number),
-                ("yaw_sd_rad", Number),
-            ],
-            Self::State => &[
-                ("at_ns", Integer),
-                ("position", Integer),
-                ("chainage_m", Number),
-                ("pass_sd_m", Number),
-                ("stand_s", Integer),
-                ("speed_mps", Number),
-                ("v_max_mps", Number),
-                ("reason", Integer),
-                ("predicted_t_m", Number),
-                ("pass_m", Number),
-                ("fail_m", Number),
-                ("cannot_say_m", Number),
-                ("open_m", Number),
-                ("not_inspected_m", Number),
-                ("unsure", Integer),
-                ("unsure_from", Integer),
-                ("unsure_to", Integer),
-                ("alerts", Integer),
-                ("turning", Integer),
-            ],
-            Self::NoPose => &[("at_ns", Integer), ("reason", Integer)],
-            Self::Alert => &[
-                ("at_ns", Integer),
-                ("kind", Integer),
-                ("x_m", Number),
-                ("off_m", Number),
-                // Present only if the observation names a source.
-                ("source", Integer),
-            ],
+            Self::Run => &[("id", WordKind::Integer), ("change", WordKind::Integer)],
+            Self::Advice => &ADVICE,
+            Self::Pose => &POSE,
+            Self::State => &STATE,
+            Self::NoPose => &[("at_ns", WordKind::Integer), ("reason", WordKind::Integer)],
+            Self::Alert => &ALERT,
             Self::AlertChange => &ALERT_CHANGE,
             Self::Note => &NOTE,
             Self::Voice => &VOICE,
-        };
-        // Words beyond the last field repeat. Advice has the speeds that other modes allow. The live state
-        // has each source's last reading. A note has its text.
-        let beyond = match self {
-            Self::Advice => ("alternative_v_max_mps", Number),
-            Self::State => ("heard_ns", Integer),
-            Self::Note => ("text", Integer),
-            _ => ("beyond the last field", Number),
-        };
-        fields.get(place).copied().unwrap_or(beyond)
+        }
     }
 }
 
@@ -250,7 +267,7 @@ impl RecordKind {
 pub struct ResultStream {
     digest: Digest,
     words: Vec<u64>,
-    /// Capacity per tick, words; zero unless words are kept.
+    /// Capacity for words per tick; zero unless words are kept.
     room: usize,
     head: usize,
     records: u64,
@@ -266,7 +283,7 @@ impl ResultStream {
         self.words.reserve_exact(self.room);
     }
 
-    /// Begins a record.
+    /// Begins a record of the stream.
     pub(super) fn record(&mut self, kind: RecordKind) -> &mut Self {
         self.records += 1;
         self.head = self.words.len();
@@ -274,21 +291,21 @@ impl ResultStream {
         self
     }
 
-    /// Adds an integer.
+    /// Adds an integer to the present record.
     pub(super) fn integer(&mut self, value: u64) -> &mut Self {
         self.digest.integer(value);
         self.word(value);
         self
     }
 
-    /// Adds the bits of a number; -0 counts as +0.
+    /// Adds the bits of a number to the present record; -0 counts as +0.
     pub(super) fn number(&mut self, value: f64) -> &mut Self {
         self.digest.number(value);
         self.word((value + 0.0).to_bits());
         self
     }
 
-    /// The digest so far.
+    /// The digest of all words so far.
     pub fn value(&self) -> u64 {
         self.digest.value()
     }
@@ -308,7 +325,7 @@ impl ResultStream {
         self.lost
     }
 
-    /// Adds the first 16 bytes of a text, as two integers.
+    /// Adds the first 16 bytes of a text to the present record, as two integers.
     pub(super) fn text(&mut self, text: &str) -> &mut Self {
         let mut bytes = [0; 16];
         bytes.iter_mut().zip(text.bytes()).for_each(|(byte, of)| *byte = of);
@@ -358,20 +375,20 @@ impl ResultStream {
 /// One record of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record<'a> {
-    /// Kind; `None` if this version doesn't know it.
+    /// Kind of the record; `None` if this version doesn't know it.
     pub kind: Option<RecordKind>,
-    /// Words.
+    /// Words of the record.
     pub words: &'a [u64],
 }
 
-/// Text encoded in two words of a record.
+/// Text decoded from two words of a record.
 pub fn text_of(words: [u64; 2]) -> String {
     let bytes = words.map(u64::to_le_bytes);
     let text = bytes.as_flattened().iter().copied().take_while(|byte| *byte != 0).collect::<Vec<_>>();
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// First of a sequence of records, and the words after it.
+/// First record of a word sequence, and the words after it.
 ///
 /// `None` if there are no more words, or if the record is incomplete.
 pub fn first_record(words: &[u64]) -> Option<(Record<'_>, &[u64])> {
@@ -394,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn records_are_read_as_written() {
+    fn result_records_are_read_as_written() {
         let stream = filled();
         let (first, rest) = first_record(stream.words()).unwrap();
         assert_eq!(first, Record { kind: Some(RecordKind::Run), words: &[7, 1] });
@@ -408,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn short_text_is_kept_and_long_one_is_cut() {
+    fn short_text_is_kept_and_long_text_is_cut_in_records() {
         for (text, back) in [("", ""), ("0.3 deg", "0.3 deg"), ("a mode's long name", "a mode's long na")] {
             let mut stream = ResultStream::default();
             stream.keep();
@@ -418,7 +435,7 @@ mod tests {
         }
     }
 
-    /// The digest depends neither on whether words are kept, nor on whether there is room for them.
+    /// The digest is the same whether words are kept or not, and whether there is room for them or not.
     #[test]
     fn digest_does_not_depend_on_whether_records_are_stored() {
         let mut plain = ResultStream::default();

@@ -12,35 +12,36 @@ const HEADER_BYTES: usize = 20;
 /// Maximum packet length, bytes.
 pub const MAX_PACKET_BYTES: usize = 4096;
 
-/// Value of `order` in live packets. In replayed packets it is the order of consumption recorded in the log.
+/// Value of `order` in live packets. In replayed packets `order` is the order of consumption recorded in the
+/// log.
 pub const NO_ORDER: u64 = u64::MAX;
 
 /// Reason for which a packet was not written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RingError {
-    /// The ring is full. Try again after a tick, or count the packet as dropped.
+    /// The packet ring is full. Try again after a tick, or count the packet as dropped.
     #[error("a packet needs {needed} bytes and the ring has {free} free; try again after a tick")]
     Full {
-        /// Free bytes.
+        /// Free bytes in the ring.
         free: usize,
-        /// Bytes needed, header included.
+        /// Bytes that the packet needs, header included.
         needed: usize,
     },
     /// The packet has more than [`MAX_PACKET_BYTES`].
     #[error("writing a packet of {len} bytes: at most {MAX_PACKET_BYTES} bytes are allowed")]
     TooLong {
-        /// Length of the packet.
+        /// Length of the packet, bytes.
         len: usize,
     },
 }
 
-/// Writing end: for a port's thread, a player or a simulator.
+/// Writing end of a packet ring, used by a port's thread, a player or a simulator.
 pub struct Port<R: ByteProducer = HeapProd<u8>> {
     ring: R,
 }
 
-/// Reading end, in the loop.
+/// Reading end of a packet ring, used by the loop.
 pub(super) struct PortReader<R: ByteConsumer = HeapCons<u8>> {
     ring: R,
 }
@@ -60,7 +61,7 @@ pub(super) fn ring(capacity_bytes: usize) -> (Port, PortReader) {
 }
 
 impl<R: ByteProducer> Port<R> {
-    /// Wraps the writing end of a ring.
+    /// Makes a port from the writing end of a byte ring.
     pub(super) fn on(ring: R) -> Self {
         Self { ring }
     }
@@ -95,14 +96,14 @@ impl<R: ByteProducer> Port<R> {
         Ok(())
     }
 
-    /// Whether a packet of `len` bytes would fit now.
+    /// Whether a packet of `len` bytes would fit into the ring now.
     pub fn has_room(&self, len: usize) -> bool {
         self.ring.vacant() >= HEADER_BYTES + len
     }
 }
 
 impl<R: ByteConsumer> PortReader<R> {
-    /// Wraps the reading end of a ring.
+    /// Makes a port reader from the reading end of a byte ring.
     pub(super) fn on(ring: R) -> Self {
         Self { ring }
     }
@@ -123,7 +124,7 @@ impl<R: ByteConsumer> PortReader<R> {
         whole.then_some(PacketHeader { received: MonoNs(word(0)), order: word(8), len })
     }
 
-    /// Discards waiting packets.
+    /// Discards all waiting packets.
     pub(super) fn clear(&mut self) {
         self.ring.skip(usize::MAX);
     }
@@ -169,7 +170,7 @@ mod model_tests {
     use super::*;
     use crate::byte_ring::model::{Hasty, ModelConsumer, explore, packets_by};
 
-    /// Lengths of two packets. The ring holds one packet and the header of the other.
+    /// Lengths of two test packets, bytes. The ring holds one packet and the header of the other.
     const LENGTHS: [usize; 2] = [3, 5];
     const CAPACITY: usize = 2 * HEADER_BYTES + 5;
 

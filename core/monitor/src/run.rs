@@ -30,7 +30,7 @@ use headrace_vehicle::Mission;
 /// next batch.
 const FINISHED_AT_ONCE: usize = 256;
 
-/// The parts of a loop.
+/// The worlds and the alerter of which a loop consists.
 pub(super) struct Parts {
     pub(super) placer: Placer,
     pub(super) surveyor: Surveyor,
@@ -46,7 +46,7 @@ pub struct Loop {
     ahead: Option<(Placer, Adviser)>,
     surveyor: Surveyor,
     alerter: Alerter,
-    /// Values of the last tick.
+    /// Results of placer and adviser for the last tick.
     placed: Arc<Placed>,
     advised: Advised,
     outlets: Vec<Box<dyn Outlet>>,
@@ -77,7 +77,7 @@ impl Loop {
             ticks: 0,
             finished: false,
         };
-        // The first run of a schedule allocates memory. Without packets the run has no other effect.
+        // Outlets may allocate in the first tick. Without packets this tick has no other effect.
         armed.tick(MonoNs(0));
         armed.ticks = 0;
         armed
@@ -98,11 +98,11 @@ impl Loop {
         self.placed.inbox.len()
     }
 
-    /// Runs the parts of a tick that follow placer and adviser, and publishes the results.
+    /// Runs the parts of a tick that follow placer and adviser, and publishes their results.
     fn conclude(&mut self, now: MonoNs) {
         let Self { surveyor, alerter, placed, advised, .. } = self;
         self.time = TickTime { index: self.ticks, now };
-        // After the end of a dive, the judgements made there must not be cleared before they are published.
+        // The judgements made at the end of a dive must not be cleared before they are published.
         if !self.finished {
             surveyor.next_tick();
             alerter.next_tick();
@@ -126,7 +126,7 @@ impl Loop {
         self.outlets = outlets;
     }
 
-    /// The view of the last tick.
+    /// The view of the loop after the last tick.
     pub fn view(&self) -> DiveView<'_> {
         let Self { about, time, placed, surveyor, advised, alerter, .. } = self;
         DiveView { about, time: *time, placed, surveyor, advised, alerter }
@@ -156,7 +156,7 @@ impl Loop {
     /// previous tick.
     ///
     /// Returns false if a lagging outlet holds back the tick's packets. The call then counts as a tick
-    /// without packets. Pass the same tick again a little later.
+    /// without packets. Call again with the same tick a little later.
     pub fn tick_placed(&mut self, now: MonoNs, placed: &Arc<Placed>, advised: &mut Advised) -> bool {
         let is_taken = placed.inbox.byte_len() <= self.allowance_bytes;
         if is_taken {
@@ -187,12 +187,12 @@ impl Loop {
         &self.about.sources
     }
 
-    /// Tunnel and target.
+    /// Tunnel and coverage target.
     pub fn mission(&self) -> &Mission {
         &self.about.mission
     }
 
-    /// Names of the heads and their alternative settings.
+    /// Names of the heads, and the alternative settings that could be advised.
     pub fn head_descriptions(&self) -> &HeadDescriptions {
         &self.about.descriptions
     }
@@ -202,22 +202,22 @@ impl Loop {
         self.ticks
     }
 
-    /// Number and end of the last tick.
+    /// Number and end time of the last tick.
     pub fn time(&self) -> TickTime {
         self.time
     }
 
-    /// End of the last tick's time.
+    /// End time of the last tick.
     pub fn now(&self) -> MonoNs {
         self.time.now
     }
 
-    /// The placer, unless it is split off.
+    /// The placer, unless it is split off to another thread.
     pub fn placer(&self) -> Option<&Placer> {
         self.ahead.as_ref().map(|(placer, _)| placer)
     }
 
-    /// Fix at `at`, which may be slightly before or after the last reading.
+    /// Fix at the time `at`, which may be slightly before or after the last reading.
     ///
     /// Errors: the reason for which there is no fix.
     pub fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
@@ -238,7 +238,7 @@ impl Loop {
         self.ahead.as_ref().expect("no part of the loop is split off")
     }
 
-    /// Advice history.
+    /// Speed advice history.
     pub fn advice_log(&self) -> &AdviceLog {
         self.ahead().1.log()
     }
@@ -308,7 +308,7 @@ impl Loop {
     /// A loop of the same vehicle gives the same results after it has restored the snapshot. The snapshot
     /// excludes packets waiting in the rings, and private state of plugins.
     ///
-    /// Errors: a part is split off or can't be serialised.
+    /// Errors: placer and adviser are split off, or a value can't be serialised.
     pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
         let Some((placer, adviser)) = &self.ahead else {
             let (part, why) =
@@ -372,7 +372,10 @@ impl Loop {
     }
 }
 
-/// The value behind an `Arc`, which no other reader has between ticks unless the loop was split.
+/// Returns exclusive access to the value behind an `Arc`.
+///
+/// Between ticks no other reader holds the value, unless the loop was split. In that case, a new value
+/// replaces it.
 fn sole<'a>(placed: &'a mut Arc<Placed>, placer: &Placer) -> &'a mut Placed {
     if Arc::get_mut(placed).is_none() {
         *placed = Arc::new(placer.placed_with_room());

@@ -1,11 +1,10 @@
-//! Compares the report of a smoothed dive with the report of the same dive by the filter alone.
+//! Compares the report of a smoothed dive with the report of the same dive by the navigation filter alone.
 
-use super::report::{
-    ChangeReport, JudgedReport, MetresReport, Report, SectionReport, SmoothingReport, SummaryReport,
-};
+use super::report::{ChangeReport, JudgedReport, MetresReport, Report, SmoothingReport, SummaryReport};
+use super::section_row::SectionRow;
 
-/// Compares the filter's report with the report after smoothing `estimates` estimates in `pieces` contiguous
-/// pieces.
+/// Compares the report by the navigation filter with the report after smoothing. The smoothed trajectory has
+/// `estimates` state estimates in `pieces` contiguous pieces.
 pub fn compare(filter: &Report, smoothed: &Report, estimates: u64, pieces: u64) -> SmoothingReport {
     SmoothingReport {
         filter_digest: filter.digest.clone(),
@@ -22,15 +21,15 @@ fn metres(summary: &SummaryReport) -> MetresReport {
     MetresReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m }
 }
 
-fn judged(section: &SectionReport) -> JudgedReport {
-    let SectionReport { verdict, hole_m, hole_sd_m, .. } = *section;
-    JudgedReport { verdict, hole_m, hole_sd_m }
+fn judged(section: &SectionRow) -> JudgedReport {
+    let SectionRow { verdict, hole_m, hole_sd_m, .. } = *section;
+    JudgedReport { verdict: verdict.as_str(), hole_m, hole_sd_m }
 }
 
-/// Lists the sections whose verdict differs.
+/// Lists the sections whose verdict differs between two reports.
 ///
 /// Both inputs are in the order of chainage. Either may have sections that are missing in the other.
-fn changes(before: &[SectionReport], after: &[SectionReport]) -> Vec<ChangeReport> {
+fn changes(before: &[SectionRow], after: &[SectionRow]) -> Vec<ChangeReport> {
     let (mut before, mut after) = (before.iter().peekable(), after.iter().peekable());
     let mut changed = Vec::new();
     loop {
@@ -40,7 +39,7 @@ fn changes(before: &[SectionReport], after: &[SectionReport]) -> Vec<ChangeRepor
         let is = after.next_if(|section| section.start_m <= start_m);
         let Some(section) = was.or(is) else { return changed };
         if was.map(|section| section.verdict) != is.map(|section| section.verdict) {
-            let SectionReport { start_m, end_m, .. } = *section;
+            let SectionRow { start_m, end_m, .. } = *section;
             let [before, after] = [was, is].map(|section| section.map(judged));
             changed.push(ChangeReport { start_m, end_m, before, after });
         }

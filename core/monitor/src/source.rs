@@ -6,11 +6,11 @@ use headrace_sensor::device::Decoder;
 pub struct SourceSpec {
     /// Name of the source, and of its channel in the log.
     pub id: String,
-    /// Kind of device.
+    /// Kind of device that the source is.
     pub plugin: String,
-    /// Connection as written in the vehicle file.
+    /// Connection of the source, as written in the vehicle file.
     pub connect: String,
-    /// Decoder from bytes to readings.
+    /// Decoder from the source's bytes to readings.
     pub decoder: Box<dyn Decoder>,
     /// Capacity of the source's ring, bytes.
     pub ring_bytes: usize,
@@ -19,10 +19,10 @@ pub struct SourceSpec {
 /// A source without its decoder, as listed in reports and logs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceInfo {
-    /// Name.
+    /// Name of the source.
     pub id: String,
-    /// Kind of device.
+    /// Kind of device that the source is.
     pub plugin: String,
-    /// Connection.
+    /// Connection of the source, as written in the vehicle file.
     pub connect: String,
 }

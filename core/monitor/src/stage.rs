@@ -3,17 +3,19 @@
 use bevy_ecs::schedule::SystemSet;
 
 /// A stage of a world. Its systems see all results of the world's earlier stages.
+///
+/// A stage doesn't run in a tick without input for it.
 pub trait Stage: SystemSet + Copy + PartialEq {
-    /// All stages of the world, in order.
+    /// All stages of the world, in the order in which they run.
     const ALL: &'static [Self];
 }
 
 /// Stages of the placer: from packets to placed pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum PlaceStage {
-    /// Converts bytes to readings.
+    /// Converts the bytes of sensor packets to readings.
     Decode,
-    /// Converts readings to fixes.
+    /// Converts readings to fixes of the vehicle.
     Navigate,
     /// Converts returns to points on the wall.
     Georeference,
@@ -26,12 +28,13 @@ impl Stage for PlaceStage {
 /// Stages of the surveyor: from placed pings to verdicts.
 ///
 /// Verdicts decide which sections are due next. The stages from [`Self::Walk`] to [`Self::Report`] therefore
-/// run once per stop: a ping that makes sections due, or an update. The other stages run once per tick.
+/// run once per stop. A stop is a ping that makes sections due, or an update. [`Self::Classify`] runs once
+/// per tick with pings or updates, [`Self::Surveyed`] once per tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum SurveyStage {
     /// Decides which returns are wall.
     Classify,
-    /// Converts pings to samples and passes, up to the next stop.
+    /// Converts pings to samples and passes, up to the next ping that makes sections due or the next update.
     Walk,
     /// Judges the sections that are due.
     Judge,
@@ -42,7 +45,7 @@ pub enum SurveyStage {
 }
 
 impl SurveyStage {
-    /// Stages that run once per stop, in order.
+    /// Stages that run each time the surveyor stops to judge sections or to process an update, in order.
     pub(super) const OF_STOP: [Self; 3] = [Self::Walk, Self::Judge, Self::Report];
 }
 
@@ -50,7 +53,7 @@ impl Stage for SurveyStage {
     const ALL: &'static [Self] = &[Self::Classify, Self::Walk, Self::Judge, Self::Report, Self::Surveyed];
 }
 
-/// Stage of the adviser.
+/// The only stage of the adviser.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum AdviseStage {
     /// Computes the speed advice at each update.

@@ -31,7 +31,7 @@ use super::observations::Observations;
 use super::part::Part;
 use super::placer::{Placed, PlacedTick};
 use super::resources::{Coverage, Digests, Finder, Tally};
-use super::stage::{Stage as _, SurveyStage};
+use super::stage::SurveyStage;
 use classify::{Classified, NearWall};
 use driving::Driving;
 use headrace_coverage::{Outlook, Request};
@@ -43,7 +43,7 @@ use survey::{Cursor, Requests};
 /// Part of the loop from placed pings to verdicts.
 pub struct Surveyor {
     part: Part<SurveyStage>,
-    /// A tick without packets, which the world has between ticks.
+    /// Empty tick for the placer's values. The surveyor keeps it as a placeholder between ticks.
     nothing: Arc<Placed>,
 }
 
@@ -83,10 +83,6 @@ impl Surveyor {
         part.add_systems(SurveyStage::Judge, judge::judge_due);
         part.add_systems(SurveyStage::Report, standing::report_standing);
         part.initialize()?;
-        // The first run of a schedule allocates memory. Without pings it has no other effect.
-        for stage in SurveyStage::ALL {
-            part.run(*stage);
-        }
         Ok(Self { part, nothing: Arc::default() })
     }
 
@@ -96,7 +92,9 @@ impl Surveyor {
         part.world.resource_mut::<Found>().clear();
         *part.world.resource_mut::<Cursor>() = Cursor::default();
         part.world.resource_mut::<PlacedTick>().0 = Arc::clone(placed);
-        part.run(SurveyStage::Classify);
+        if !placed.items.is_empty() {
+            part.run(SurveyStage::Classify);
+        }
         while part.world.resource::<Cursor>().next < placed.items.len() {
             for stage in SurveyStage::OF_STOP {
                 part.run(stage);
@@ -112,12 +110,12 @@ impl Surveyor {
         self.part.world.resource_mut::<Digests>().next_tick();
     }
 
-    /// Findings of the last tick.
+    /// Results of the surveyor in the last tick.
     pub fn found(&self) -> &Found {
         self.part.world.resource()
     }
 
-    /// Coverage of the wall.
+    /// Coverage of the wall, with samples and verdicts.
     pub fn coverage(&self) -> &Coverage {
         self.part.world.resource()
     }
@@ -132,12 +130,12 @@ impl Surveyor {
         self.part.world.resource()
     }
 
-    /// Result streams.
+    /// Result streams of the surveyor.
     pub fn digests(&self) -> &Digests {
         self.part.world.resource()
     }
 
-    /// A resource of a plugin.
+    /// A resource that a plugin has added.
     pub fn resource<T: Resource>(&self) -> Option<&T> {
         self.part.resource()
     }
@@ -156,7 +154,7 @@ impl Surveyor {
         wall::end_returns(&mut self.part.world);
     }
 
-    /// Sections to be judged at the end of a dive, and the fields common to all requests for them.
+    /// Requests to judge sections at the end of a dive, and the fields that all these requests share.
     pub(super) fn open_requests(&mut self, at: MonoNs) -> (Vec<i64>, Option<Request>) {
         let outlook = self.outlook(at);
         let (mut open, mut common) = (Vec::new(), None);
@@ -198,9 +196,9 @@ mod tests {
     use super::*;
     use crate::entities::{Head, HiddenAngles, Mounted};
     use crate::fixtures::armed;
-    use crate::resources::{Target, TunnelDesign};
+    use crate::resources::{Plan, TunnelDesign};
 
-    /// Other resources and components are constant since arming, or set in each tick.
+    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_world() {
         let dive = armed();
@@ -209,7 +207,7 @@ mod tests {
             TypeId::of::<HeadEntities>(),
             TypeId::of::<HiddenAngles>(),
             TypeId::of::<Mounted>(),
-            TypeId::of::<Target>(),
+            TypeId::of::<Plan>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<Classified>(),
             TypeId::of::<Cursor>(),

@@ -1,4 +1,5 @@
-//! An unsure stretch and its texts. Allocates: outlets only, never within a tick.
+//! An unsure stretch (neighbouring sections that neither pass nor fail) and its texts. Allocates: outlets
+//! only, never within a tick.
 
 use serde::Serialize;
 
@@ -7,24 +8,24 @@ use headrace_coverage::{Driven, Sections, Stretch, Unsure};
 /// A stretch that neither passes nor fails.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UnsureStretch {
-    /// Reason.
+    /// Reason for which the stretch has no verdict.
     pub why: Unsure,
-    /// Beginning, m.
+    /// Beginning of the stretch, m.
     pub from_m: f64,
-    /// End, m.
+    /// End of the stretch, m.
     pub to_m: f64,
     /// Metres of the stretch that are unsure.
     pub metres_m: f64,
-    /// Largest hole, m.
+    /// Diameter of the stretch's largest hole, m.
     pub hole_m: f64,
-    /// Standard deviation of that hole, m.
+    /// Standard deviation of that diameter, m.
     pub hole_sd_m: f64,
-    /// Error of that hole: the confidence times its standard deviation, m.
+    /// Error of that diameter: the confidence times its standard deviation, m.
     pub hole_error_m: f64,
     /// Driving figures of the section with the largest hole.
     #[serde(skip)]
     pub driven: Driven,
-    /// Whether the error matters more than the hole in most sections of the stretch.
+    /// Whether the hole's error, rather than its size, prevents a verdict in most sections of the stretch.
     #[serde(skip)]
     pub is_mostly_error: bool,
 }
@@ -32,12 +33,7 @@ pub struct UnsureStretch {
 impl UnsureStretch {
     /// Creates an unsure stretch from a stretch of sections.
     pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
-        Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
-    }
-
-    /// Creates an unsure stretch. `section_m` is the length of a section, m, and `confidence_sd` a number of
-    /// standard deviations.
-    pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
+        let section_m = sections.section_m();
         let [hole_m, hole_sd_m] = stretch.largest().hole_m;
         Self {
             why: stretch.why,
@@ -46,7 +42,7 @@ impl UnsureStretch {
             metres_m: f64::from(stretch.sections()) * section_m,
             hole_m,
             hole_sd_m,
-            hole_error_m: confidence_sd * hole_sd_m,
+            hole_error_m: sections.target().error_m(hole_sd_m),
             driven: stretch.largest().driven,
             is_mostly_error: stretch.is_mostly_error(),
         }
@@ -69,10 +65,11 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     }
 }
 
-/// Ratios to the fitting speed. A speed between them counts as equal to the fitting speed.
+/// Lower and upper ratio of a speed to the fitting speed, which is the largest one that meets the target.
+/// Between the two ratios, the speed counts as equal to the fitting speed.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
-/// Text of the remedy; empty if there is none.
+/// Text of the remedy for an unsure stretch; empty if there is none.
 pub fn helps_text(stretch: &UnsureStretch) -> String {
     let surer = "pass it again with a more certain position";
     let helps = match stretch.why {
@@ -87,7 +84,8 @@ pub fn helps_text(stretch: &UnsureStretch) -> String {
             } else if fits_mps > 0.0 && speed_mps > most_mps {
                 format!("at most {fits_mps:.2} m/s, or {surer}")
             } else if speed_mps > 0.0 && speed_mps < least_mps && is_uneven {
-                // Below this speed, heads apart along the hull are out of phase.
+                // Below this speed, heads at different places along the hull are out of phase with each
+                // other.
                 format!("at {fits_mps:.2} m/s, or {surer}")
             } else {
                 surer.to_owned()

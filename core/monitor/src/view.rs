@@ -1,4 +1,5 @@
-//! The view: what outsiders read of a tick. It borrows the values of the parts and computes nothing.
+//! The view: everything that outlets and plugins can read after a tick. It borrows the values of the parts
+//! and computes nothing.
 
 use super::adviser::Advised;
 use super::alert_list::{AlertList, TextContext};
@@ -14,23 +15,24 @@ use super::notes::Notes;
 use super::placer::Placed;
 use super::resources::{Coverage, Tally, TickTime};
 use super::result_stream::ResultStream;
+use super::section_row::SectionRow;
 use super::source::SourceInfo;
 use super::surveyor::Surveyor;
 use headrace_geometry::time::MonoNs;
 use headrace_vehicle::Mission;
 
-/// Mission and sensors of a loop; constant since arming.
+/// Mission and sensors of a loop; constant after arming.
 #[derive(Debug)]
 pub struct About {
-    /// Tunnel and target.
+    /// Tunnel and coverage target.
     pub mission: Mission,
     /// Sources of the sensors, in the order of their ids. The operator's input is not among them.
     pub sources: Vec<SourceInfo>,
-    /// Names of the heads and their alternative settings.
+    /// Names of the heads, and the alternative settings that could be advised.
     pub descriptions: HeadDescriptions,
 }
 
-/// The loop after a tick.
+/// Read-only view of the loop after a tick.
 #[derive(Clone, Copy)]
 pub struct DiveView<'a> {
     pub(super) about: &'a About,
@@ -42,7 +44,7 @@ pub struct DiveView<'a> {
 }
 
 impl<'a> DiveView<'a> {
-    /// Tunnel and target.
+    /// Tunnel and coverage target.
     pub fn mission(&self) -> &'a Mission {
         &self.about.mission
     }
@@ -52,27 +54,27 @@ impl<'a> DiveView<'a> {
         &self.about.sources
     }
 
-    /// Names of the heads and their alternative settings.
+    /// Names of the heads, and the alternative settings that could be advised.
     pub fn head_descriptions(&self) -> &'a HeadDescriptions {
         &self.about.descriptions
     }
 
-    /// Number and end of the tick.
+    /// Number and end time of the tick.
     pub fn time(&self) -> TickTime {
         self.time
     }
 
-    /// Results of the placer.
+    /// Results of the placer for the tick.
     pub fn placed(&self) -> &'a Placed {
         self.placed
     }
 
-    /// The surveyor.
+    /// The surveyor after the tick.
     pub fn surveyor(&self) -> &'a Surveyor {
         self.surveyor
     }
 
-    /// Advice of the tick.
+    /// Speed advice of the tick.
     pub fn advised(&self) -> &'a Advised {
         self.advised
     }
@@ -104,9 +106,14 @@ impl<'a> DiveView<'a> {
         found.chain(advised).chain(self.alerter.notices.iter().copied())
     }
 
-    /// Coverage of the wall.
+    /// Coverage of the wall, with samples and verdicts.
     pub fn coverage(&self) -> &'a Coverage {
         self.surveyor.coverage()
+    }
+
+    /// The section with this index; `None` beyond the tunnel's ends.
+    pub fn section_row(&self, index: i64) -> Option<SectionRow> {
+        SectionRow::of(&self.coverage().sections, index, &self.about.mission.profile)
     }
 
     /// Counts of pings over the whole dive.
@@ -114,7 +121,7 @@ impl<'a> DiveView<'a> {
         self.surveyor.tally()
     }
 
-    /// Alerts with their life cycle.
+    /// Alerts of the dive with their life cycle.
     pub fn alert_list(&self) -> &'a AlertList {
         &self.alerter.list
     }
@@ -124,7 +131,7 @@ impl<'a> DiveView<'a> {
         &self.alerter.notes
     }
 
-    /// Traffic of the operator's input.
+    /// Traffic statistics of the operator's input.
     pub fn console_counts(&self) -> ConsoleCounts {
         ConsoleCounts { without_effect: self.alerter.without_effect, ..self.placed.console }
     }

@@ -1,12 +1,12 @@
-//! Recordings of voice notes: limits and formats. The loop has only the notes. The recordings go straight
-//! from the page to the log.
+//! Recordings of voice notes: limits and formats. The monitoring loop handles only the notes. The recordings
+//! go straight from the page to the log.
 
-/// Longest recording, seconds.
+/// Maximum length of a voice recording, seconds.
 pub const MAX_VOICE_S: u32 = 60;
-/// Maximum size of a recording, bytes. A minute at 24 kbit/s takes 180 kB.
+/// Maximum size of a voice recording, bytes. A minute at 24 kbit/s takes 180 kB.
 pub const MAX_VOICE_BYTES: usize = 512 << 10;
 
-/// Container of a recording. Browsers record Opus in WebM or Ogg, or AAC in MP4.
+/// Container format of a voice recording. Browsers record Opus in WebM or Ogg, or AAC in MP4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Container {
     /// WebM.
@@ -18,17 +18,17 @@ pub enum Container {
 }
 
 impl Container {
-    /// All containers, in order.
+    /// All allowed container formats, in order.
     pub const ALL: [Self; 3] = [Self::Webm, Self::Ogg, Self::Mp4];
 
-    /// Container of a media type, with or without parameters: `audio/webm;codecs=opus`. `None` if the type
-    /// isn't allowed.
+    /// Container format for a media type, with or without parameters: `audio/webm;codecs=opus`. `None` if the
+    /// type isn't allowed.
     pub fn of_media_type(text: &str) -> Option<Self> {
         let essence = text.split(';').next().unwrap_or_default().trim();
         Self::ALL.into_iter().find(|container| container.media_type().eq_ignore_ascii_case(essence))
     }
 
-    /// Media type.
+    /// Media type of the container format.
     pub fn media_type(self) -> &'static str {
         match self {
             Self::Webm => "audio/webm",
@@ -37,7 +37,7 @@ impl Container {
         }
     }
 
-    /// Extension of the container's files.
+    /// File extension of the container format.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Webm => "webm",
@@ -63,11 +63,11 @@ impl Container {
 pub struct Voice {
     /// Id of the note; not 0.
     pub id: u32,
-    /// Length, seconds.
+    /// Length of the recording, seconds.
     pub seconds: u32,
-    /// Container of the audio.
+    /// Container format of the audio.
     pub container: Container,
-    /// Contents of the audio file.
+    /// Contents of the recording's audio file.
     pub audio: Vec<u8>,
 }
 
@@ -75,7 +75,7 @@ pub struct Voice {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoiceError {
-    /// The id is 0.
+    /// The id of the recording is 0.
     #[error("a voice note has the id 0; expected 1 to 4294967295")]
     Id,
     /// The recording is too long or too short.
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn error_names_the_violated_limit() {
+    fn voice_recording_error_names_the_violated_limit() {
         assert!(voice(b"OggS and so on").checked().is_ok());
         assert_eq!(Voice { id: 0, ..voice(b"OggS") }.checked(), Err(VoiceError::Id));
         assert_eq!(Voice { seconds: 61, ..voice(b"OggS") }.checked(), Err(VoiceError::Seconds(61)));

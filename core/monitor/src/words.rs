@@ -10,36 +10,36 @@ use headrace_coverage::Verdict;
 use headrace_fusion::NoFix;
 use headrace_sampling::advice::Reason;
 
-/// Name of the condition if sensors deliver data, but no update has come yet.
+/// Name of the condition after sensors have begun to deliver data and before the first update.
 pub const STARTING: &str = "STARTING";
-/// Action for finding the gyros' bias. The number of seconds follows.
+/// Action for finding the gyros' bias. The number of seconds follows in the text.
 pub const STAND_STILL: &str = "stand still";
-/// State of a section that not all heads have passed.
+/// Words for the state of a section where some heads have not been.
 pub const NOT_INSPECTED: &str = "not inspected";
-/// State of wall without any data.
+/// Words for the state of wall without any data.
 pub const UNSEEN: &str = "unseen";
 
 /// Words for a condition, without figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConditionWords {
-    /// Name.
+    /// Name of the condition.
     pub name: &'static str,
-    /// Explanation; empty if the name explains itself.
+    /// Explanation of the condition; empty if its name explains itself.
     pub detail: &'static str,
-    /// Action; empty if there is none, or if it is a speed.
+    /// Action against the condition; empty if there is none, or if it is a speed.
     pub action: &'static str,
     /// Words before v_max; empty if v_max isn't stated.
     pub speed: &'static str,
 }
 
 impl ConditionWords {
-    /// Name and explanation.
+    /// Name of the condition, followed by its explanation.
     pub fn text(&self) -> String {
         let Self { name, detail, .. } = self;
         if detail.is_empty() { (*name).to_owned() } else { format!("{name}: {detail}") }
     }
 
-    /// Action; empty if there is none. `v_max` is v_max with its unit.
+    /// Action against the condition; empty if there is none. `v_max` is v_max with its unit.
     pub fn action_text(&self, v_max: &str) -> String {
         let Self { action, speed, .. } = self;
         if speed.is_empty() { (*action).to_owned() } else { format!("{speed} {v_max}") }
@@ -58,8 +58,8 @@ pub fn condition_words(condition: Condition) -> ConditionWords {
         Condition::GoingBack(_) => ["going back", "to a missed section: any speed will do", "", ""],
         Condition::NoSpeed => ["slower won't help", "no speed meets the target here", "", ""],
         Condition::TooFast => ["TOO FAST", "", "", "at most"],
-        // Heads that are apart along the hull and turn out of phase can miss wall below v_max. Going slower
-        // would then make it worse, so the action is v_max itself.
+        // Below v_max, heads at different places along the hull can be out of phase and miss wall. Going
+        // slower would then make it worse, so the action is v_max itself.
         Condition::TurnFails => ["THIS TURN MISSES", "", "", "go"],
         Condition::CannotSay(doubt) => ["CAN'T SAY", doubt_words(doubt), "", "at most"],
         Condition::Over => ["a little fast", "", "", "at most"],
@@ -119,7 +119,7 @@ pub fn sensor_words(state: SensorState) -> &'static str {
     }
 }
 
-/// Word for a priority.
+/// Word for a priority of alerts.
 pub fn priority_word(priority: Priority) -> &'static str {
     match priority {
         Priority::EmergencyAlarm => "EMERGENCY",

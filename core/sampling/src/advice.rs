@@ -1,4 +1,4 @@
-//! Speed advice from the current measurements, and alternatives.
+//! Speed advice from the current measurements, and alternative modes of the heads.
 
 mod answer;
 mod hysteresis;
@@ -16,6 +16,7 @@ use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
 use super::strips::{Going, PARTS, Strips, View};
 use super::swing::Swing;
+use super::target::Target;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
@@ -28,39 +29,37 @@ pub use hysteresis::Hysteresis;
 pub use ring_cache::Looks;
 pub use search::SPEED_MARGIN;
 
-/// Number of advice updates per recomputation of the alternatives.
+/// The alternatives are recomputed once per this number of advice updates.
 const ALTERNATIVES_EVERY: u32 = 25;
-/// Number of iterations that solve for the speed and its position margin, each of which depends on the other.
+/// Number of iterations that solve for the speed and the position margin, which depend on each other.
 const FALLS: u32 = 3;
-/// Speed below which the last direction of travel is kept, m/s.
+/// Speed below which the last direction of travel is assumed to continue, m/s.
 const UNDER_WAY_MPS: f64 = 0.02;
-/// Capacity for stretches of wall outside a head's range limits.
+/// Maximum number of stretches of wall outside a head's range limits.
 const OUT_OF_REACH: usize = 16;
 
-/// The largest speed found for a target.
+/// The largest speed that meets a target, as found by the search.
 struct Fastest {
-    /// The speed, m/s.
+    /// The largest speed that meets the target, m/s.
     speed_mps: f64,
-    /// Advised speed after the margin for speed errors, m/s.
+    /// Advised speed, which is lower by the margin for speed errors, m/s.
     advised_mps: f64,
-    /// T_y at the place that limits the speed, m.
+    /// T_y (largest distance between samples of a turn) at the place that limits the speed, m.
     t_y_m: f64,
 }
 
 /// The inspection task that the advice is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
-    /// Target T, m.
-    pub target_m: f64,
-    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
-    pub confidence_sd: f64,
+    /// Target.
+    pub target: Target,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Layout of the heads.
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
-    /// Resolution and update rate of the advice's view of the wall.
+    /// Angular resolution and update rate of the rays that find the wall for the advice.
     pub looks: Looks,
 }
 
@@ -74,12 +73,12 @@ pub struct Advisor {
     /// Strips of the wall with the heads in their present settings, and in each of their modes.
     now: Strips,
     modes: Strips,
-    /// Largest step in each mode at the centre of the tunnel, m.
+    /// Largest distance between neighbouring samples of a turn, in each mode, at the tunnel's centre, m.
     centred_m: Vec<f64>,
     parallax_rad: f64,
-    /// Ring stride of one step, for each head that turns.
+    /// Number of ring soundings per angular step, for each head that turns.
     strides: [Option<usize>; MAX_HEADS],
-    /// The head whose ring is checked first.
+    /// The head whose ring of rays is checked first at the next update.
     next: usize,
     /// Number of advice updates until the alternatives are recomputed, and the current alternatives.
     until_alternatives: u32,
@@ -87,9 +86,9 @@ pub struct Advisor {
     anew: Option<Anew>,
     margins: Option<Margins>,
     astern: bool,
-    /// Largest speed found by the last update.
+    /// Largest speed that met the target in the last update.
     last_mps: Option<f64>,
-    /// Distance that the vehicle may move before rings are recast, m.
+    /// Distance that the vehicle may move before the heads' rings are recast, m.
     still_m: f64,
 }
 
@@ -175,7 +174,7 @@ impl Advisor {
         self.heads.iter().map(|head| head.hidden.as_slice())
     }
 
-    /// Number of ring soundings per step of a head.
+    /// Number of ring soundings per angular step of a head.
     fn stride(&self, step_rad: f64) -> usize {
         Ring::stride(step_rad, self.task.looks.ring)
     }
@@ -186,8 +185,8 @@ impl Advisor {
     /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. It propagates the phases
     /// to each tested speed. `left_s` is the remaining time, if known.
     ///
-    /// Heads apart along the hull keep their phases only in some intervals of speed. The result is the upper end of
-    /// the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
+    /// Heads that are apart along the hull keep their phases only in some intervals of speed. The result is the upper
+    /// end of the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
     /// Source: docs/decisions/0005-advice-and-plan.md.
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
@@ -245,7 +244,7 @@ impl Advisor {
             nearest_mps,
             reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
             predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
-            will_exceed: predicted_t_m > self.task.target_m,
+            will_exceed: predicted_t_m > self.task.target.max_hole_m,
             may_exceed: predicted_t_m > sure_m,
             sure_m,
             pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
@@ -265,7 +264,7 @@ impl Advisor {
         }
     }
 
-    /// Returns the motion of the vehicle and its beams.
+    /// Returns the motion of the vehicle and its beams for the prediction of spacing.
     fn going(&self, pose: &Pose, situation: &Situation, phasing: &Phasing, swing: Swing) -> Going {
         let periods_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
         let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
@@ -321,7 +320,7 @@ impl Advisor {
         }
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
-        // Most rings are unchanged since the last advice.
+        // Most heads' rings are unchanged since the last advice.
         for (head, stride) in self.heads.iter_mut().zip(self.strides) {
             if let Some(stride) = stride {
                 head.ring.keep_steps(stride);
@@ -353,9 +352,9 @@ impl Advisor {
         }
     }
 
-    /// Returns the largest speed at which the present phases meet a target, and the advised speed.
+    /// Returns the largest speed at which the heads' present phases meet a target, and the advised speed.
     ///
-    /// Errors: no speed meets the target in any phase.
+    /// Errors: no speed meets the target, whatever the heads' phases.
     fn fastest(
         &self,
         phasing: &Phasing,
@@ -368,7 +367,8 @@ impl Advisor {
         let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
-            // The heads have other phases at another speed, and the swing between them is smaller.
+            // At another speed, the heads have other phases and less swing between their passes, so this error is not
+            // final.
             Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
             Err(why) => return Err(*why),
         };
@@ -380,19 +380,24 @@ impl Advisor {
         Ok(Fastest { speed_mps, advised_mps: driving.kept_back_mps(speed_mps), t_y_m })
     }
 
-    /// Distance that the vehicle may move before rings are recast, m.
+    /// Returns the distance that the vehicle may move before the heads' rings are recast, m.
     fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
         if let Some(anew_m) = self.task.looks.anew_m {
             return anew_m;
         }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // If the swing is too wide for any speed, it is also too wide at a slightly different position.
+            // If the vehicle swings too much for any speed, it also does so at a slightly different position.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
-            // The limiting step is unknown.
-            Err(_) => (self.task.target_m, 0.0),
+            // The distance between samples that limits the speed is unknown.
+            Err(_) => (self.task.target.max_hole_m, 0.0),
         };
-        ring_cache::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
+        ring_cache::still_m(
+            self.task.target.max_hole_m,
+            t_y_m,
+            self.profile.perimeter_m() / math::TAU,
+            swing_share,
+        )
     }
 
     /// Computes the largest speed in each mode common to all heads, and the cost of each margin.
@@ -443,9 +448,9 @@ impl Advisor {
             && (passes.turn_s() - period_s).abs() < SAME * period_s
     }
 
-    /// Returns the largest speeds as the margins are added one after the other.
+    /// Returns the largest speeds as the margins of the target are added one after the other.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
-        let target_m = self.task.target_m;
+        let target_m = self.task.target.max_hole_m;
         let known = RemainingTarget { pass_error_m: 0.0, ..sure };
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         let (lossy, passes) = (passes, &passes.lossy(false));
@@ -495,7 +500,7 @@ impl Advisor {
             ping_period_s = ping_period_s.max(turn(head)?.ping_period_s());
         }
         let passes = match self.task.layout {
-            // The size of a sector does not depend on the number of remaining heads.
+            // The size of a sector does not depend on the number of heads still working.
             HeadLayout::SectorOffset => {
                 Passes::in_sectors(heads, 2.0 * longest_s / self.heads.len().max(1) as f64)
             }
@@ -512,16 +517,15 @@ impl Advisor {
                 .bound_for_target(number, &passes, target_m, &going)
                 .map_or(0.0, |bound| bound.speed_mps)
         };
-        // Each speed has a larger position margin than the faster one before, so the speeds converge from above.
+        // Each iteration finds a lower speed with a larger position margin, so the speeds converge from above.
         Some((0..FALLS).fold(bound_mps(sure.most_m()), |speed_mps, _| bound_mps(sure.at_m(speed_mps))))
     }
 
-    /// Returns the target less the margin for position errors, for the present motion of the heads.
+    /// Returns the target minus the margin for position errors, for the present motion of the heads.
     fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> RemainingTarget {
         let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
         RemainingTarget {
-            target_m: self.task.target_m,
-            confidence_sd: self.task.confidence_sd,
+            target: self.task.target,
             pass_error_m: situation.pass_error_m,
             measured_s: margin::error_time_s(1.0 / even_gap_s, apart_m, situation.speed_mps, APART_SHARE),
             even_gap_s,
@@ -530,17 +534,17 @@ impl Advisor {
         }
     }
 
-    /// Returns the target less the margin for position errors, with the steps of another mode.
+    /// Returns the target minus the margin for position errors, with the angular steps of another mode.
     fn sure_in(&self, mode: usize, sure: RemainingTarget) -> RemainingTarget {
         RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
     /// Returns the first remedy that alone makes the target possible.
     ///
-    /// The order is: a steady heading, then the tunnel's centre if the steps are short enough there, then the fastest
-    /// mode.
+    /// The order is: a steady heading, then the tunnel's centre if samples of a turn are close enough there, then the
+    /// fastest mode.
     fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
-        let target_m = self.task.target_m;
+        let target_m = self.task.target.max_hole_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         if going.swing_mps.max(going.apart_swing_mps) > 0.0
             && self.now.bound_for_target(0, passes, target_m, &steady).is_ok()
@@ -562,7 +566,7 @@ impl Advisor {
     }
 }
 
-/// Chance losses of each turning head, by number.
+/// Rates at which each turning head loses returns by chance, by head number.
 fn rates_of(situation: &Situation) -> [Option<LossRate>; MAX_HEADS] {
     let mut rates = [None; MAX_HEADS];
     for ((slot, motion), rate) in rates.iter_mut().zip(&situation.heads).zip(situation.losses) {

@@ -6,10 +6,10 @@ use super::head_set::MAX_HEADS;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplingError {
-    /// A quantity that must be positive is not.
+    /// A quantity that must be positive is zero or negative.
     #[error("{what} is {value}; it must be a finite number above zero")]
     NotPositive {
-        /// The quantity, with its unit.
+        /// The quantity that is not positive, with its unit.
         what: &'static str,
         /// The value of the quantity.
         value: f64,
@@ -17,15 +17,15 @@ pub enum SamplingError {
     /// A quantity that must not be negative is negative or not finite.
     #[error("{what} is {value}; it must be a finite number, zero or above")]
     Negative {
-        /// The quantity, with its unit.
+        /// The quantity that is negative or not finite, with its unit.
         what: &'static str,
         /// The value of the quantity.
         value: f64,
     },
-    /// The step does not divide a turn.
+    /// The angular step of a head does not divide a turn.
     #[error("a step of {step_deg} degrees doesn't divide a turn: 360 degrees are {steps} of them")]
     StepDoesNotDivide {
-        /// The step, degrees.
+        /// The angular step, degrees.
         step_deg: f64,
         /// Number of steps per turn.
         steps: f64,
@@ -35,13 +35,13 @@ pub enum SamplingError {
         "a beam {angle_deg} degrees off the perpendicular never meets the flat wall; it must be below 90"
     )]
     BeamMissesWall {
-        /// Angle from the perpendicular, degrees.
+        /// Angle of the beam from the perpendicular, degrees.
         angle_deg: f64,
     },
     /// The beam runs along the tunnel and meets no wall within a kilometre.
     #[error("the beam at a head angle of {angle_deg} degrees runs along the tunnel and meets no wall")]
     BeamAlongTunnel {
-        /// Head angle, degrees.
+        /// Head angle of the beam, degrees.
         angle_deg: f64,
     },
     /// The scan plane of a head lies along the tunnel.
@@ -50,9 +50,9 @@ pub enum SamplingError {
     /// A head outside the tunnel's profile.
     #[error("a head at y = {y_m:.3} m, z = {z_m:.3} m is outside the tunnel's profile")]
     HeadOutside {
-        /// Left of the axis, m.
+        /// Position of the head left of the tunnel's axis, m.
         y_m: f64,
-        /// Above the floor's centre, m.
+        /// Height of the head above the floor's centre, m.
         z_m: f64,
     },
     /// Sectors are impossible with fewer than two heads.
@@ -61,7 +61,7 @@ pub enum SamplingError {
         /// Number of heads.
         heads: usize,
     },
-    /// No head, or more than [`MAX_HEADS`].
+    /// There is no head, or there are more than [`MAX_HEADS`].
     #[error("{heads} heads; from 1 to {MAX_HEADS} are possible")]
     HeadCount {
         /// Number of heads.
@@ -73,14 +73,14 @@ pub enum SamplingError {
     /// A planning question has no target, speed or time.
     #[error("no question: give a target, a speed or a time")]
     NothingAsked,
-    /// Heads apart along the hull have no phase for a stationary vehicle.
+    /// Heads that are apart along the hull cannot be phased for a stationary vehicle.
     #[error(
         "heads {apart_m} m apart along the hull have no phase at {speed_mps} m/s; it takes a speed above zero"
     )]
     NoPhaseAtRest {
-        /// Distance along the hull, m.
+        /// Distance between the heads along the hull, m.
         apart_m: f64,
-        /// Speed, m/s.
+        /// Speed of the vehicle, m/s.
         speed_mps: f64,
     },
     /// A strip of the wall that no head sees is as wide as the target.
@@ -88,27 +88,27 @@ pub enum SamplingError {
         "no speed meets a target of {target_m} m: no head sees {width_m:.2} m of the wall, {arc_m:.2} m from the floor's centre"
     )]
     UnseenStrip {
-        /// The target, m.
+        /// The target T, m.
         target_m: f64,
         /// Width of the strip, m.
         width_m: f64,
         /// Arc length of the strip's middle, m.
         arc_m: f64,
     },
-    /// The vehicle's heading is too far off the axis, or it swings too fast.
+    /// The vehicle's heading is too far off the axis, or the vehicle swings too fast.
     #[error("no speed meets a target of {target_m} m: at this heading or swing, passes are farther apart")]
     OffAxis {
-        /// The target, m.
+        /// The target T, m.
         target_m: f64,
     },
-    /// Neighbours of one turn are as far apart as the target.
+    /// Neighbouring samples of one turn are as far apart as the target.
     #[error(
         "no speed meets a target of {target_m} m: neighbours of one turn are {t_y_m:.3} m apart, whatever the speed"
     )]
     AngularStep {
-        /// The target, m.
+        /// The target T, m.
         target_m: f64,
-        /// The largest distance between neighbours of one turn, m.
+        /// The largest distance between neighbouring samples of one turn, m.
         t_y_m: f64,
     },
 }

@@ -1,10 +1,10 @@
-//! Heads for the tests of this crate.
+//! Sonar heads for the tests of this crate.
 
 use super::head::{HeadBody, HeadSpec};
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math;
 
-/// A head in FAST at `place` on the vehicle, facing forward or aft, with a body of radius `radius_m`.
+/// A head in FAST mode at `place` on the vehicle, facing forward or aft, with a body of radius `radius_m`.
 pub(super) fn head([x, y, z]: [f64; 3], aft: bool, radius_m: f64) -> HeadSpec {
     HeadSpec {
         mount: Mount {

@@ -6,14 +6,14 @@ use headrace_geometry::frames::{Body, Mount, Rot, Sensor, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 
-/// A head without a return for this long counts as silent.
+/// Duration without a return after which a head counts as silent.
 ///
-/// The program does not wait for a silent head, and does not use it in the advice.
+/// Headrace does not wait for a silent head, and leaves it out of the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
 /// Tolerance for a whole number of steps per turn, because steps are specified in decimal degrees.
 const WHOLE_STEPS: f64 = 1e-6;
-/// Maximum number of steps per turn.
+/// Maximum number of angular steps per turn of a head.
 const MAX_STEPS: f64 = 100_000.0;
 
 /// Rotation of a head in a whole number of equal steps per turn, with a ping at each step.
@@ -68,19 +68,19 @@ impl Turn {
     }
 }
 
-/// Source of the turn period of a mode.
+/// Origin of the stated turn period of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
-    /// Measured on this head at this range setting, from the vehicle file.
+    /// Period measured on this head at this range setting, from the vehicle file.
     Measured,
-    /// The manufacturer's table, at its range setting.
+    /// Period from the manufacturer's table, at the table's range setting.
     Table,
-    /// Estimated from another range setting.
+    /// Period estimated from the period at another range setting.
     Estimated,
 }
 
 impl Basis {
-    /// Name used in tables.
+    /// Name of the period's origin in tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -95,27 +95,27 @@ impl Basis {
 pub struct HeadMode {
     /// Name of the mode in vehicle files.
     pub name: &'static str,
-    /// Step and period.
+    /// Angular step and turn period.
     pub turn: Turn,
-    /// Source of the period.
+    /// Origin of the turn period.
     pub basis: Basis,
 }
 
 /// The body of a head: a cylinder around the head's axis, which may occlude neighbouring heads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadBody {
-    /// Radius, m; zero for a head without a body.
+    /// Radius of the body, m; zero for a head without a body.
     pub radius_m: f64,
-    /// Extent ahead of the beam along the sensor's +x, m.
+    /// Extent of the body ahead of the beam, along the sensor's +x, m.
     pub ahead_m: f64,
-    /// Extent behind the beam, m.
+    /// Extent of the body behind the beam, m.
     pub behind_m: f64,
 }
 
-/// Properties of a head that its schedule requires.
+/// Properties of a head that are needed to schedule its rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadSpec {
-    /// Mounting on the vehicle.
+    /// Position and attitude of the head on the vehicle.
     pub mount: Mount,
     /// Angle between two pings, radians.
     pub step_rad: f64,
@@ -127,7 +127,7 @@ pub struct HeadSpec {
     pub sound_speed_mps: f64,
     /// zeta: full width of the beam, radians.
     pub beam_rad: f64,
-    /// Body of the head.
+    /// Body of the head, which may occlude other heads.
     pub body: HeadBody,
 }
 
@@ -138,12 +138,12 @@ impl HeadSpec {
     }
 }
 
-/// Program of a head for a dive: start angle, direction and sector. Angles in the sensor frame.
+/// Rotation program of a head for a dive: start angle, direction and sector, with angles in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadProgram {
-    /// Angle of the first ping, radians.
+    /// Head angle at the first ping, radians.
     pub start_rad: f64,
-    /// Whether the first step is towards growing angles.
+    /// Whether the head's first step is towards growing angles.
     pub growing: bool,
     /// Least angle and size of the sector to sweep back and forth, radians; `None` for continuous rotation.
     pub sector: Option<(f64, f64)>,
@@ -152,11 +152,11 @@ pub struct HeadProgram {
 /// Measured motion of a head that is turning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadMotion {
-    /// Mounting on the vehicle.
+    /// Position and attitude of the head on the vehicle.
     pub mount: Mount,
-    /// Current angle, in the sensor frame, radians.
+    /// Current angle of the head in the sensor frame, radians.
     pub angle_rad: f64,
-    /// Rate of rotation, rad/s, positive where the angle grows.
+    /// Rate of the head's rotation, rad/s, positive where its angle grows.
     pub rate_radps: f64,
     /// Angle between two pings, radians, positive.
     pub step_rad: f64,
@@ -171,7 +171,7 @@ impl HeadMotion {
         rate_radps > 0.0 && rate_radps.is_finite() && step_rad > 0.0 && step_rad.is_finite()
     }
 
-    /// Time of a whole turn at this rate, seconds.
+    /// Time of a whole turn at the head's present rate, seconds.
     pub fn turn_period_s(&self) -> f64 {
         TAU / self.rate_radps.abs()
     }
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_turn_names_the_cause() {
+    fn error_about_an_invalid_turn_names_the_cause() {
         let why =
             |step_deg: f64, period_s| Turn::new(step_deg.to_radians(), period_s).unwrap_err().to_string();
         assert!(why(0.7, 8.0).starts_with("a step of 0.7"), "{}", why(0.7, 8.0));

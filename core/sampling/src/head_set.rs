@@ -1,16 +1,16 @@
-//! Sets of heads of a vehicle.
+//! Sets of sonar heads of a vehicle.
 
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of heads of a vehicle.
 pub const MAX_HEADS: usize = 8;
 
-/// A set of heads by their numbers.
+/// A set of sonar heads, given by their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct HeadSet(u8);
 
 impl HeadSet {
-    /// The heads 0 to `count` - 1.
+    /// The set of the heads 0 to `count` - 1.
     pub fn first(count: usize) -> Self {
         (0..count).fold(Self::default(), Self::with)
     }
@@ -27,7 +27,7 @@ impl HeadSet {
         Self(self.0 & !Self::bit(head))
     }
 
-    /// The heads of either set.
+    /// The union of two sets: heads that are in either set.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -38,7 +38,7 @@ impl HeadSet {
         self.0
     }
 
-    /// The set of these bits.
+    /// The set encoded by these bits.
     pub fn from_bits(bits: u8) -> Self {
         Self(bits)
     }
@@ -48,7 +48,7 @@ impl HeadSet {
         self.0 & Self::bit(head) != 0
     }
 
-    /// Number of heads.
+    /// Number of heads in the set.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
     }

@@ -18,13 +18,13 @@ pub struct Exposure {
     pub facing_s: f64,
     /// Time for which the beams' footprints on the wall overlap, seconds per turn.
     pub same_patch_s: f64,
-    /// Period of the turn, or of the sweep there and back, seconds.
+    /// Period of the heads' turn, or of their sweep there and back, seconds.
     pub of_s: f64,
 }
 
-/// Returns the exposure of each pair of heads that follow a schedule, with the vehicle at `pose`.
+/// Returns for each pair of scheduled heads the time in which they can receive each other's pings, at `pose`.
 ///
-/// Pairs without exposure are omitted. Heads at the same position are an idealisation and have no exposure.
+/// Pairs without such times are omitted. Heads at the same position are an idealisation and never interfere.
 /// Errors: a head outside the profile, or a beam along the tunnel.
 pub fn exposures(
     heads: &[HeadSpec],
@@ -154,8 +154,8 @@ mod tests {
     }
 
     #[test]
-    fn heads_that_look_the_same_way_share_a_patch_of_wall() {
-        // Time that two heads `apart_m` apart along the hull share a patch, s.
+    fn heads_that_point_the_same_way_share_a_patch_of_wall() {
+        // Time in which two heads `apart_m` apart along the hull share a patch of wall, s.
         let shared = |apart_m: f64| {
             let found = found(&[[apart_m, 0.0, 0.0], [0.0, 0.0, 0.1]], HeadLayout::PhaseShift);
             found.iter().map(|exposure| exposure.same_patch_s).sum::<f64>()
@@ -163,8 +163,8 @@ mod tests {
         // At 0.2 m/s and 8 s per turn, the vehicle travels 0.8 m in half a turn. The footprints of heads 0.8 m apart
         // never overlap.
         assert!(shared(0.8) <= 0.0);
-        // A beam is 0.15 m wide at 6 m, and wider on the floor. Heads 0.1 m apart are near enough, but their angles
-        // differ by half a turn.
+        // A beam's footprint is 0.15 m wide at a range of 6 m, and wider on the floor. Heads 0.1 m apart are near
+        // enough, but their angles differ by half a turn.
         assert!(shared(0.1) <= 0.0);
         let heads = heads(&[[0.1, 0.0, 0.0], [0.0, 0.0, 0.1]]);
         let profile = shapes::ceran().unwrap();

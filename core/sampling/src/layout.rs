@@ -4,7 +4,7 @@ use super::error::{SamplingError, not_negative, positive};
 use super::head::{HeadProgram, HeadSpec, MAX_HEADS, faces_aft};
 use headrace_geometry::math::{self, TAU};
 
-/// Layout of the heads of a vehicle.
+/// Layout of the heads of a vehicle: how they share the wall between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeadLayout {
     /// All s heads rotate continuously. At the moments when they pass the same place, their angles are 2 pi / s apart.
@@ -53,7 +53,7 @@ pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64,
     turned.is_finite().then_some(turned).ok_or(SamplingError::NoPhaseAtRest { apart_m: x_m, speed_mps })
 }
 
-/// gamma: start angle of a head `x_m` behind the foremost one, in [0, 2 pi).
+/// gamma: start angle of a head `x_m` behind the foremost head, in [0, 2 pi).
 ///
 /// The head has the phase `phase_rad` where it passes the foremost head's place. The error is about 1e-16 of the
 /// angle turned between the two passes.
@@ -65,7 +65,7 @@ pub fn start_rad(phase_rad: f64, rate_radps: f64, x_m: f64, speed_mps: f64) -> R
     Ok(math::wrap(phase_rad - turned_over_rad(rate_radps, x_m, speed_mps)?, TAU))
 }
 
-/// gamma of a head that faces the other way, in [0, 2 pi).
+/// gamma: start angle of a head that faces opposite to the foremost head, in [0, 2 pi).
 ///
 /// The angles of this head grow in the opposite sense to those of the foremost head.
 ///
@@ -80,20 +80,20 @@ pub fn start_reversed_rad(
     Ok(math::wrap(TAU - start_rad(phase_rad, rate_radps, x_m, speed_mps)?, TAU))
 }
 
-/// Angles closer together than this are equal, radians.
+/// Angles closer together than this count as equal, radians.
 const ROUNDING_RAD: f64 = 1e-9;
 
-/// Number of steps to cover `far_rad`; the last step is shorter if the steps do not divide `far_rad`.
+/// Number of steps to cover the angle `far_rad`; the last step is shorter if the steps do not divide `far_rad`.
 pub(super) fn steps_over(far_rad: f64, step_rad: f64) -> i64 {
     -math::floor_to_i64(-(far_rad / step_rad - 1e-6))
 }
 
-/// Angle and direction of a head in its sweep, in the sensor frame.
+/// Angle and direction of a head that sweeps a sector, in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InSector {
     /// Head angle, radians, in [0, 2 pi).
     pub angle_rad: f64,
-    /// Whether the angle is growing.
+    /// Whether the head's angle is growing.
     pub growing: bool,
 }
 
@@ -102,7 +102,7 @@ pub struct InSector {
 pub struct Sector {
     /// Sector number, from zero at the floor.
     pub number: usize,
-    /// Number of sectors.
+    /// Number of sectors of all heads.
     pub of: usize,
     /// Distance of the head behind the first head, m.
     pub behind_m: f64,
@@ -116,8 +116,8 @@ pub struct Sector {
 /// head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s.
 /// A `speed_mps` of zero means no delay: all heads are at the same point of their sweeps, regardless of their
 /// positions along the hull.
-/// Errors: fewer than two sectors, a number that isn't one of them, a lead outside sector 0, a time that isn't above
-/// zero, a speed below zero.
+/// Errors: fewer than two sectors, a sector number that doesn't exist, a lead outside sector 0, a time that isn't
+/// above zero, a speed below zero.
 /// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
 pub fn in_step(
     lead: InSector,
@@ -140,7 +140,7 @@ pub fn in_step(
         "what is left of the first head's sector in radians",
         size_rad - lead.angle_rad + ROUNDING_RAD,
     )?;
-    // Point in the sweep, unfolded: 0 to 1 on the way out, 1 to 2 on the way back.
+    // Unfolded position in the sweep: 0 to 1 on the way out, 1 to 2 on the way back.
     let share = (lead.angle_rad / size_rad).min(1.0);
     let lead_legs = if lead.growing { share } else { 2.0 - share };
     let legs = math::wrap(lead_legs - delay_s / sweep_s, 2.0);
@@ -169,11 +169,11 @@ pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
     best.1
 }
 
-/// Tries the remaining sectors for the next head, in order.
+/// Tries each unassigned sector for the next head, in order.
 ///
 /// The first of several equal assignments is kept.
 fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f64, Vec<usize>)) {
-    /// Gains closer together than this are equal, m.
+    /// Assignments whose sums differ by less than this count as equal, m.
     const SAME_M: f64 = 1e-9;
     let Some(gain) = gains.get(taken.len()) else {
         if so_far > best.0 + SAME_M {
@@ -224,7 +224,7 @@ pub fn programs(
     }
 }
 
-/// Program for continuous rotation.
+/// Rotation program of a head for continuous rotation.
 ///
 /// All heads turn in the same sense in the body frame, so a head that faces aft steps downwards in its sensor frame.
 fn phase_shift(
@@ -245,13 +245,14 @@ fn phase_shift(
 fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<HeadProgram, SamplingError> {
     let size_rad = TAU / sector.of as f64;
     let step_rad = positive("the step in radians", head.step_rad)?;
-    // A sweep takes a whole number of pings. If steps do not divide the sector, the turn period is rounded up.
+    // A sweep of a sector takes a whole number of pings. If steps do not divide the sector, the turn period is
+    // rounded up.
     let turn_s = head.ping_period_s * steps_over(size_rad, step_rad) as f64 * sector.of as f64;
     let least_rad = size_rad * sector.number as f64;
     let least_rad = if sector.reversed { math::wrap(TAU - least_rad - size_rad, TAU) } else { least_rad };
     let begin = InSector { angle_rad: 0.0, growing: true };
     let start = in_step(begin, sector, turn_s, speed_mps)?;
-    // The wrapping may have moved either end by a whole turn.
+    // Wrapping of the angle may have moved either end of the sector by a whole turn.
     let along_rad = math::wrap(start.angle_rad - least_rad + ROUNDING_RAD, TAU) - ROUNDING_RAD;
     Ok(HeadProgram {
         start_rad: least_rad + along_rad,
@@ -260,13 +261,13 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// Spacing rule for heads apart along the hull, with starts that differ by multiples of 1/s turn.
+/// Spacing rule for heads that are apart along the hull, with starts that differ by multiples of 1/s turn.
 ///
 /// The rule relates distance, speed and turn period such that the heads' passes interleave. Heads with these start
 /// angles interfere least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HullRule {
-    /// q: number of s-ths of a turn in which the vehicle travels the distance, rounded to the nearest.
+    /// q: number of s-ths of a turn in which the vehicle travels the distance between the heads, rounded.
     pub q: u32,
     /// The speed that fits the rule, m/s: s x / (q T).
     pub speed_mps: f64,
@@ -310,7 +311,7 @@ pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2],
     Ok(divided_m(2.0 * pitch_m / heads as f64, share))
 }
 
-/// Divides `both_m` at a position in the sector, the smaller part first.
+/// Divides the distance `both_m` at a position in the sector; returns the smaller part first.
 ///
 /// `both_m` is the distance travelled in a sweep there and back.
 pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {

@@ -41,5 +41,7 @@ pub mod section;
 pub mod spacing;
 pub mod strips;
 pub mod swing;
+pub mod target;
 
 pub use error::SamplingError;
+pub use target::Target;

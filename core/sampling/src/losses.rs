@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 use super::head::MAX_HEADS;
 use headrace_geometry::math;
 
-/// Length of a stretch of wall, m.
+/// Length of the stretches of wall for which the chance of a hole is limited, m.
 ///
 /// The share [`MAY_FAIL`] of such stretches may fail because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches that may fail: 95 in 100 stretches pass.
+/// Share of stretches of wall that may fail. The other 95 in 100 stretches meet the target.
 const MAY_FAIL: f64 = 0.05;
-/// Maximum number of passes.
+/// Maximum number of passes required over a place.
 ///
 /// More passes take too long in practice; the returns themselves must then improve.
 pub const MOST_PASSES: f64 = 10.0;
@@ -27,13 +27,14 @@ pub const MOST_PASSES: f64 = 10.0;
 const HARDLY: f64 = 1e-3;
 /// Share of a hole's diameter, along and around the tunnel, that lost passes and pings must cover.
 const INNER: f64 = 0.7;
-/// Upper limit of the share of lost returns: a head that receives one ping in a thousand receives nothing.
+/// Upper limit of the share of lost returns. In practice, a head that receives one ping in a thousand receives
+/// nothing.
 const MOST_SHARE: f64 = 0.999;
 
 /// Rate at which a head's pings lose their returns by chance.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LossRate {
-    /// Share of lost pings among all pings, from 0 to 1.
+    /// Share of pings with lost returns among all pings, from 0 to 1.
     pub share: f64,
     /// Share of lost pings among those that follow a lost ping, from 0 to 1.
     pub after_lost: f64,
@@ -47,7 +48,7 @@ impl LossRate {
         rate
     }
 
-    /// Whether both shares are from 0 to 1.
+    /// Whether both shares of lost pings are from 0 to 1.
     pub fn is_valid(&self) -> bool {
         [self.share, self.after_lost].iter().all(|share| (0.0..=1.0).contains(share))
     }
@@ -62,10 +63,10 @@ impl LossRate {
         self.share * power(self.after_lost, (pings - 1.0).max(0.0))
     }
 
-    /// Length in pings of the longest run to expect at this many places of the wall.
+    /// Length in pings of the longest run of lost pings to expect at this many places of the wall.
     ///
-    /// Such a run occurs at one of these places with the probability [`MAY_FAIL`]. Zero if even a single lost ping is
-    /// less likely.
+    /// A run of this length occurs at one of these places with the probability [`MAY_FAIL`]. Zero if even a single
+    /// lost ping is less likely.
     fn longest_run(self, places: f64) -> f64 {
         let expected = places * self.share / MAY_FAIL;
         if expected <= 0.0 {
@@ -76,19 +77,19 @@ impl LossRate {
     }
 }
 
-/// Sampling of a wall, and the target.
+/// Spacing of samples on a wall, and the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampled {
     /// Target T, m.
     pub target_m: f64,
-    /// Largest distance between neighbours of one turn, m.
+    /// Largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
     /// Perimeter of the wall, m.
     pub perimeter_m: f64,
 }
 
 impl Sampled {
-    /// Returns the number of passes over each place that replace a single pass because of lost returns.
+    /// Returns the number of passes over each place that lost returns require in place of a single pass.
     ///
     /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of two distances
     /// between passes: the one that the target allows, and the one that losses leave. It ranges from 1 without losses
@@ -112,7 +113,7 @@ impl Sampled {
         heads.sort_unstable_by(|a, b| b.chance_of_run(pings).total_cmp(&a.chance_of_run(pings)));
         let along_m = math::sqrt(lattice_m2);
         let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
-        // More passes have more places at which they may fail together.
+        // More passes provide more places at which passes may fail together.
         let once = self.passes_for(places, along_m, heads);
         let passes = self.passes_for(places * once, along_m, heads);
         debug_assert!(
@@ -124,8 +125,8 @@ impl Sampled {
 
     /// Whether a hole of this diameter, m, may have been caused by chance.
     ///
-    /// `along_m` is the distance between passes, and `rate` the loss rate. If chance is excluded, the wall there gives
-    /// no returns at any speed.
+    /// `along_m` is the distance between passes, and `rate` the loss rate. If chance is excluded, the wall at the
+    /// hole gives no returns at any speed.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn is_by_chance(&self, hole_m: f64, along_m: f64, rate: LossRate) -> bool {
@@ -139,12 +140,12 @@ impl Sampled {
         places.max(1.0) * power(chance, (inner_m / along_m).max(1.0)) >= HARDLY
     }
 
-    /// Number of pings, at least one, whose loss makes a gap as wide as the target.
+    /// Number of successive pings, at least one, whose loss makes a gap as wide as the target.
     fn pings_across(&self) -> f64 {
         (self.target_m / self.t_y_m - 1.0).max(1.0)
     }
 
-    /// Number of passes needed, for a number of places at which passes may fail together.
+    /// Number of passes needed over a place, given the number of places at which passes may fail together.
     ///
     /// See [`Sampled::passes_needed`]. `along_m` is the allowed distance between passes without losses.
     fn passes_for(&self, places: f64, along_m: f64, heads: &[LossRate]) -> f64 {
@@ -166,9 +167,9 @@ impl Sampled {
 
     /// Distance between passes at which the largest circle equals the target, m.
     ///
-    /// One of the passes misses a run of pings. With half a step h and half the gap g, the circle touches both ends
-    /// of the gap and two neighbouring samples of the previous pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the
-    /// pass with the gap, where a is the distance between passes.
+    /// One of two neighbouring passes misses a run of pings. With half the distance h between samples of a turn and
+    /// half the gap g, the circle touches both ends of the gap and two neighbouring samples of the previous pass. Its
+    /// centre is (a^2 + h^2 - g^2) / (2 a) from the pass with the gap, where a is the distance between passes.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

@@ -3,25 +3,26 @@
 //! Plan, live advice and report use the same functions, so that the planned speed equals the advised speed.
 //! Source: docs/decisions/0005-advice-and-plan.md.
 
+use crate::target::Target;
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation that requires no margin, m: about that of navigation without error estimates.
+/// Standard deviation of a hole's size that requires no margin, m: about that of navigation without error estimates.
 const NOTHING_M: f64 = 0.002;
 /// Minimum share of the distance between passes that remains after the margin.
 ///
 /// No speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
-/// Maximum share of the target that the margin takes.
+/// Maximum share of the target that the margin for position errors takes.
 const MOST_SHARE: f64 = 0.2;
-/// Share of the time between heads apart along the hull that counts towards the time between passes.
+/// Share of the travel time from the foremost to the rearmost head that counts towards the time between passes.
 ///
-/// Only some neighbouring passes are by heads apart, and holes between these passes grow by less than the heads'
+/// Only some neighbouring passes are by such heads, and holes between these passes grow by less than the heads'
 /// separation. With this share, a hole's size D is within two of its standard deviations 93 % of the time, over the
-/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share of
-/// 0, and 99 % with a share of 1.
+/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share
+/// of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
-/// Speed below which a vehicle counts as stationary, m/s.
+/// Speed below which a vehicle counts as at rest, m/s.
 const SLOW_MPS: f64 = 0.01;
 /// Limit for the time until the rearmost head reaches the position of the foremost head, seconds.
 const LONGEST_APART_S: f64 = 20.0;
@@ -38,15 +39,16 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 
 /// Part of a target reserved for position errors, m.
 ///
-/// The margin is `confidence_sd` times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
-/// distance between neighbours of one turn. The margin is continuous in all inputs. It is at most a fifth of the
-/// target, and leaves at least three fifths of the distance between passes. With a larger margin, a slower speed
-/// would cost more than it gains.
-pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t_y_m: f64) -> f64 {
+/// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
+/// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth
+/// of the target, and leaves at least three fifths of the distance between passes. With a larger margin, a slower
+/// speed would cost more than it gains.
+pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
+    let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
     let least_m = math::sqrt(LEFT_SHARE * LEFT_SHARE * along_m2 + t_y_m * t_y_m);
     let most_m = (target_m - least_m).clamp(0.0, MOST_SHARE * target_m);
-    let margin_m = (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(most_m);
+    let margin_m = target.error_m((pass_error_m - NOTHING_M).max(0.0)).min(most_m);
     debug_assert!(
         (0.0..=MOST_SHARE * target_m).contains(&margin_m),
         "a margin is at most a fifth of the target of {target_m} m: {margin_m} m"
@@ -56,44 +58,42 @@ pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t
 
 /// Exponent with which position errors grow with the time between two passes.
 ///
-/// It lies between the exponent of independent noise, 0.5, and that of drifting speeds, 1. VITA 2 with two heads,
-/// swaying, has 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
+/// It lies between the exponent of independent noise, 0.5, and that of drifting speeds, 1. On a swaying VITA 2 with
+/// two heads, the error is 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
 const GROWTH: f64 = 0.7;
 
-/// Target less the margin for position errors, as a function of speed.
+/// Target minus the margin for position errors, as a function of speed.
 ///
-/// The errors are known at the present speed only. At half that speed, the time between passes of heads apart along
-/// the hull is twice as long, and the margin is larger.
+/// The errors are known at the present speed only. At half that speed, the time between passes of heads that are
+/// apart along the hull is twice as long, and the margin is larger.
 #[derive(Debug, Clone, Copy)]
 pub struct RemainingTarget {
-    /// Target T, m.
-    pub target_m: f64,
-    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
-    pub confidence_sd: f64,
-    /// Standard deviation of a hole's size as measured, m.
+    /// Target.
+    pub target: Target,
+    /// Standard deviation of a hole's size as measured at the present speed, m.
     pub pass_error_m: f64,
-    /// [`error_time_s`] at the measurement of `pass_error_m`, seconds.
+    /// Value of [`error_time_s`] when `pass_error_m` was measured, seconds.
     pub measured_s: f64,
     /// Time between two passes of evenly spread heads, seconds.
     pub even_gap_s: f64,
-    /// Length of hull between the heads, m.
+    /// Length of hull between the foremost and the rearmost head, m.
     pub apart_m: f64,
-    /// The largest distance between neighbours of one turn, m.
+    /// The largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
 }
 
 impl RemainingTarget {
-    /// Returns the remaining target at a speed, m; grows continuously with speed.
+    /// Returns the target minus the margin at a speed, m; grows continuously with speed.
     pub fn at_m(&self, speed_mps: f64) -> f64 {
         let time_s = error_time_s(1.0 / self.even_gap_s, self.apart_m, speed_mps, APART_SHARE);
-        // If no heads turn, the time is unknown.
+        // If no heads turn, the time between passes is unknown.
         let same = self.measured_s <= 0.0 || (time_s - self.measured_s).abs() <= f64::EPSILON * time_s;
         let growth = if same { 1.0 } else { math::exp(GROWTH * math::ln(time_s / self.measured_s)) };
         let error_m = self.pass_error_m * growth;
-        self.target_m - position_margin_m(self.target_m, self.confidence_sd, error_m, self.t_y_m)
+        self.target.max_hole_m - position_margin_m(self.target, error_m, self.t_y_m)
     }
 
-    /// Returns the remaining target at unlimited speed, m.
+    /// Returns the target minus the margin for position errors at unlimited speed, m.
     pub fn most_m(&self) -> f64 {
         self.at_m(f64::INFINITY)
     }
@@ -111,7 +111,7 @@ pub struct ExpectedErrors {
 impl ExpectedErrors {
     /// Returns the standard deviation of a hole's size after a time between passes, m.
     ///
-    /// The value is interpolated, and proportional to time beyond the last entry.
+    /// The value is interpolated between the entries, and proportional to time beyond the last entry.
     pub fn pass_error_m(&self, time_s: f64) -> f64 {
         let mut before = [0.0, 0.0];
         for &after in &self.by_time {
@@ -128,26 +128,26 @@ impl ExpectedErrors {
 /// A cause that lowers the speed below that of the ideal geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Margin {
-    /// No cause but the distance between turns.
+    /// Ideal geometry: only the distance that the vehicle travels between two passes limits the speed.
     Geometry,
     /// Wall that the vehicle hides from some of its heads, or that is outside their range limits.
     Hidden,
     /// Heads that are not evenly phased, or that are side by side.
     Phase,
-    /// Beams that swing along the wall.
+    /// Beams that swing along the wall because the vehicle yaws or pitches.
     Swing,
-    /// Uncertain position.
+    /// Uncertain position of the vehicle.
     Position,
-    /// Lost returns.
+    /// Returns that the heads lose by chance.
     Losses,
 }
 
 impl Margin {
-    /// All causes in the order in which they are added.
+    /// All causes of lower speed, in the order in which their margins are added.
     pub const ALL: [Self; 6] =
         [Self::Geometry, Self::Hidden, Self::Phase, Self::Swing, Self::Position, Self::Losses];
 
-    /// Name used in reports and logs.
+    /// Name of the cause in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Geometry => "geometry",
@@ -160,29 +160,29 @@ impl Margin {
     }
 }
 
-/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the one before.
+/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
     pub geometry_mps: f64,
-    /// Speed with the wall that the vehicle hides, too.
+    /// Speed after hidden wall is also taken into account.
     pub hidden_mps: f64,
-    /// Speed with the phases and positions of the heads, too.
+    /// Speed after the phases and positions of the heads are also taken into account.
     pub phase_mps: f64,
-    /// Speed with the swing of beams, too.
+    /// Speed after the swing of beams is also taken into account.
     pub swing_mps: f64,
-    /// Speed with position errors, too.
+    /// Speed after position errors are also taken into account.
     pub position_mps: f64,
-    /// Speed with the passes for lost returns, too: the largest speed that meets the target.
+    /// Speed after lost returns are also taken into account: the largest speed that meets the target.
     pub losses_mps: f64,
     /// Standard deviation of a hole's size between two passes that `position_mps` assumes, m.
     pub pass_error_m: f64,
 }
 
 impl Margins {
-    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; no speed may exceed the one before.
+    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; no speed may exceed the previous one.
     pub fn of(speeds_mps: [f64; 6], pass_error_m: f64) -> Self {
-        // Each speed is raised to the largest one after it, so that a margin with a negative cost counts as zero.
+        // Each speed is raised to the largest later speed, so that a margin with a negative cost counts as zero.
         let mut most = 0.0_f64;
         let mut speeds = speeds_mps;
         for speed in speeds.iter_mut().rev() {
@@ -193,7 +193,7 @@ impl Margins {
         Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, pass_error_m }
     }
 
-    /// Returns the speeds in the order of [`Margin::ALL`], m/s.
+    /// Returns the largest speeds in the order of [`Margin::ALL`], m/s.
     pub fn speeds_mps(&self) -> [f64; 6] {
         let Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, .. } = *self;
         [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps]
@@ -227,23 +227,26 @@ impl Margins {
 mod tests {
     use super::*;
 
+    const TARGET: Target = Target { max_hole_m: 0.5, confidence_sd: 2.0 };
+
     #[test]
-    fn margin_is_a_limited_multiple_of_the_standard_deviation() {
-        let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(0.5, 2.0, pass_error_m, t_y_m);
+    fn position_margin_is_a_limited_multiple_of_the_standard_deviation() {
+        let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(TARGET, pass_error_m, t_y_m);
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
-        // If steps nearly reach the target, three fifths of the distance between passes remain.
+        // If the distance between samples of a turn nearly reaches the target, the margin leaves three fifths of the
+        // distance between passes.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);
         assert!(margin_m(0.1, 0.5).abs() <= 0.0 && margin_m(0.1, 0.6).abs() <= 0.0);
     }
 
     #[test]
-    fn margin_is_continuous() {
-        let mut before = position_margin_m(0.5, 2.0, 0.0, 0.3);
+    fn position_margin_is_continuous() {
+        let mut before = position_margin_m(TARGET, 0.0, 0.3);
         for k in 1..=2000 {
-            let now = position_margin_m(0.5, 2.0, 1e-4 * f64::from(k), 0.3);
+            let now = position_margin_m(TARGET, 1e-4 * f64::from(k), 0.3);
             assert!((0.0..=2.1e-4).contains(&(now - before)), "{k}");
             before = now;
         }
@@ -264,8 +267,7 @@ mod tests {
     #[test]
     fn margin_does_not_depend_on_the_speed_at_which_errors_were_measured() {
         let sure = RemainingTarget {
-            target_m: 0.5,
-            confidence_sd: 2.0,
+            target: TARGET,
             pass_error_m: 0.012,
             measured_s: error_time_s(0.25, 0.8, 0.1, APART_SHARE),
             even_gap_s: 4.0,
@@ -273,7 +275,7 @@ mod tests {
             t_y_m: 0.1,
         };
         assert!((sure.at_m(0.1) - (0.5 - 2.0 * 0.01)).abs() < 1e-9);
-        // Each time is 4 s plus 0.4 of 16 s, 8 s or 0 s.
+        // Each expected error time is 4 s plus 0.4 of 16 s, 8 s or 0 s.
         let times_s = [10.4, 7.2, 4.0];
         let error_m = |time_s: f64| 0.012 * math::exp(GROWTH * math::ln(time_s / times_s[1]));
         let at = [0.05, 0.1, f64::INFINITY].map(|speed_mps| sure.at_m(speed_mps));
@@ -295,7 +297,7 @@ mod tests {
     #[test]
     fn margin_costs_add_up_and_the_costliest_is_named() {
         let margins = Margins::of([0.23, 0.118, 0.117, 0.118, 0.108, 0.1], 0.02);
-        // The gain by swing is set to zero; it does not reduce the cost of phase.
+        // A negative cost of swing is set to zero, and does not reduce the cost of phase.
         let expected = [0.23, 0.118, 0.118, 0.118, 0.108, 0.1];
         assert!(margins.speeds_mps().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
         let sum: f64 = margins.prices_mps().iter().map(|(_, price)| price).sum();

@@ -4,7 +4,8 @@ use super::head::{HeadSpec, MAX_HEADS};
 use headrace_geometry::frames::{Body, Mount, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
 
-/// Angular spacing of the search, radians (0.05 degrees). The search may miss narrower obstructions.
+/// Angular spacing of the rays that search for obstructions, radians (0.05 degrees). Narrower obstructions may be
+/// missed.
 const SEARCH_STEP_RAD: f64 = TAU / 7200.0;
 
 /// A solid part of the vehicle.
@@ -17,21 +18,21 @@ pub enum Obstacle {
         /// The corner with the largest coordinates.
         most: Vec3<Body>,
     },
-    /// A capped cylinder.
+    /// A cylinder with flat ends.
     Cylinder {
         /// Centre of the first end.
         from: Vec3<Body>,
         /// Vector from the first end's centre to the other end's centre, m.
         along: Vec3<Body>,
-        /// Radius, m.
+        /// Radius of the cylinder, m.
         radius_m: f64,
     },
 }
 
-/// A range of angles of a head, in the sensor's frame.
+/// A range of beam angles of a head, in the sensor's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleRange {
-    /// Start angle, radians, in [0, 2 pi).
+    /// Start angle of the range, radians, in [0, 2 pi).
     pub from_rad: f64,
     /// Size of the range, radians, up to 2 pi.
     pub size_rad: f64,
@@ -43,7 +44,7 @@ impl AngleRange {
         math::wrap(angle_rad - self.from_rad, TAU) <= self.size_rad
     }
 
-    /// Middle of the range, radians.
+    /// Middle of the angle range, radians.
     pub fn middle_rad(&self) -> f64 {
         self.from_rad + self.size_rad / 2.0
     }
@@ -71,7 +72,7 @@ impl AngleRange {
 }
 
 impl Obstacle {
-    /// The body of a head.
+    /// Returns the cylinder of a head's body.
     pub fn of_head(spec: &HeadSpec) -> Self {
         let along = |x_m| spec.mount.rotation * Vec3::new(x_m, 0.0, 0.0);
         Self::Cylinder {
@@ -83,7 +84,7 @@ impl Obstacle {
 
     /// Whether a point is inside a box.
     ///
-    /// Always false for cylinders, since these are heads and heads may share a position.
+    /// Always false for cylinders, since these represent heads, and heads may share a position.
     pub fn holds(&self, place: Vec3<Body>) -> bool {
         match self {
             Self::Box { least, most } => {
@@ -96,7 +97,8 @@ impl Obstacle {
 
     /// Whether a ray from outside meets the obstacle.
     ///
-    /// A ray from inside does not, so that an obstacle around a head does not hide the wall from this head.
+    /// A ray from inside does not meet the obstacle, so an obstacle around a head does not hide the wall from this
+    /// head.
     pub fn stops(&self, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
         self.enters_m(from, direction).is_some()
     }
@@ -221,9 +223,9 @@ fn edge_rad(hidden: &impl Fn(f64) -> bool, from_rad: f64, to_rad: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// Returns for each head the angles that other heads and the hull hide.
+/// Returns for each head the angles at which other heads or the hull hide the wall.
 ///
-/// A neighbour whose axis runs through the head does not hide anything: such heads are idealised as one position.
+/// A neighbour whose axis runs through the head hides nothing, because such heads are idealised as one position.
 pub fn hidden_by_vehicle(heads: &[HeadSpec], hull: &[Obstacle]) -> Vec<Vec<AngleRange>> {
     heads
         .iter()
@@ -247,9 +249,10 @@ mod tests {
         fixtures::head(position, aft, 0.04)
     }
 
-    /// A point on a side is outside, like a point inside in only two of three coordinates.
+    /// A point on a side of the box counts as outside, and so does a point that is inside in only two of three
+    /// coordinates.
     ///
-    /// Cylinders contain nothing.
+    /// Cylinders contain no point.
     #[test]
     fn box_contains_points_inside_all_its_sides() {
         let hull = Obstacle::Box { least: Vec3::new(-1.0, -0.3, -0.2), most: Vec3::new(0.5, 0.3, 0.2) };
@@ -280,10 +283,11 @@ mod tests {
     }
 
     #[test]
-    fn heads_hide_angles_towards_each_other_in_any_orientation() {
+    fn each_head_occludes_its_neighbours_beams_in_any_orientation() {
         for aft in [false, true] {
             let pair = [head([0.5, 0.15, 0.0], aft), head([0.5, -0.15, 0.0], aft)];
-            // The left head's hidden range lies to the right, at 270 degrees. The right head's lies to the left.
+            // The left head's hidden range lies to the right, at 270 degrees. The right head's hidden range lies to
+            // the left.
             for ((ranges, spec), middle_deg) in
                 hidden_by_vehicle(&pair, &[]).iter().zip(&pair).zip([270.0, 90.0])
             {
@@ -293,7 +297,8 @@ mod tests {
             }
         }
         let mount = head([0.0; 3], true).mount;
-        // For a head that faces aft, a quarter turn from 10 degrees on is the quarter turn up to -10 degrees.
+        // Angles of an aft-facing head are mirrored, so its quarter turn from 10 degrees on becomes the one that ends
+        // at -10 degrees.
         let quarter = AngleRange { from_rad: 10_f64.to_radians(), size_rad: TAU / 4.0 }.across_body(&mount);
         assert!((quarter.from_rad.to_degrees() - 260.0).abs() < 1e-9, "{quarter:?}");
         assert!(quarter.has(300_f64.to_radians()) && !quarter.has(355_f64.to_radians()));
@@ -305,7 +310,7 @@ mod tests {
         assert!(hidden_by_vehicle(&apart, &[]).iter().all(Vec::is_empty));
         let together = [head([0.0; 3], false), head([0.0; 3], false)];
         assert!(hidden_by_vehicle(&together, &[]).iter().all(Vec::is_empty));
-        // Back to back, each body extends 0.2 m behind its beam, so the bodies overlap along the hull.
+        // The heads are back to back. Each body extends 0.2 m behind its beam, so the bodies overlap along the hull.
         let near = [head([0.1, 0.1, 0.0], false), head([-0.05, -0.1, 0.0], true)];
         assert!(hidden_by_vehicle(&near, &[]).iter().all(|ranges| ranges.len() == 1));
     }
@@ -381,7 +386,7 @@ mod tests {
                 assert!(!inside(direction.scaled(enters_m - 1e-9)), "direction {direction:?}");
                 assert!(inside(direction.scaled(enters_m + 1e-9)) || !marched, "direction {direction:?}");
             }
-            // Marching in steps may miss a ray that only grazes the cylinder.
+            // The reference marches along the ray in steps, so it may miss a cylinder that the ray only grazes.
             assert!(stops || !marched, "direction {direction:?}");
             met += i32::from(stops && marched) - i32::from(stops && !marched);
         }

@@ -14,16 +14,16 @@ use sectors::{AT_ONCE, Leg};
 
 /// Speed below which a vehicle counts as at rest, m/s.
 ///
-/// The phases then do not depend on the heads' offsets along the hull.
+/// At rest, phases do not depend on the heads' offsets along the hull.
 const AT_REST_MPS: f64 = 1e-3;
-/// Relative difference of turn periods above which heads count as out of step.
+/// Relative difference of turn periods above which heads count as rotating at different rates.
 const SAME_TURN: f64 = 0.02;
 /// Limit for the cosine of the angle between a head's axis and the tunnel's axis.
 ///
 /// Below it, the head is askew: its scan plane meets no wall near the vehicle.
 const ASKEW: f64 = 0.1;
 
-/// Limit of the rounding errors in shares of a turn or of a length.
+/// Tolerance for rounding errors in shares of a turn or of a length.
 const ROUNDING: f64 = 1e-9;
 
 /// Measured state of a vehicle and its heads at one epoch.
@@ -43,22 +43,22 @@ pub struct Situation {
     pub heads: [Option<HeadMotion>; MAX_HEADS],
     /// Heads that turn and ping, but get no returns from the wall.
     pub deaf: HeadSet,
-    /// Chance losses of each head, by number.
+    /// Rate at which each head loses returns by chance, by head number.
     pub losses: [LossRate; MAX_HEADS],
-    /// Upper bound of the chance losses of any head.
+    /// Upper bound of the rate at which any head loses returns by chance.
     ///
     /// All missing returns count as losses until enough pings have been counted.
     pub lost_at_most: LossRate,
 }
 
 impl Situation {
-    /// Returns the chance losses of the heads that turn.
+    /// Returns the rates at which the turning heads lose returns by chance.
     pub fn losses_of_turning(&self) -> impl Iterator<Item = LossRate> {
         self.heads.iter().zip(self.losses).filter_map(|(motion, rate)| motion.is_some().then_some(rate))
     }
 }
 
-/// The passes of a vehicle's heads at one speed.
+/// The times at which a vehicle's heads pass places on the wall, at one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passes {
     heads: HeadSet,
@@ -69,7 +69,7 @@ pub struct Passes {
     parallax_s: f64,
     /// Whether the vehicle is too slow for phases along the tunnel to have a meaning.
     at_rest: bool,
-    /// Whether extra passes are required for lost returns.
+    /// Whether extra passes over each place are required for lost returns.
     lossy: bool,
 }
 
@@ -79,16 +79,16 @@ enum Pattern {
     ///
     /// The value of each head is the phase of its passes, as a share of the vehicle's advance per turn, in [0, 1).
     Turning([f64; MAX_HEADS]),
-    /// Each head sweeps back and forth.
+    /// Each head sweeps a sector back and forth.
     Sectors {
         /// The longest period of a sweep there and back, seconds.
         sweep_s: f64,
-        /// Unevenness at shared ends, as in [`Passes::uneven_ends`].
+        /// Unevenness of passes at shared sector ends, as in [`Passes::uneven_ends`].
         uneven: f64,
     },
     /// Heads turn in opposite senses or at different rates.
     ///
-    /// Passes come at uneven times, and only one head is reliable.
+    /// Passes come at uneven times, and only the passes of a single head are predictable.
     Loose,
 }
 
@@ -99,7 +99,7 @@ pub struct Phasing {
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
     ahead_m: [f64; MAX_HEADS],
-    /// Position of each head in its sweep, for heads in sectors.
+    /// Position of each head in the sweep through its sector; `None` for continuous rotation.
     legs: [Option<Leg>; MAX_HEADS],
 }
 
@@ -163,7 +163,7 @@ impl Phasing {
 
     /// Largest distance along the tunnel between the planes in which the heads meet the wall, m.
     ///
-    /// Zero for heads that are not phased with each other.
+    /// The result is zero for heads that are not phased with each other.
     pub fn apart_m(&self) -> f64 {
         let Pattern::Turning(_) = self.pattern else { return 0.0 };
         self.spread_m()
@@ -198,7 +198,7 @@ impl Phasing {
         share
     }
 
-    /// Returns the heads with the phases of a schedule of `scheduled` heads for `planned_mps`.
+    /// Returns this phasing, with its phases replaced by those of a schedule of `scheduled` heads for `planned_mps`.
     ///
     /// A speed of zero means a schedule that ignores positions along the hull. Heads in sectors or out of step keep
     /// their phases.
@@ -217,7 +217,7 @@ impl Phasing {
         then
     }
 
-    /// Returns the passes at a speed of `speed_mps`.
+    /// Returns the passes of the heads at the speed `speed_mps`.
     ///
     /// Continuous rotation: head k passes the vertical at the times t_k + i T. The head is x_k ahead of the vehicle's
     /// origin, so it meets the wall at chainages x_k + v (t_k + i T). Divided by v T, these chainages are phases on a
@@ -245,7 +245,7 @@ impl Phasing {
     }
 }
 
-/// Angle until each head next passes the vertical, as a share of a turn.
+/// Angle that each head turns until it next passes the vertical, as a share of a turn.
 ///
 /// `None` for heads with opposite senses or different rates.
 fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]> {
@@ -268,9 +268,9 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
     Some(phases)
 }
 
-/// Distance ahead of the vehicle's origin at which a head meets the wall, along the tunnel, m.
+/// Chainage at which a head's scan plane meets the wall, relative to the vehicle's origin, m.
 ///
-/// The distance is the same all round the wall, except for a part common to all heads with parallel axes. `None` for
+/// The chainage is the same all round the wall, except for a part common to all heads with parallel axes. `None` for
 /// a head whose scan plane lies along the tunnel.
 ///
 /// The head's samples lie in the plane through the head normal to its axis n: `x n_x + y n_y + z n_z = (head) n`.
@@ -300,9 +300,9 @@ pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
 }
 
 impl Passes {
-    /// Returns these passes for side-by-side heads.
+    /// Returns these passes with the parallax of side-by-side heads.
     ///
-    /// The heads' angles towards one place on the wall differ by up to `parallax_rad`.
+    /// The angles from the heads to one place on the wall differ by up to `parallax_rad`.
     #[must_use]
     pub fn beside(self, parallax_rad: f64) -> Self {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
@@ -315,7 +315,7 @@ impl Passes {
         Self { lossy, ..self }
     }
 
-    /// Whether extra passes are required for lost returns.
+    /// Whether extra passes over each place are required for lost returns.
     pub fn is_lossy(&self) -> bool {
         self.lossy
     }
@@ -329,7 +329,7 @@ impl Passes {
             Pattern::Turning(_) => {
                 (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
             }
-            // There and back: at a sector's end, one pass follows another immediately.
+            // A sweep there and back passes a place twice. At a sector's end, one pass follows another immediately.
             Pattern::Sectors { sweep_s, .. } => (2, sweep_s),
             Pattern::Loose => (1, gap_s),
         };
@@ -346,8 +346,8 @@ impl Passes {
 
     /// Creates passes of continuously rotating heads, evenly phased in order of their numbers.
     ///
-    /// A schedule for the present speed has these passes if the turn periods are equal. Otherwise, heads run out of
-    /// step, and no phase is reliable. `turn_s` returns the turn period of a head, seconds.
+    /// A schedule for the present speed has these passes if the turn periods are equal. With unequal turn periods,
+    /// heads run out of step, and no phase is reliable. `turn_s` returns the turn period of a head, seconds.
     /// Errors: no head.
     pub fn evenly_phased(heads: HeadSet, turn_s: impl Fn(usize) -> f64) -> Result<Self, SamplingError> {
         const IN_STEP: f64 = 1e-6;
@@ -376,7 +376,7 @@ impl Passes {
         Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Returns the set of heads.
+    /// Returns the set of heads whose passes these are.
     pub fn heads(&self) -> HeadSet {
         self.heads
     }
@@ -433,7 +433,7 @@ impl Passes {
         even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
     }
 
-    /// Returns [`Passes::gap_s`] of all heads if they were evenly phased, seconds; zero without a head.
+    /// Returns the longest time between passes of all heads if their phases were even, seconds; zero without a head.
     pub fn even_gap_s(&self) -> f64 {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
@@ -442,7 +442,7 @@ impl Passes {
         }
     }
 
-    /// Returns the phase error of each head relative to the first that turns, radians.
+    /// Returns the phase error of each head relative to the first head that turns, radians.
     ///
     /// The error is an angle of the head's turn, in [-pi, pi). If it is positive, the head passes a place later, and
     /// farther ahead, than in the schedule for `scheduled` heads. `None` for an absent head, for heads that aren't
@@ -487,7 +487,7 @@ fn largest_gap(phases: &mut [f64]) -> f64 {
     gap
 }
 
-/// 1 if the head's angles grow in the body's sense, -1 if they grow in the opposite sense.
+/// Sign of a head's rotation: 1 if its angles grow in the body's sense of rotation, -1 if in the opposite sense.
 fn body_sign(motion: &HeadMotion) -> f64 {
     if faces_aft(motion.mount.rotation) { -1.0 } else { 1.0 }
 }

@@ -1,4 +1,4 @@
-//! The general case by ray casting, for any profile and pose.
+//! Points where a head's beams meet the wall, by ray casting for any profile and pose.
 //!
 //! The functions compute the points where the beams of a head at rest meet the wall.
 
@@ -13,7 +13,7 @@ use headrace_geometry::tunnel::{Profile, WallHit};
 /// Range above which a beam counts as running along the tunnel, m.
 const ALONG_M: f64 = 1000.0;
 
-/// A head at rest in a straight tunnel.
+/// A head at rest in a straight tunnel, from which rays are cast.
 #[derive(Debug, Clone, Copy)]
 pub struct Standing<'a> {
     profile: &'a Profile,
@@ -26,7 +26,7 @@ pub struct Standing<'a> {
 pub struct Sounding {
     /// Head angle, radians in the sensor's frame.
     pub angle_rad: f64,
-    /// Vector from the head to the wall: chainage, left, up, m. Its length is the range.
+    /// Vector from the head to the wall: chainage, left, up, m. The vector's length is the range.
     pub beam: Vec3<Tunnel>,
     /// Arc length of the point on the wall, m.
     pub arc_m: f64,
@@ -39,7 +39,7 @@ pub struct Sounding {
 pub struct Footprint {
     /// Extent of the footprint in the head's scan plane, along the unrolled wall, m.
     pub in_plane_m: f64,
-    /// Extent of the footprint across the scan plane, m.
+    /// Extent of the footprint across the head's scan plane, m.
     pub across_m: f64,
 }
 
@@ -116,7 +116,7 @@ impl Sounding {
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// The distance is the shortest one around the perimeter. Holidays are measured by it.
+    /// The distance is the shortest one around the perimeter. The size of a holiday is measured in this way.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -128,19 +128,19 @@ impl Sounding {
     }
 }
 
-/// Soundings of a whole turn at equal angles, with reusable buffers.
+/// Ray-cast soundings of a head's whole turn at equal angles, with reusable buffers.
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
     /// Signed arc lengths from the first sounding to each sounding, m. The last entry is the arc length of the whole
     /// turn.
     ///
-    /// Values are negative if the head turns against arc length.
+    /// Values are negative if the head turns in the direction of falling arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
-    /// Angles and beam directions of the soundings, cached between casts.
+    /// Angles and beam directions of the soundings, cached for the next cast.
     beams: Vec<(f64, Vec3<Sensor>)>,
-    /// Stride of the distances cached in `steps_m`; zero if no distances are cached.
+    /// Number of soundings between the pairs whose distances `steps_m` caches; zero if no distances are cached.
     stride: usize,
     steps_m: Vec<f64>,
 }
@@ -148,7 +148,7 @@ pub struct Ring {
 stateful!(Ring { state: perimeter_m, stride; lists: soundings, way_m, beams, steps_m; });
 
 impl Ring {
-    /// Casts a ring of `count` soundings, the first at `start_rad`.
+    /// Casts a ring of `count` rays around a turn, the first at the angle `start_rad`.
     ///
     /// Errors: as for [`Standing::sounding`]; a count of zero.
     pub fn cast(standing: &Standing<'_>, start_rad: f64, count: u32) -> Result<Self, SamplingError> {
@@ -193,7 +193,7 @@ impl Ring {
             "a turn goes round whole perimeters of {} m: {way_m} m",
             self.perimeter_m
         );
-        // Capacity for `keep_steps`, which must not allocate.
+        // Reserves capacity for `keep_steps`, which must not allocate.
         self.steps_m.clear();
         self.steps_m.reserve(self.soundings.len());
         Ok(())
@@ -205,7 +205,7 @@ impl Ring {
         (rounds - math::round_to_i64(rounds) as f64).abs() <= 1e-6
     }
 
-    /// Computes the beam directions of a turn, unless the last cast had the same directions.
+    /// Computes the beam directions of a turn, unless the last cast used the same directions.
     fn aim(&mut self, start_rad: f64, count: u32) {
         let from_rad = self.beams.first().map(|(angle_rad, _)| angle_rad.to_bits());
         if self.beams.len() == count as usize && from_rad == Some((start_rad + 0.0).to_bits()) {
@@ -228,7 +228,7 @@ impl Ring {
         }
     }
 
-    /// The distances cached by [`Ring::keep_steps`]; `None` for another stride.
+    /// The distances cached by [`Ring::keep_steps`]; `None` if they were cached for another stride.
     pub fn kept_steps_m(&self, stride: usize) -> Option<&[f64]> {
         let is_kept = self.stride == stride;
         debug_assert!(
@@ -240,7 +240,7 @@ impl Ring {
         is_kept.then_some(self.steps_m.as_slice())
     }
 
-    /// Number of soundings per step for `count` soundings per turn, rounded up; at least one.
+    /// Number of soundings per angular step of a head for `count` soundings per turn, rounded up; at least one.
     pub fn stride(step_rad: f64, count: u32) -> usize {
         let soundings = -math::floor_to_i64(-(step_rad * f64::from(count) / TAU - 1e-6));
         usize::try_from(soundings.clamp(1, i64::from(count.max(1)))).unwrap_or(1)
@@ -251,12 +251,12 @@ impl Ring {
         self.perimeter_m
     }
 
-    /// Signed arc length of a whole turn, m: negative if the head turns against arc length.
+    /// Signed arc length of a whole turn, m; negative if the head turns in the direction of falling arc length.
     pub fn way_round_m(&self) -> f64 {
         self.way_m.last().copied().unwrap_or(0.0)
     }
 
-    /// The soundings, in order of angle.
+    /// The soundings of the ring, in order of angle.
     pub fn soundings(&self) -> &[Sounding] {
         &self.soundings
     }
@@ -278,7 +278,7 @@ impl Ring {
         self.steps_m(stride).fold(0.0, f64::max)
     }
 
-    /// Distances on the unrolled wall from each sounding to the one `stride` further, m.
+    /// Distances on the unrolled wall from each sounding to the sounding `stride` places further, m.
     ///
     /// The distances follow the direction of rotation. With one ping per turn, the distance is the whole perimeter.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
@@ -289,8 +289,8 @@ impl Ring {
         self.pairs(stride).enumerate().map(move |(k, (a, b))| {
             let (to, turns) =
                 if k + rest < count { (k + rest, turns) } else { (k + rest - count, turns + 1) };
-            // The direct difference has the smallest rounding error. The cumulative length gives the number of
-            // rounds, mostly zero.
+            // The difference of arc lengths has the smallest rounding error. The cumulative length gives the number
+            // of whole perimeters to add, mostly zero.
             let short_m = math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
             let round_m = way_m(to) + whole_m * turns as f64 - way_m(k) - short_m;
             let rounds = if round_m.abs() < 0.4 * self.perimeter_m {
@@ -302,7 +302,8 @@ impl Ring {
         })
     }
 
-    /// Smallest, mean and largest chord between soundings `stride` apart, m; zeros without soundings.
+    /// Smallest, mean and largest straight-line distance between soundings `stride` places apart, m; zeros without
+    /// soundings.
     pub fn chords_m(&self, stride: usize) -> [f64; 3] {
         let chords = || self.pairs(stride).map(|(a, b)| a.chord_m(b));
         let count = self.soundings.len();
@@ -316,7 +317,7 @@ impl Ring {
         ]
     }
 
-    /// The longest range of the turn, m; zero without soundings.
+    /// The longest range to the wall in the turn, m; zero without soundings.
     pub fn longest_range_m(&self) -> f64 {
         self.soundings.iter().map(Sounding::range_m).fold(0.0, f64::max)
     }

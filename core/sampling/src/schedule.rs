@@ -6,7 +6,7 @@ use super::layout::{self, HeadLayout, steps_over};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
-/// Programs of the heads, and the head angles that result from them.
+/// Rotation programs of the heads, and the head angles that result from them.
 ///
 /// Heads step, ping at each step, and reverse at the ends of a sector. The last step is shorter if the sector is not
 /// a whole number of steps.
@@ -24,12 +24,12 @@ impl Schedule {
         Ok(Self { heads: heads.iter().copied().zip(programs).collect() })
     }
 
-    /// Program of each head, in order.
+    /// Rotation program of each head, in the order of the heads.
     pub fn programs(&self) -> impl Iterator<Item = &HeadProgram> {
         self.heads.iter().map(|(_, program)| program)
     }
 
-    /// Angle of a head at its last ping up to `since` the start, sensor frame, radians.
+    /// Angle of a head's last ping at the time `since` after the start, in the sensor frame, radians.
     ///
     /// The angle is in [0, 2 pi) for continuous rotation, or within the head's sector. `None` for a head that does
     /// not exist, or before the start.

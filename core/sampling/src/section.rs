@@ -7,7 +7,7 @@
 use super::error::{SamplingError, not_negative, positive};
 use headrace_geometry::math;
 
-/// T_y1, m: the step along a flat wall at the foot of the perpendicular, the smallest on that wall.
+/// T_y1, m: distance between samples of a turn on a flat wall at the foot of the perpendicular, the smallest there.
 ///
 /// `distance_m` > 0 is the distance h to the wall, `step_rad` the step theta, in (0, pi/2).
 /// Errors: an argument out of range; a step of 90 degrees or more.
@@ -16,10 +16,10 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
     t_y2_m(distance_m, step_rad, 1)
 }
 
-/// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1.
+/// T_y2, m: distance between the samples at (m - 1) theta and m theta on a flat wall, for any m >= 1.
 ///
-/// The step is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall.
-/// The formula h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)),
+/// The distance is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall. The
+/// formula h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)),
 /// which avoids cancellation. Multiples of theta have twice double precision, so that a beam almost along the wall is
 /// as accurate.
 /// Errors: an argument out of range; m theta of 90 degrees or more.
@@ -32,9 +32,9 @@ pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingErr
     Ok(distance_m * math::sin(step_rad) / (cosine * cos_of_multiple(m - 1, step_rad)?))
 }
 
-/// T_c, m: the step along a circular wall for a head at its centre, the same everywhere on it.
+/// T_c, m: distance between samples of a turn on a circular wall for a head at its centre, the same everywhere.
 ///
-/// The step is the chord between two samples. `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 is the step theta.
+/// T_c is a straight-line distance. `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 is the step theta.
 /// Errors: an argument out of range.
 /// Source: Jorge et al. 2021, Eq. 7 (b sin(theta / 2)).
 pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
@@ -43,7 +43,7 @@ pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
     Ok((2.0 * radius_m * math::sin(step_rad / 2.0)).abs())
 }
 
-/// Mean step along a flat wall from the foot of the perpendicular to m theta, m.
+/// Mean distance between samples of a turn on a flat wall, from the foot of the perpendicular to m theta, m.
 ///
 /// Errors: as for [`t_y2_m`].
 /// Source: Jorge et al. 2021, Eq. 8, whose sum telescopes to Eq. 9: h tan(m theta) / m.
@@ -55,7 +55,7 @@ pub fn t_y2_mean_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, Sampli
     Ok(distance_m * sine / cosine / f64::from(m))
 }
 
-/// T_yp, m: upper bound of the mean step of a whole turn, perimeter / pings per turn.
+/// T_yp, m: upper bound of the mean distance between samples of a turn: perimeter / pings per turn.
 ///
 /// The bound holds for any head position.
 ///
@@ -65,7 +65,7 @@ pub fn t_yp_m(perimeter_m: f64, steps: u32) -> Result<f64, SamplingError> {
     Ok(positive("the perimeter in metres", perimeter_m)? / positive("the steps of a turn", f64::from(steps))?)
 }
 
-/// epsilon: overlap of the beams of neighbouring pings (beam width / step).
+/// epsilon: overlap of the beams of neighbouring pings (beam width / angular step).
 ///
 /// Beams do not overlap below 1. `beam_rad` is the beam's full width zeta, `step_rad` the step theta.
 /// Errors: an argument that isn't above zero.
@@ -74,7 +74,7 @@ pub fn overlap(beam_rad: f64, step_rad: f64) -> Result<f64, SamplingError> {
     Ok(positive("the beam's width in radians", beam_rad)? / positive("the step in radians", step_rad)?)
 }
 
-/// eta, m: range resolution of a head: its span of ranges divided by the number of counts.
+/// eta, m: range resolution of a head, which is its span of ranges divided by the number of counts.
 ///
 /// Errors: no counts, a negative least range, or an empty span of ranges.
 /// Source: Jorge et al. 2021, §6.
@@ -110,7 +110,7 @@ pub fn footprint_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> Result<f64
     Ok(distance_m * math::sin(beam_rad) / (far * near))
 }
 
-/// cos(m x) for m x in [0, pi/2).
+/// Returns cos(m x) for m x in [0, pi/2), with m x in twice double precision.
 fn cos_of_multiple(m: u32, x_rad: f64) -> Result<f64, SamplingError> {
     let (high, low) = product(f64::from(m), x_rad);
     above_zero(high, math::cos(high) - math::sin(high) * low)
@@ -121,10 +121,10 @@ fn sin_of_multiple(m: u32, x_rad: f64) -> f64 {
     math::sin(high) + math::cos(high) * low
 }
 
-/// cos(a + b) for |a + b| < pi/2.
+/// Returns cos(a + b) for |a + b| < pi/2.
 fn cos_of_sum(a_rad: f64, b_rad: f64) -> Result<f64, SamplingError> {
     let high = a_rad + b_rad;
-    // Rounding error of the sum (Knuth's two-sum).
+    // Rounding error of a sum of two doubles (Knuth's two-sum).
     let b_part = high - a_rad;
     let low = (a_rad - (high - b_part)) + (b_rad - b_part);
     above_zero(high, math::cos(high) - math::sin(high) * low)
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn formulas_equal_hand_computed_values() {
         let step = f64::to_radians(0.9);
-        // tan 0.9 deg = 0.015709; h = 4.571 m.
+        // The hand-computed values use tan 0.9 deg = 0.015709 and h = 4.571 m.
         assert!((t_y1_m(4.571, step).unwrap() - 0.071_807).abs() < 1e-6);
         assert!((t_y2_m(2.0, step, 50).unwrap() - 2.0 * (tan(50.0 * step) - tan(49.0 * step))).abs() < 1e-13);
         assert!((t_c_m(6.05, step).unwrap() - 0.095_032).abs() < 1e-6);
@@ -214,9 +214,10 @@ mod tests {
     }
 
     proptest! {
-        /// Theorem 1: steps along a flat wall grow with the distance from the perpendicular's foot.
+        /// Theorem 1: distances between samples on a flat wall grow with the distance from the foot of the
+        /// perpendicular.
         #[test]
-        fn flat_wall_steps_grow_with_distance(h in 0.01..100.0f64, step in 1e-4..0.3f64, share in 0.0..1.0f64) {
+        fn flat_wall_sample_distances_grow_with_distance_from_the_perpendicular(h in 0.01..100.0f64, step in 1e-4..0.3f64, share in 0.0..1.0f64) {
             let last = headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1;
             prop_assume!(last >= 2);
             let m = 1 + headrace_geometry::math::floor_to_i64(share * (last - 1) as f64);
@@ -224,15 +225,15 @@ mod tests {
             prop_assert!(t_y2_m(h, step, m).unwrap() < t_y2_m(h, step, m + 1).unwrap());
         }
 
-        /// T_c < T_y1: a circular crown is sampled more densely than a floor at the same distance.
+        /// T_c < T_y1, so a circular crown is sampled more densely than a floor at the same distance.
         #[test]
         fn crown_is_sampled_more_densely_than_the_floor(h in 0.01..100.0f64, step in 1e-3..1.5f64) {
             prop_assert!(t_c_m(h, step).unwrap() < t_y1_m(h, step).unwrap());
         }
 
-        /// The mean of Eq. 8 equals the mean of its terms.
+        /// The mean distance between samples by Eq. 8 equals the mean of the single distances.
         #[test]
-        fn mean_step_equals_the_mean_of_the_single_steps(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
+        fn mean_sample_distance_equals_the_mean_of_the_single_distances(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
             let m = u32::try_from(headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1).unwrap_or(0);
             prop_assume!(m >= 1);
             let sum: f64 = (1..=m).map(|k| t_y2_m(h, step, k).unwrap()).sum();

@@ -7,7 +7,7 @@ use headrace_geometry::math;
 /// T_max, m: the longer diagonal of the parallelogram of four neighbouring samples.
 ///
 /// `t_x_m` is the distance between passes, `advance_m` (d) the distance travelled between two pings, and `t_y_m` the
-/// largest distance between neighbours within a turn. All arguments are finite.
+/// largest distance between neighbouring samples of one turn. All arguments are finite.
 /// Source: Jorge et al. 2021, Eq. 16.
 pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)
@@ -27,11 +27,11 @@ pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_per
 ///
 /// `None` if `t_y_m` alone reaches the target.
 pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
-    // (T - t)(T + t) avoids cancellation for t close to T.
+    // The form (T - T_y)(T + T_y) avoids cancellation if T_y is close to T.
     (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))
 }
 
-/// The spiral of samples on the wall at a constant speed.
+/// The spiral of samples that a turning head leaves on the wall at a constant vehicle speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     speed_mps: f64,
@@ -69,41 +69,47 @@ impl Spiral {
         self.pitch_m() / self.passes_per_turn
     }
 
-    /// T_ymax, m, from the largest step `t_y2_m` of a head at rest. Source: Eq. 13.
+    /// T_ymax, m: largest distance between samples of a turn, from the largest distance `t_y2_m` of a head at rest.
+    /// Source: Eq. 13.
     pub fn t_y_max_m(&self, t_y2_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_y2_m)
     }
 
-    /// T_ymin, m, from the smallest step of a head at rest: T_y1 or T_c. Source: Eq. 14.
+    /// T_ymin, m: smallest distance between samples of a turn, from that of a head at rest: T_y1 or T_c. Source: Eq.
+    /// 14.
     pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
         math::hypot(self.advance_m(), smallest_step_m)
     }
 
-    /// Mean step, m, from the mean step `t_yp_m` of a head at rest, as printed in Eq. 15.
+    /// Mean distance between samples of a turn, m, from the mean distance `t_yp_m` of a head at rest, as printed in
+    /// Eq. 15.
     ///
-    /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with a single step.
-    /// [`Spiral::t_y_mean_m`] uses the advance of one step, so that both values can be displayed.
+    /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with the distance of a single step.
+    /// [`Spiral::t_y_mean_m`] uses the advance between two pings, so that both values can be displayed.
     /// Source: Eq. 15.
     pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }
 
-    /// Mean step, m: the mean step of a head at rest combined with the advance of one step.
+    /// Mean distance between samples of a turn, m: that of a head at rest combined with the advance between two
+    /// pings.
     pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_yp_m)
     }
 
-    /// T_max, m, from the largest step `t_y2_m` of a head at rest. Source: Eq. 16.
+    /// T_max: largest spacing of samples, m, from the largest distance `t_y2_m` of a head at rest. Source: Eq. 16.
     pub fn t_max_m(&self, t_y2_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y2_m)
     }
 
-    /// T_mean, m, from the mean step including the advance. Source: Eq. 17.
+    /// T_mean: mean spacing of samples, m, from the mean distance of a turn's samples, advance included. Source: Eq.
+    /// 17.
     pub fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_mean_m)
     }
 
-    /// T_min, m, from the smallest step including the advance. Source: Eq. 18.
+    /// T_min: smallest spacing of samples, m, from the smallest distance of a turn's samples, advance included.
+    /// Source: Eq. 18.
     pub fn t_min_m(&self, t_y_min_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_min_m)
     }
@@ -121,7 +127,7 @@ mod tests {
         assert!((one.pitch_m() - 1.576).abs() < 1e-12 && (one.t_x_m() - 1.576).abs() < 1e-12);
         let four = Spiral::new(0.197, fast, 4.0).unwrap();
         assert!((four.t_x_m() - 0.394).abs() < 1e-12);
-        // sqrt(0.39794^2 + 0.18^2)
+        // The expected T_max is sqrt(0.39794^2 + 0.18^2).
         assert!((four.t_max_m(0.18) - 0.436_756_6).abs() < 1e-6);
         assert!((one.t_y_mean_printed_m(0.085) - math::hypot(1.576, 0.085)).abs() < 1e-12);
         assert!((one.t_y_mean_m(0.085) - 0.085_091_3).abs() < 1e-6);
@@ -140,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn speed_for_a_target_gives_back_the_target() {
+    fn spacing_at_the_speed_for_a_target_equals_the_target() {
         let v = speed_for_target_mps(0.5, 0.12, 2.0, 0.02).unwrap();
         assert!((t_max_m(v * 2.0, v * 0.02, 0.12) - 0.5).abs() < 1e-12);
         assert_eq!(speed_for_target_mps(0.5, 0.5, 2.0, 0.02), None);

@@ -20,7 +20,7 @@ use thin::Thin;
 pub use limit::Going;
 pub use view::{Arc, PARTS, Sector, View};
 
-/// Width below which a strip is a rounding error, m.
+/// Width below which a strip of wall counts as a rounding error, m.
 const NO_WIDTH_M: f64 = 1e-9;
 
 /// A strip of the wall along the tunnel.
@@ -30,19 +30,19 @@ pub struct Strip {
     pub arc: Arc,
     /// The heads that see the strip.
     pub seen_by: HeadSet,
-    /// Whether any part of the strip is hidden from a head that would otherwise ping it.
+    /// Whether any part of the strip is hidden from a head whose beam would otherwise sweep it.
     ///
-    /// Pings then stop up to a step before the strip's edge. If the strip is merely outside a sector, pings stop at
-    /// its edge.
+    /// Pings then stop up to one angular step before the strip's edge. If the strip is merely outside a sector, pings
+    /// stop at its edge.
     pub hidden: bool,
-    /// Longest time between two passes over the strip, as a share of the longest on any strip: 0.5 to 1.
+    /// Longest time between two passes over the strip, as a share of the longest time on any strip: 0.5 to 1.
     ///
     /// The time is the longest at the ends of a sector.
     pub wait: f64,
 }
 
 impl Strip {
-    /// Whether another strip differs from this one only in its place.
+    /// Whether another strip differs from this strip only in its place on the wall.
     fn is_like(&self, other: &Self) -> bool {
         let same_wait = (self.wait - other.wait).abs() <= 0.0;
         self.seen_by == other.seen_by && self.hidden == other.hidden && same_wait
@@ -52,20 +52,20 @@ impl Strip {
 /// Largest speed for a target, and T_y at the place that limits this speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
-    /// The speed, m/s; infinite if nothing limits it.
+    /// The largest speed, m/s; infinite if nothing limits it.
     pub speed_mps: f64,
-    /// T_y of the limiting strip, m.
+    /// T_y (largest distance between samples of a turn) on the strip that limits the speed, m.
     pub t_y_m: f64,
 }
 
-/// A strip that misses a target at a speed.
+/// A strip of the wall that misses a target at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
     /// Longest time between two passes over the strip, s, without extra passes for lost returns.
     ///
     /// Infinite if no head sees the strip.
     pub gap_s: f64,
-    /// The largest step on the strip, m.
+    /// The largest distance between neighbouring samples of a turn on the strip, m.
     pub t_y_m: f64,
     /// Width of the strip around the wall, m: the minimum distance between the samples on either side of it.
     pub width_m: f64,
@@ -73,27 +73,28 @@ pub struct Unmet {
 
 /// Strips of the wall in order of arc length; a single strip if all heads see all of the wall.
 ///
-/// Neighbouring strips differ in the heads that see them or in the time between passes. The largest steps on each
-/// strip are stored for several settings of the heads.
+/// Neighbouring strips differ in the heads that see them or in the time between passes. For several settings of the
+/// heads, the largest distance between neighbouring samples of a turn is stored for each strip.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
     strips: Vec<Strip>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
-    /// Largest step of the heads that see a strip, and of all heads, m, by setting and strip.
+    /// Largest distance between samples of a turn, m, of the heads that see a strip and of all heads; by setting and
+    /// strip.
     steps_m: Vec<[f64; 2]>,
-    /// Passes needed because of lost returns, within and across a strip, by setting and strip.
+    /// Number of passes needed because of lost returns, within and across a strip; by setting and strip.
     ///
-    /// Empty before the first call of `count_losses`.
+    /// The list is empty before the first call of `count_losses`.
     needed: Vec<[f64; 2]>,
-    /// Strip of each sounding of the current ring, and the approximate distance to this strip's end, m.
+    /// Strip of each sounding of the current ring, and approximate distance from the sounding to the strip's end, m.
     strip_of: Vec<(usize, f64)>,
 }
 
 stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, needed, strip_of; });
 
 impl Strips {
-    /// Creates an empty list with capacity for the strips of `arcs` arcs in `settings` settings.
+    /// Creates an empty list with capacity for the strips of `arcs` arcs and for `settings` settings of the heads.
     pub fn with_room(arcs: usize, settings: usize, soundings: u32) -> Self {
         let strips = 2 * arcs + 1;
         Self {
@@ -106,7 +107,7 @@ impl Strips {
         }
     }
 
-    /// Builds the strips of these views, without steps.
+    /// Divides the wall into strips by the views of the heads; distances between samples are not yet known.
     ///
     /// Allocates: not if the capacity suffices for the views' sectors and hidden arcs.
     pub fn rebuild<'a>(&mut self, perimeter_m: f64, views: &'a [View]) {
@@ -148,7 +149,7 @@ impl Strips {
         (sum_m - self.perimeter_m).abs() <= 1e-6 * self.perimeter_m
     }
 
-    /// Joins the last strip with the first one across the seam if they are alike.
+    /// Joins the last strip with the first strip across the arc-length seam if both are alike.
     fn join_at_the_seam(&mut self) {
         let first = self.strips.first().copied();
         if self.strips.len() > 1
@@ -160,9 +161,11 @@ impl Strips {
         }
     }
 
-    /// Measures the largest steps on each strip in `settings` settings of the heads.
+    /// Measures the largest distance between samples of a turn on each strip, for each of `settings` settings of the
+    /// heads.
     ///
-    /// `stride` returns the ring stride of a head's step by setting and head; `None` for an absent head.
+    /// `stride` returns the number of ring soundings in a head's step, by setting and head; `None` for an absent
+    /// head.
     ///
     /// Allocates: not if the capacity suffices for the settings.
     pub fn measure<'a>(
@@ -210,19 +213,19 @@ impl Strips {
         }
     }
 
-    /// The strips.
+    /// The strips of the wall, in order of arc length.
     pub fn as_slice(&self) -> &[Strip] {
         &self.strips
     }
 
-    /// Returns the strip at an arc length.
+    /// Returns the strip that contains an arc length.
     pub fn at(&self, arc_m: f64) -> Option<&Strip> {
         self.strips.get(number_at(&self.strips, arc_m, self.perimeter_m))
     }
 
     /// Returns the arc of a strip joined with its neighbours that the same heads see.
     ///
-    /// The neighbours may have another time between passes.
+    /// The joined strips may differ in the time between passes.
     fn seen_alike(&self, k: usize) -> Arc {
         let count = self.strips.len();
         let Some(strip) = self.strips.get(k) else {
@@ -236,7 +239,8 @@ impl Strips {
         Arc { from_m: strip.arc.from_m - back_m, length_m: (forward_m + back_m).min(self.perimeter_m) }
     }
 
-    /// Returns the largest step in a setting, m, over all heads and the strips that they see.
+    /// Returns the largest distance between samples of a turn in a setting, m, over all heads and the strips that
+    /// they see.
     pub fn largest_step_m(&self, setting: usize) -> f64 {
         let count = self.strips.len();
         let of_setting = self.steps_m.iter().skip(setting * count).take(count);
@@ -245,8 +249,8 @@ impl Strips {
 
     /// Returns T_max predicted at a speed, m: the largest of any strip.
     ///
-    /// The result is infinite if no head sees a wide strip. Passes are farther apart on a strip that some heads do
-    /// not see. On a narrow strip, the samples on either side limit T as well.
+    /// The result is infinite if there is a wide strip that no head sees. Passes are farther apart on a strip that
+    /// some heads do not see. On a narrow strip, the samples on either side limit T as well.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
@@ -302,7 +306,7 @@ impl Strips {
         Some(slowest_mps)
     }
 
-    /// Returns T predicted on each strip at a speed, m.
+    /// Returns the spacing T predicted on each strip at a speed, m.
     fn ts_m(
         &self,
         setting: usize,
@@ -354,7 +358,8 @@ impl Strips {
         Ok(slowest)
     }
 
-    /// Returns two limits of T for each strip: within the strip, and between the samples beside it.
+    /// Returns two upper bounds of the spacing T for each strip: one from samples within the strip, and one from the
+    /// samples on either side of it.
     ///
     /// The first is `None` if no head sees the strip. The second is `None` if the strip is not thin.
     fn limits(
@@ -390,7 +395,7 @@ impl Strips {
 
     /// Returns the distance between the samples on either side of the thin strips around strip `k`, m.
     ///
-    /// Also returns whether sectors alone leave these strips out.
+    /// Also returns whether these strips are thin only because they lie between sectors.
     fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> (f64, bool) {
         let count = self.strips.len();
         let thin = |number: usize| {
@@ -410,11 +415,12 @@ impl Strips {
             is_left_out &= strip.seen_by.is_empty() && !strip.hidden;
             step_m = step_m.max(self.steps_m.get(setting * count + number).map_or(0.0, |steps| steps[1]));
         }
-        // Pings end at the edge of a sector, but up to a step before the edge of a hidden arc.
+        // Pings end at the edge of a sector, but up to one angular step before the edge of a hidden arc.
         (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
     }
 
-    /// Computes the number of passes over each strip that replace a single pass in a setting.
+    /// Computes how many passes over each strip replace a single pass because of lost returns, in a setting of the
+    /// heads.
     ///
     /// The number is used with [`crate::passes::Passes::lossy`]. `rates` are the losses of each head, `None` for an
     /// absent head.
@@ -442,24 +448,24 @@ impl Strips {
         }
     }
 
-    /// Returns the number of passes that replace a single pass, within a strip and across it.
+    /// Returns how many passes replace a single pass because of lost returns, within a strip and across it.
     fn needed(&self, setting: usize, k: usize, thin: &Thin<'_>) -> [f64; 2] {
         let needed = || self.needed.get(setting * self.strips.len() + k).copied();
         if thin.is_lossy() { needed().unwrap_or([1.0; 2]) } else { [1.0; 2] }
     }
 }
 
-/// Start and direction of a step.
+/// Start and direction on the perimeter of a step between two soundings.
 struct Reached {
     head: usize,
     arc_m: f64,
     strip: usize,
     forward: bool,
-    /// Whether the step certainly ends in the strip in which it begins.
+    /// Whether a head's step between two soundings certainly ends in the strip in which it begins.
     is_within: bool,
 }
 
-/// Records a step on every strip that it touches or crosses, even on the narrowest one.
+/// Records a head's step between two soundings on every strip that it touches or crosses, even the narrowest.
 fn note_step(
     strips: &[Strip],
     steps_m: &mut [[f64; 2]],

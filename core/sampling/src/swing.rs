@@ -7,25 +7,26 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Number of stored directions: at 5 Hz, `WINDOW` plus one turn of a head in its slowest mode.
 const BEATS: usize = 320;
-/// Length of the history in which a swing counts.
+/// Length of the past period in which a swing counts.
 ///
 /// A swing with a period of up to a minute reaches its full extent within half a minute.
 const WINDOW: DurNs = DurNs(30_000_000_000);
 /// Largest rotation between two passes that is attributed to navigation errors, radians.
 ///
-/// A rotation counts fully from twice this value.
+/// A rotation of twice this value or more counts fully.
 const DEAD_RAD: f64 = 0.0075;
 
-/// Swing of a vehicle.
+/// Size and speed of a vehicle's swing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Swing {
     /// Largest rotation between two passes, divided by the time between them, rad/s.
     pub rate_radps: f64,
-    /// Largest rotation over any time within the history, radians.
+    /// Largest rotation between any two moments of the stored history, radians.
     pub most_rad: f64,
-    /// Largest rotation between two heads apart along the hull, divided by the time between them, rad/s.
+    /// Largest rotation between the passes of two heads that are apart along the hull, divided by the time between
+    /// them, rad/s.
     ///
-    /// The time ends when the rearmost head reaches the position of the foremost.
+    /// The time is that until the rearmost head reaches the position of the foremost head.
     pub apart_rate_radps: f64,
 }
 
@@ -39,7 +40,7 @@ pub struct Looks {
 stateful!(Looks { state: count; lists: looks; });
 
 impl Default for Looks {
-    /// Allocates: the full capacity.
+    /// Allocates: the full capacity of the history.
     fn default() -> Self {
         Self { looks: Vec::with_capacity(BEATS), count: 0 }
     }
@@ -59,7 +60,8 @@ impl Looks {
         self.count += 1;
     }
 
-    /// Returns the largest rotation from `look` to any direction stored since a time, radians.
+    /// Returns the largest rotation from the direction `look` to any direction stored since the time `since`,
+    /// radians.
     pub fn turned_since(&self, look: Vec3<Tunnel>, since: MonoNs) -> f64 {
         let recent = self.newest_first().take_while(|(then, _)| *then >= since);
         recent.map(|(_, then)| (look + -*then).norm()).fold(0.0, f64::max)
@@ -67,8 +69,9 @@ impl Looks {
 
     /// Returns the largest swing of the last half minute up to `now`.
     ///
-    /// The result persists while the vehicle swings to and fro. `gap_s` is the time between passes; all heads pass a
-    /// place within `apart_s`. Rotation within the navigation errors is excluded, with a continuous transition.
+    /// The result stays about constant while the vehicle swings to and fro. `gap_s` is the time between passes; all
+    /// heads pass a place within `apart_s`. Rotation within the navigation errors is excluded, with a continuous
+    /// transition.
     /// Allocates: never.
     pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing {
         let rate = |over_s: f64| {
@@ -86,7 +89,7 @@ impl Looks {
         Swing { rate_radps, most_rad: counted(largest_rad) * most_rad, apart_rate_radps }
     }
 
-    /// Returns the largest rotation over a duration within the last half minute, radians.
+    /// Returns the largest rotation between two moments this duration apart within the last half minute, radians.
     fn turned_over(&self, now: MonoNs, over_s: f64) -> f64 {
         let over = DurNs::from_secs_f64(over_s.min(1e3));
         let oldest = self.newest_first().last().map(|(_, look)| *look);
@@ -97,7 +100,7 @@ impl Looks {
             while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < over.0) {
                 earlier.next();
             }
-            // If the duration exceeds the history, the oldest direction is used.
+            // If the duration exceeds the stored history, the oldest direction is used.
             let before = earlier.peek().map(|(_, before)| *before).or(oldest);
             turned_rad = turned_rad.max(before.map_or(0.0, |before| (*look + -before).norm()));
         }
@@ -153,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_swing_counts_between_heads_apart_along_the_hull() {
+    fn slow_vehicle_swing_counts_between_heads_at_different_positions_along_the_hull() {
         // The rotation between passes is within the navigation errors, but the rotation over ten seconds is not.
         let (looks, now) = looks(80.0, |t| [0.02 * math::sin(TAU * t / 50.0), 0.0]);
         let swing = looks.swing(now, 2.0, 10.0);
@@ -164,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn swing_expires_half_a_minute_after_its_end() {
+    fn vehicle_swing_expires_half_a_minute_after_its_end() {
         let ended = |t: f64| [if t < 50.0 { 0.1 * math::sin(TAU * t / 10.0) } else { 0.0 }, 0.0];
         let (now, still) = (looks(75.0, ended), looks(90.0, ended));
         assert!(now.0.swing(now.1, 2.0, 0.0).rate_radps > 0.02);
@@ -198,10 +201,10 @@ mod tests {
     }
 
     #[test]
-    fn pitch_swing_counts_and_gaps_beyond_the_history_use_its_oldest_direction() {
+    fn pitch_swing_counts_and_longer_pass_intervals_use_the_oldest_direction() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
-        // The largest rotation is from the oldest stored direction to the one farthest from it.
+        // The largest rotation is from the oldest stored direction to the direction farthest from it.
         let turned_rad = looks.swing(now, 60.0, 0.0).rate_radps * 60.0;
         assert!((turned_rad - 0.09).abs() < 0.01, "{turned_rad}");
         assert_eq!(looks.swing(now, f64::NAN, 0.0), Swing::default());

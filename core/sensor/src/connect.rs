@@ -7,15 +7,15 @@ use crate::driver::Carrier;
 
 /// Default serial rate, baud.
 const USUAL_BAUD: u32 = 115_200;
-/// Highest serial rate accepted, baud.
+/// Highest accepted serial rate, baud.
 const MAX_BAUD: u32 = 12_000_000;
 
 /// A USB device, identified by its descriptors, which are the same on any port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbIdentity {
-    /// Vendor id.
+    /// USB vendor id.
     pub vendor: u16,
-    /// Product id.
+    /// USB product id.
     pub product: u16,
     /// Serial number, to distinguish devices of the same product.
     pub serial: Option<String>,
@@ -30,71 +30,71 @@ pub enum SerialPort {
     Usb(UsbIdentity),
 }
 
-/// A parsed `connect`.
+/// A parsed `connect` value from a vehicle file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Connect {
     /// `serial:/dev/serial/by-id/...?baud=115200` or `serial:usb:VID:PID[:SERIAL]?baud=115200`.
     Serial {
-        /// The port.
+        /// Serial port of the device.
         port: SerialPort,
-        /// Bits per second; 8 data bits, no parity, 1 stop bit.
+        /// Serial rate, bits per second; 8 data bits, no parity, 1 stop bit.
         baud: u32,
     },
     /// `tcp:HOST:PORT`: the host opens a connection to the device.
     Tcp {
-        /// Host name or address, and port.
+        /// Host name or address of the device, and its port.
         address: String,
     },
     /// `udp:HOST:PORT`: the host sends packets to the device and receives the answers.
     Udp {
-        /// Host name or address, and port.
+        /// Host name or address of the device, and its port.
         address: String,
     },
     /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port to which the device sends.
     ///
     /// Only one sender is accepted: the one in `from`, or else the first whose message the device's driver accepts.
     UdpListen {
-        /// Local address and port.
+        /// Local address and port at which the host receives.
         address: String,
         /// Host of the device, optionally with its port; any host if `None`.
         from: Option<String>,
     },
-    /// `can:INTERFACE`.
+    /// `can:INTERFACE`: a CAN bus.
     Can {
-        /// Name of the network interface.
+        /// Name of the CAN network interface.
         interface: String,
     },
-    /// `hid:VID:PID[:SERIAL]`.
+    /// `hid:VID:PID[:SERIAL]`: a USB device of the class HID.
     Hid(UsbIdentity),
-    /// `i2c:/dev/i2c-1:0x40`.
+    /// `i2c:/dev/i2c-1:0x40`: a device on an I2C bus.
     I2c {
-        /// Device file of the bus.
+        /// Device file of the I2C bus.
         bus: String,
-        /// Address of the device, 7 bits.
+        /// Address of the device on the I2C bus, 7 bits.
         address: u8,
     },
 }
 
-/// Error in a `connect`.
+/// Error in the value of a `connect` key.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("connect = {text:?}: {problem}; {allowed}")]
 pub struct ConnectError {
-    /// The text as written.
+    /// The value of `connect` as written.
     pub text: String,
-    /// The fault.
+    /// Description of the fault.
     pub problem: String,
-    /// Allowed forms, with an example.
+    /// Allowed forms of `connect`, with an example.
     pub allowed: String,
 }
 
-/// All forms, listed in errors about a text with none of them.
+/// All forms of `connect`, listed in errors about a text that has none of them.
 const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
      tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
 
 impl Connect {
     /// Parses the `connect` of a sensor in a vehicle file.
     ///
-    /// Errors: the text has none of the forms of [`Connect`]; the message lists the allowed ones.
+    /// Errors: the text has none of the forms of [`Connect`]; the message lists the allowed forms.
     pub fn parse(text: &str) -> Result<Self, ConnectError> {
         let refused = |problem: &str, allowed: &str| ConnectError {
             text: text.to_owned(),
@@ -138,7 +138,7 @@ impl Connect {
         }
     }
 
-    /// Carrier of the connection.
+    /// Carrier of the connection: serial, TCP, UDP, CAN, HID or I2C.
     pub fn carrier(&self) -> Carrier {
         match self {
             Self::Serial { .. } => Carrier::Serial,
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn error_names_the_fault_and_the_allowed_form() {
+    fn connect_error_names_the_fault_and_the_allowed_form() {
         for (text, named, right) in [
             ("", "it is empty", "tcp:HOST:PORT"),
             ("/dev/ttyUSB0", "no colon", "serial:/dev"),

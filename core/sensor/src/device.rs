@@ -1,4 +1,4 @@
-//! Interface of a device's crate.
+//! Interface that the crate of each kind of device implements.
 //!
 //! A kind parses its own keys in a sensor's table of a vehicle file. Each configured sensor has a driver, a decoder
 //! and an emulator.
@@ -19,7 +19,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::{HeadMode, HeadProgram, HeadSpec};
 use serde::{Deserialize, Serialize};
 
-/// Keys common to all `[[sensors]]` tables.
+/// Values of the keys that all `[[sensors]]` tables of a vehicle file share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorConfig {
     /// Name of the sensor and of its log channel.
@@ -28,7 +28,7 @@ pub struct SensorConfig {
     pub plugin: String,
     /// Connection, as written in the vehicle file.
     pub connect: String,
-    /// Mount on the vehicle.
+    /// Position and attitude of the sensor on the vehicle.
     pub mount: Mount,
     /// Delay from the time of validity of a value to the receive time of its first byte.
     pub latency: DurNs,
@@ -37,14 +37,14 @@ pub struct SensorConfig {
 /// Mount and kind of a sensor, for navigation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorInfo {
-    /// Mount on the vehicle.
+    /// Position and attitude of the sensor on the vehicle.
     pub mount: Mount,
     /// Kind of sensor.
     pub kind: SensorKind,
 }
 
 impl SensorInfo {
-    /// Creates a sensor that is mounted at the vehicle's origin and that navigation does not use.
+    /// Creates the information of a sensor at the vehicle's origin that navigation does not use.
     pub fn other() -> Self {
         Self { mount: Mount { position: Vec3::zero(), rotation: Rot::identity() }, kind: SensorKind::Other }
     }
@@ -57,7 +57,7 @@ pub enum SensorKind {
     Head,
     /// An echosounder; readings below `min_confidence` are ignored.
     Echosounder {
-        /// Minimum confidence, 0 to 1.
+        /// Minimum confidence of a used reading, 0 to 1.
         min_confidence: f64,
     },
     /// A pressure sensor.
@@ -90,14 +90,14 @@ pub struct InertialNoise {
     pub force_bias: BiasSpec,
 }
 
-/// Bias of an inertial sensor, in its unit.
+/// Bias of an inertial sensor, in the sensor's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasSpec {
-    /// Standard deviation of the constant part, which is set at power-on.
+    /// Standard deviation of the bias's constant part, which is set at power-on.
     pub turn_on: f64,
-    /// Standard deviation of its drift during operation.
+    /// Standard deviation of the bias's drift during operation.
     pub in_run: f64,
-    /// Correlation time of the drift, s.
+    /// Correlation time of the bias's drift, s.
     pub time_s: f64,
 }
 
@@ -106,13 +106,13 @@ pub struct BiasSpec {
 pub struct CounterSpec {
     /// Smallest change of the length, m; `None` if each reading carries the step.
     pub step_m: Option<f64>,
-    /// Noise, standard deviation without rounding, m; `None` if unknown.
+    /// Standard deviation of the counter's noise, rounding excluded, m; `None` if unknown.
     pub sd_m: Option<f64>,
 }
 
 /// One kind of device, named in vehicle files as `plugin`, for instance `plugin = "imagenex881"`.
 pub trait DeviceKind: Sync {
-    /// The name in vehicle files and in the channel metadata of logs.
+    /// Name of this kind of device in vehicle files and in the channel metadata of logs.
     fn name(&self) -> &'static str;
 
     /// Parses this kind's own keys in a sensor's table. `sensor` already contains the common keys.
@@ -128,22 +128,22 @@ pub trait DeviceKind: Sync {
 
 /// Parts of a configured sensor that the loop uses.
 pub struct SensorSpec {
-    /// Common keys of the sensor's table in the vehicle file.
+    /// Values of the common keys in the sensor's table of the vehicle file.
     pub sensor: SensorConfig,
     /// Kind of sensor, for navigation.
     pub kind: SensorKind,
-    /// Decoder from bytes to readings.
+    /// Decoder from the sensor's bytes to readings.
     pub decoder: Box<dyn Decoder>,
-    /// Size of the ring buffer ahead of the loop, bytes.
+    /// Size of the ring buffer between the sensor's port and the loop, bytes.
     pub ring_bytes: usize,
 }
 
-/// A configured sensor.
+/// A sensor as configured in a vehicle file.
 pub trait Device: Send + Sync {
-    /// Returns the parts for the loop, with a decoder in its initial state.
+    /// Returns the parts of the sensor for the loop, with a decoder in its initial state.
     fn specification(&self) -> SensorSpec;
 
-    /// Returns the specification for scheduling; `None` unless the device is a profiling head.
+    /// Returns the head's properties for scheduling its rotation; `None` unless the device is a profiling head.
     fn head(&self) -> Option<HeadSpec> {
         None
     }
@@ -159,7 +159,7 @@ pub trait Device: Send + Sync {
     /// Returns the quantity that the device measures, for simulations.
     fn sense(&self) -> Sense;
 
-    /// Returns the device's side of the wire, for simulations.
+    /// Returns the emulator of the device's side of the line, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
 
     /// Returns the noise of an inertial unit if known. Values in the vehicle file take precedence.
@@ -178,7 +178,7 @@ pub trait Device: Send + Sync {
         None
     }
 
-    /// Writes the packet without its optional payload to `shorter` and returns `true`.
+    /// Writes a packet without the payload that a log may omit to `shorter`, and returns `true`.
     ///
     /// Returns `false` if the packet has no such payload, or if the payload cannot be recognised from these bytes
     /// alone.
@@ -199,14 +199,14 @@ pub trait Device: Send + Sync {
         Vec::new()
     }
 
-    /// Returns the supported carriers. UDP may replace any of them; each datagram then carries one message.
+    /// Returns the supported carriers. UDP may replace any of these carriers; each datagram then carries one message.
     fn carriers(&self) -> &'static [Carrier];
 
     /// Returns the driver, which is the host's side of the device's line.
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
-/// Payload that a log may omit. The readings are bit-identical without it.
+/// Part of a packet that a log may omit. The readings are bit-identical without it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OptionalPayload {
     /// Echo strengths, if the message also contains the range.
@@ -217,7 +217,7 @@ pub enum OptionalPayload {
 
 /// Converts bytes to readings: a codec with the device's configuration.
 ///
-/// It is pure and runs in the loop. Its state depends only on the decoded bytes, and does not include the
+/// The decoder is pure and runs in the loop. Its saved state depends only on the decoded bytes, and excludes the
 /// configuration.
 pub trait Decoder: Stateful + Send + Sync {
     /// Decodes a packet and calls `sink` for each completed reading.
@@ -225,7 +225,7 @@ pub trait Decoder: Stateful + Send + Sync {
     /// Allocates: never.
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded));
 
-    /// Counters of the codec.
+    /// Counters of the decoder's codec.
     fn counts(&self) -> CodecCounts;
 
     /// Number of readings that were decoded but withheld.
@@ -247,9 +247,9 @@ pub trait Decoder: Stateful + Send + Sync {
 /// Initial conditions of an emulated device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EmulatorSetup {
-    /// Power-on time. The device does nothing before it.
+    /// Time at which the device is switched on. Before this time, the device does nothing.
     pub start: MonoNs,
-    /// Program of a head; `None` for other devices.
+    /// Rotation program of a head; `None` for other devices.
     pub head: Option<HeadProgram>,
     /// Water and location of the tunnel, as the operator knows them.
     pub site: Site,
@@ -268,7 +268,7 @@ pub enum Direction {
     Sent,
 }
 
-/// Receives the traffic on a line: direction, time of the first byte, bytes.
+/// Function that receives the traffic on a line: direction, time of the first byte, bytes.
 pub type LineSink<'a> = &'a mut dyn FnMut(Direction, MonoNs, &[u8]);
 
 /// Device side of the wire, and optionally a host that polls it. `M` is the type of its measurements.
@@ -285,13 +285,13 @@ pub trait Emulator<M>: Send + Sync {
 
     /// Encodes a measurement and passes each message to `line` with its time.
     ///
-    /// It is called once for each measurement begun, in the same order. An emulator with an emulated host also
-    /// encodes imported measurements, which it did not begin. In imported measurements, a value that is not finite
-    /// was not measured, and no message carries it.
+    /// The method is called once for each measurement that the device began, in the same order. An emulator with an
+    /// emulated host also encodes imported measurements, which it did not begin. A value that is not finite in an
+    /// imported measurement means that the quantity was not measured; no message carries it.
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 
-/// An emulated device with its type of measurement.
+/// An emulated device, by the type of its measurements.
 pub enum Emulated {
     /// A profiling head.
     Head(Box<dyn Emulator<Sounding>>),
@@ -310,17 +310,17 @@ pub enum Emulated {
 /// Quantity measured by a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sense {
-    /// Range to the wall, all around.
+    /// Range to the wall, measured in all directions by a turning head.
     Head,
-    /// Range to the wall, in one direction.
+    /// Range to the wall, measured in one fixed direction.
     Echosounder,
-    /// Depth.
+    /// Depth below the water's surface.
     Depth,
-    /// Attitude and motion.
+    /// Attitude, turn rate and acceleration of the vehicle.
     Inertial,
-    /// Velocity over ground.
+    /// Velocity of the vehicle over ground.
     Velocity,
-    /// Distance travelled.
+    /// Distance travelled, as length of cable.
     Tether,
 }
 

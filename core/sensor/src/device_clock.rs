@@ -1,10 +1,10 @@
 //! Model of a device's clock against the host's: unwraps its ticks and estimates its drift.
 //!
 //! A device stamp arrives at the host after a minimum delay, and buses and queues only add to that delay. So the
-//! receive time less the device time has a lower envelope, and the slope of the envelope is the drift. Time is
-//! divided into stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to
-//! the kept stamps. A constant delay shifts all stamps equally, which changes the offset but not the slope. If all
-//! slots are full, stretches are merged in pairs, so that ten hours need no more memory than two minutes.
+//! receive time minus the device time has a lower envelope, and the slope of the envelope is the drift. Time is
+//! divided into stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to the
+//! kept stamps. A constant delay shifts all stamps equally, which changes the offset but not the slope. If all slots
+//! are full, stretches are merged in pairs, so that ten hours need no more memory than two minutes.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,14 +12,14 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::array;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Maximum number of stretches kept.
+/// Maximum number of stretches of time for which a stamp is kept.
 const PLACES: usize = 128;
 
-/// Initial length of a stretch on the device's clock.
+/// Initial length of a stretch of time, measured by the device's clock.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
-/// Minimum number of stretches for a drift estimate. The scatter of fewer stamps is a poor measure of the drift's
-/// error.
+/// Minimum number of stretches of time for a drift estimate. The scatter of fewer stamps is a poor measure of the
+/// drift's error.
 const LEAST_STRETCHES: usize = 8;
 
 /// Largest deviation of a stamp from its predicted time that is attributed to queues.
@@ -28,14 +28,14 @@ const LEAST_STRETCHES: usize = 8;
 /// most a quarter of the wrap period, for a clock that wraps soon.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
-/// Largest difference between the minimum delays of two stretches.
+/// Largest plausible difference between the minimum delays in two stretches of time.
 ///
-/// The limit is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. No clock drifts by more
+/// This difference is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. No clock drifts by more
 /// than this ratio. The stamp of a stretch with a larger delay was queued, and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
 const MOST_DRIFT: f64 = 500e-6;
 
-/// Longest queueing delay. If stretches stay shifted for longer, a new epoch begins.
+/// Longest plausible queueing delay. If delays stay shifted for longer, a new clock epoch begins.
 const LONGEST_QUEUE_NS: i64 = 30_000_000_000;
 
 const LONGEST_TICK_NS: i64 = 900_000_000_000;
@@ -45,13 +45,13 @@ const PPM: f64 = 1e6;
 /// Statistics of a device's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ClockReport {
-    /// Stamps received.
+    /// Number of device stamps received.
     pub stamps: u64,
     /// Number of times the clock restarted, or fell behind by more than queues explain.
     pub restarts: u64,
     /// Number of times the clock ran ahead by more than queues explain.
     pub jumps: u64,
-    /// Length of the epoch used for the drift, on the device's clock.
+    /// Length of the clock epoch used for the drift, measured by the device's clock.
     pub span: DurNs,
     /// Drift against the host's clock; `None` until there is enough data.
     pub drift: Option<Drift>,
@@ -60,7 +60,7 @@ pub struct ClockReport {
 /// Rate error against the host's clock, parts per million. Positive: the device's clock is fast.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
-    /// Rate error, parts per million.
+    /// Rate error of the device's clock, parts per million.
     pub ppm: f64,
     /// Standard deviation of the rate error, parts per million.
     pub sd_ppm: f64,
@@ -69,23 +69,23 @@ pub struct Drift {
 /// Tracks a device's clock. Allocates: never.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct DeviceClock {
-    /// Number of ticks after which the clock wraps.
+    /// Number of ticks after which the device's clock wraps.
     round: i128,
     tick: DurNs,
     stamps: u64,
     restarts: u64,
     jumps: u64,
     epoch: Option<Epoch>,
-    /// Most certain drift of earlier epochs, and the length of the epoch that gave it.
+    /// Most certain drift of earlier clock epochs, and the length of the epoch that gave it.
     before: Option<(Drift, DurNs)>,
 }
 
-/// A run of the device's clock without restart or jump.
+/// A clock epoch: a run of the device's clock without restart or jump.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Epoch {
-    /// Receive time of the first stamp, the zero of device time.
+    /// Receive time of the epoch's first stamp, which is the zero of device time.
     begun: MonoNs,
-    /// The last stamp: raw ticks, unwrapped ticks, receive time.
+    /// The last device stamp: raw ticks, unwrapped ticks, receive time.
     raw: i128,
     elapsed_ticks: i128,
     received: MonoNs,
@@ -99,11 +99,11 @@ struct Edge {
     kept: [Stamp; PLACES],
     len: usize,
     span_ns: i64,
-    /// Number of the current stretch, and its least delayed stamp.
+    /// Number of the current stretch of time, and its least delayed stamp.
     open: Option<(i64, Stamp)>,
-    /// Slope for comparing stamps within a stretch.
+    /// Drift by which delays of stamps within a stretch are corrected before comparison.
     slope: f64,
-    /// Device time since which the stretches have been shifted against the kept stamps.
+    /// Device time since which the delays of new stretches have been shifted against the kept stamps.
     shifted_since_ns: Option<i64>,
 }
 
@@ -122,7 +122,7 @@ struct Line {
     mean_late_ns: f64,
 }
 
-/// Shift of a completed stretch against the kept stamps of the epoch.
+/// Shift of the delay in a completed stretch against the kept stamps of the epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shift {
     None,
@@ -146,7 +146,7 @@ impl DeviceClock {
         }
     }
 
-    /// Processes a stamp received at `received`; ignores bits beyond the clock's width.
+    /// Processes a device stamp received at `received`; ignores bits beyond the clock's width.
     ///
     /// Returns the device time since the first stamp of the epoch, without wraps.
     pub fn take(&mut self, ticks: u64, received: MonoNs) -> DurNs {
@@ -190,7 +190,8 @@ impl DeviceClock {
         Some(epoch.begun + device + late)
     }
 
-    /// Returns the statistics so far. The drift comes from the epoch with the smallest standard deviation.
+    /// Returns the clock's statistics so far. The drift comes from the epoch with the smallest standard deviation of
+    /// drift.
     pub fn report(&self) -> ClockReport {
         let now = self.drift_now();
         let best =
@@ -259,13 +260,13 @@ impl Edge {
         self.kept.get(..self.len).unwrap_or_default()
     }
 
-    /// Ends the current stretch and keeps its stamp, unless the stamp was queued.
+    /// Ends the current stretch of time and keeps its least delayed stamp, unless that stamp was delayed by a queue.
     fn close(&mut self) -> Shift {
         let Some((_, stamp)) = self.open.take() else { return Shift::None };
         let shift = self.shift(stamp);
         if shift != Shift::None {
             if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
-                // The earlier stamps were the queued ones, because the epoch began while a queue was full.
+                // The earlier stamps were the delayed ones, because the epoch began while a queue was full.
                 self.len = 0;
             } else {
                 let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);
@@ -281,13 +282,13 @@ impl Edge {
         Shift::None
     }
 
-    /// Returns the shift of a stamp against the stamp kept last.
+    /// Returns how the delay of a stamp is shifted against the stamp kept last.
     fn shift(&self, stamp: Stamp) -> Shift {
         let Some(last) = self.kept().last() else { return Shift::None };
         let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
         let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
         let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
-        // The stamps of a clock that falls behind look delayed.
+        // If a clock falls behind, its stamps look delayed.
         if late_ns > most_ns {
             Shift::Behind
         } else if late_ns < -most_ns {
@@ -310,7 +311,7 @@ impl Edge {
         }
     }
 
-    /// Merges stretches in pairs, which doubles their length.
+    /// Merges stretches of time in pairs, which doubles their length.
     fn join(&mut self) {
         self.span_ns = self.span_ns.saturating_mul(2);
         let mut joined = [Stamp::default(); PLACES];
@@ -328,7 +329,7 @@ impl Edge {
         (self.kept, self.len) = (joined, len);
     }
 
-    /// Fits a line to the kept stamps; `tick` is the resolution of the clock.
+    /// Fits a line to the delays of the kept stamps; `tick` is the resolution of the clock.
     fn line(&self, tick: DurNs) -> Option<Line> {
         let kept = self.kept();
         if kept.len() < LEAST_STRETCHES {
@@ -347,7 +348,7 @@ impl Edge {
         let slope = xy / xx;
         let left = |(x, y): (f64, f64)| (y - slope * x) * (y - slope * x);
         let scatter = kept.iter().map(about).map(left).sum::<f64>() / (n - 2.0);
-        // Even stamps without scatter are uncertain by the rounding to a tick.
+        // Even if stamps have no scatter, they are uncertain by the rounding to a tick.
         let quantum = tick.0 as f64 * tick.0 as f64 / 12.0;
         let slope_sd = math::sqrt((scatter + quantum) / xx);
         (xx > 0.0).then_some(Line { slope, slope_sd, mean_device_ns, mean_late_ns })
@@ -360,16 +361,16 @@ impl Line {
     }
 }
 
-/// Returns the elapsed ticks for a raw `difference`.
+/// Returns the ticks elapsed between two stamps whose raw difference is `difference`.
 ///
-/// It adds as many wraps as bring the result nearest to the time `waited`.
+/// The function adds as many wraps of the clock as bring the result nearest to the time `waited`.
 fn advance(difference: i128, round: i128, tick: DurNs, waited: DurNs) -> i128 {
     let expected = i128::from(waited.0).div_euclid(i128::from(tick.0));
     let rounds = (expected - difference + round / 2).div_euclid(round);
     difference + rounds * round
 }
 
-/// Returns the stamp with less delay above a line of this slope.
+/// Returns the stamp that has less delay after correction for a drift of `slope`.
 fn earlier(a: Stamp, b: Stamp, slope: f64) -> Stamp {
     let allowed = slope * b.device_ns.saturating_sub(a.device_ns) as f64;
     if (b.late_ns.saturating_sub(a.late_ns) as f64) < allowed { b } else { a }

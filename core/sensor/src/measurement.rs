@@ -7,12 +7,12 @@ use super::reading::Level;
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// A measurement of any kind of device.
+/// A simulated measurement of any kind of device.
 pub trait Measurement: Copy + Send + Sync + 'static {
-    /// True time of validity.
+    /// Returns the true time of validity of the measurement.
     fn at(&self) -> MonoNs;
 
-    /// Sets the time of validity.
+    /// Sets the measurement's true time of validity.
     fn set_at(&mut self, at: MonoNs);
 }
 
@@ -29,45 +29,45 @@ pub struct Sounding {
     pub range_m: Option<f64>,
 }
 
-/// Water pressure at a depth sensor.
+/// Simulated water pressure at a depth sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
-    /// Time of validity.
+    /// Time of validity of the pressure.
     pub at: MonoNs,
-    /// Absolute pressure, Pa.
+    /// Absolute pressure of the water, Pa.
     pub pressure_pa: f64,
 }
 
 /// A sample of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertia {
-    /// Time of validity.
+    /// Time of validity of the sample.
     pub at: MonoNs,
-    /// Sample period.
+    /// Period between two samples.
     pub period: DurNs,
     /// Attitude: rotation from the sensor's frame to the level frame.
     pub attitude: Rot<Level, Sensor>,
-    /// Turn rate, mean over the period, rad/s.
+    /// Mean turn rate over the sample period, rad/s.
     pub rate_radps: Vec3<Sensor>,
-    /// Acceleration less gravity, mean over the period, m/s^2.
+    /// Mean acceleration minus gravity over the sample period, m/s^2.
     pub force_mps2: Vec3<Sensor>,
 }
 
-/// Velocity over ground at a velocity log.
+/// Simulated velocity over ground at a velocity log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroundVelocity {
-    /// Time of validity.
+    /// Time of validity of the velocity.
     pub at: MonoNs,
-    /// Velocity of the sensor itself, m/s, which includes its motion by the vehicle's rotation.
+    /// Velocity of the sensor itself, m/s, which includes the sensor's motion by the vehicle's rotation.
     pub velocity_mps: Vec3<Sensor>,
 }
 
-/// Cable paid out into the tunnel.
+/// Simulated length of cable paid out into the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Payout {
-    /// Time of validity.
+    /// Time of validity of the length.
     pub at: MonoNs,
-    /// Chainage reached by the cable, m.
+    /// Chainage that the cable's end has reached, m.
     pub chainage_m: f64,
 }
 
@@ -102,7 +102,7 @@ impl Pressure {
 }
 
 impl Inertia {
-    /// Creates a scheduled sample that has no values yet.
+    /// Creates a scheduled sample of an inertial unit that has no values yet.
     pub fn due(at: MonoNs, period: DurNs) -> Self {
         let (attitude, rate_radps, force_mps2) = (Rot::identity(), Vec3::zero(), Vec3::zero());
         Self { at, period, attitude, rate_radps, force_mps2 }
@@ -117,7 +117,7 @@ impl GroundVelocity {
 }
 
 impl Payout {
-    /// Creates a scheduled count that has no value yet.
+    /// Creates a scheduled reading of a cable counter that has no value yet.
     pub fn due(at: MonoNs) -> Self {
         Self { at, chainage_m: 0.0 }
     }

@@ -12,12 +12,12 @@ pub enum Level {}
 /// Maximum number of sources in one loop.
 pub const MAX_SOURCES: usize = 64;
 
-/// Number of a registered source of bytes. Messages with equal times are ordered by it.
+/// Number of a registered source of bytes. Messages with equal times are ordered by this number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct SourceId(pub u16);
 
 impl SourceId {
-    /// Index into per-source tables.
+    /// Index of this source in tables with one entry per source.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
@@ -28,7 +28,7 @@ impl SourceId {
 pub struct Packet<'a> {
     /// Receive time of the first byte.
     pub received: MonoNs,
-    /// The bytes.
+    /// The received bytes.
     pub bytes: &'a [u8],
 }
 
@@ -43,13 +43,13 @@ pub enum Reading {
     Pressure(WaterPressure),
     /// Orientation computed by the device: rotation from the sensor's frame to the level frame.
     Attitude(Rot<Level, Sensor>),
-    /// Turn rate, rad/s.
+    /// Turn rate of the sensor, rad/s.
     AngularRate(Vec3<Sensor>),
-    /// Acceleration less gravity (specific force), m/s^2; +9.8 along z if the sensor is at rest and level.
+    /// Acceleration minus gravity (specific force), m/s^2; +9.8 along z if the sensor is at rest and level.
     SpecificForce(Vec3<Sensor>),
-    /// Velocity over ground, m/s.
+    /// Velocity of the sensor over ground, m/s.
     VelocityOverGround(Vec3<Sensor>),
-    /// Length of cable paid out, or another measurement of distance travelled.
+    /// Length of cable paid out, or another measure of the distance travelled.
     TetherLength(TetherLength),
 }
 
@@ -85,7 +85,7 @@ pub struct SonarReturn {
     pub angle_rad: f64,
     /// Slant range computed by the device, m; `None` if nothing exceeded its threshold.
     pub range_m: Option<f64>,
-    /// Quantum of the range, m.
+    /// Quantum (resolution step) of the range, m.
     pub resolution_m: f64,
     /// Range setting of the head, m.
     pub max_range_m: f64,
@@ -98,7 +98,7 @@ pub struct SonarReturn {
 pub struct EchoRange {
     /// Distance computed by the device, m; `None` if it found no echo.
     pub range_m: Option<f64>,
-    /// The device's confidence, 0 to 1.
+    /// The device's confidence in the distance, 0 to 1.
     pub confidence: f64,
     /// Speed of sound used by the device to compute the range, m/s.
     pub sound_speed_mps: f64,
@@ -107,26 +107,26 @@ pub struct EchoRange {
 /// Absolute pressure of the water.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WaterPressure {
-    /// Absolute pressure, Pa.
+    /// Absolute pressure of the water, Pa.
     pub pressure_pa: f64,
-    /// Quantum of the pressure, Pa.
+    /// Quantum (resolution step) of the pressure, Pa.
     pub resolution_pa: f64,
     /// Water temperature, degrees Celsius.
     pub temperature_degc: f64,
 }
 
-/// Cable paid out.
+/// A reading of a cable counter: length of cable paid out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TetherLength {
     /// Length counted since the counter's zero, m; increases as the vehicle goes in.
     pub length_m: f64,
-    /// Quantum of the length, m.
+    /// Quantum (resolution step) of the length, m.
     pub resolution_m: f64,
-    /// Last restart of the count from zero. `length_m` is continuous across the restart.
+    /// Last restart of the cable counter from zero. `length_m` is continuous across the restart.
     pub restart: Option<CountRestart>,
 }
 
-/// A restart of the count from zero.
+/// A restart of the cable counter's count from zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CountRestart {
     /// Number of the restart, from 1.
@@ -138,8 +138,8 @@ pub struct CountRestart {
 /// A reading and its time of validity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Decoded {
-    /// Time of validity: the receive time less the delays known to the decoder.
+    /// Time of validity: the receive time minus the delays known to the decoder.
     pub valid_at: MonoNs,
-    /// The value.
+    /// The sensor reading.
     pub reading: Reading,
 }

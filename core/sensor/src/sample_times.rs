@@ -1,9 +1,9 @@
 //! Corrected times of samples that arrive late, from the device's own clock.
 //!
-//! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms
-//! then have the same receive time. The first of them would count for the whole gap before the burst, even if it
-//! measured a short jerk. The device's stamps separate the samples. Receive time less device time is usually near
-//! its minimum, and any excess is the delay of the sample. Receive times still define the order; only the time of
+//! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms then
+//! have the same receive time. The first of them would count for the whole gap before the burst, even if it measured
+//! a short jerk. The device's stamps separate the samples. Receive time minus device time is usually near its
+//! minimum, and any excess is the delay of the sample. Receive times still define the order; only the time of
 //! validity is corrected.
 
 use core::cmp::Ordering;
@@ -14,20 +14,21 @@ use crate::device_clock::{ClockReport, DeviceClock};
 use crate::reading::Reading;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Rate at which the usual delay rises while stamps are later than usual, per second. Clocks drift apart more
-/// slowly.
+/// Rate at which the estimated usual delay rises while device stamps arrive later than usual, per second. Clocks
+/// drift apart more slowly.
 ///
-/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` as fast. It therefore converges to a delay
-/// that one stamp in ten is below. A garbled stamp has no larger effect than any other.
+/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` times as fast. The estimate therefore
+/// converges to a delay that is longer than the delays of one stamp in ten. A garbled stamp has no larger effect than
+/// any other stamp.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
-/// Maximum time between stamps that counts in a change of the usual delay, s.
+/// Longest time between two stamps that is used in full when the usual delay is updated, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// Minimum delay that is corrected. Smaller delays come from ticks and from the time to send the frames of a
-/// sample.
+/// Minimum delay of a sample that is corrected. Smaller delays come from clock ticks and from the time to send its
+/// frames.
 const LEAST: DurNs = DurNs(1_000_000);
-/// Maximum delay that is corrected. A stopped clock also looks late, and navigation waits no longer than this for
-/// samples.
+/// Maximum delay of a sample that is corrected. A stopped device clock also looks like a delay, and navigation waits
+/// no longer than this for samples.
 const MOST: DurNs = DurNs(150_000_000);
 
 /// Corrects the times of the samples of a device with a clock. Allocates: never.
@@ -37,7 +38,8 @@ pub struct SampleTimes {
     delay: UsualDelay,
     stamped: Option<Stamped>,
     last_reading: Option<MonoNs>,
-    /// Number of samples whose stamp came first, less number of samples whose stamp came last; clamped.
+    /// Number of samples whose stamp came before the readings, minus number of samples whose stamp came after;
+    /// clamped.
     ///
     /// The count is needed because some units send the stamp after the readings.
     leads: i8,
@@ -51,13 +53,14 @@ struct Stamped {
     told: [bool; KINDS],
 }
 
-/// Number of kinds: rate, force, attitude. A stamp belongs to the first reading of each kind after it.
+/// Number of kinds of readings: turn rate, force, attitude. A stamp belongs to the first reading of each kind after
+/// it.
 const KINDS: usize = 3;
-/// Minimum of `leads` at which stamps count as coming first, and the limit at which `leads` is clamped.
+/// Minimum of `leads` at which stamps count as coming before the readings, and the limit at which `leads` is clamped.
 const SURE_LEADS: i8 = 8;
 const MOST_LEADS: i8 = 16;
 
-/// Usual difference between receive time and device time.
+/// Estimate of the usual difference between receive time and device time.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct UsualDelay {
     delay: Option<DurNs>,
@@ -78,7 +81,7 @@ impl SampleTimes {
         }
     }
 
-    /// Processes the stamp of a sample.
+    /// Processes the device stamp of a sample.
     pub fn stamp(&mut self, ticks: u64, received: MonoNs) {
         let device = self.clock.take(ticks, received);
         let late = self.delay.late(device, received);
@@ -99,7 +102,7 @@ impl SampleTimes {
         let Some(stamped) = &mut self.stamped else { return received };
         let last = self.last_reading.replace(received);
         if let Some(last) = last.filter(|_| stamped.told == [false; KINDS]) {
-            // Within a burst, receive times are equal and do not show whether the stamp came first.
+            // Within a burst, receive times are equal and do not show whether the stamp came before the readings.
             let lead = match received.since(stamped.received).cmp(&stamped.received.since(last)) {
                 Ordering::Less => 1,
                 Ordering::Equal => 0,
@@ -114,14 +117,14 @@ impl SampleTimes {
         if is_late && !is_told && self.leads >= SURE_LEADS { stamped.usual } else { received }
     }
 
-    /// Returns statistics of the clock.
+    /// Returns statistics of the device's clock.
     pub fn report(&self) -> ClockReport {
         self.clock.report()
     }
 }
 
 impl UsualDelay {
-    /// Returns the delay of a stamp beyond the usual delay; zero for the first stamp of a clock epoch.
+    /// Returns by how much a stamp's delay exceeds the usual delay; zero for the first stamp of a clock epoch.
     fn late(&mut self, device: DurNs, received: MonoNs) -> DurNs {
         let delay = received.since(MonoNs(0)) - device;
         let is_first = device <= DurNs::ZERO || device < self.device;

@@ -1,4 +1,5 @@
-//! `[advice]` of a vehicle file: resolution and update rate of the advice's view of the wall.
+//! `[advice]` of a vehicle file: resolution and recast interval of the rays that locate the wall for the speed
+//! advice.
 
 use core::ops::RangeInclusive;
 
@@ -6,14 +7,15 @@ use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
 use headrace_sampling::advice::Looks;
 
-/// Allowed angles between the rays of a ring, degrees.
+/// Allowed angles between the rays of a ring (the rays cast from a head round the wall), degrees.
 ///
-/// The finest angle is that of `plan`. With an angle above 1 degree, the steps of every mode would be rounded.
+/// The finest angle is the one that the command `plan` uses. With an angle above 1 degree, the steps of every
+/// mode would be rounded.
 const RING_DEG: RangeInclusive<f64> = 0.1..=1.0;
-/// Allowed movement across the tunnel before a ring is recast, m.
+/// Allowed settings of the vehicle's movement across the tunnel after which a ring of rays is recast, m.
 const LOOK_M: RangeInclusive<f64> = 0.001..=0.1;
 
-/// Reads the `[advice]` table.
+/// Reads the `[advice]` table of a vehicle file.
 ///
 /// Errors: a key that is unknown or out of range.
 pub(super) fn parse_looks(section: &Section<'_>) -> Result<Looks, ConfigError> {
@@ -53,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn value_out_of_range_names_line_key_value_and_range() {
+    fn error_for_a_value_out_of_range_names_line_key_value_and_range() {
         let why = parsed("[advice]\nring_deg = 0.05\n").unwrap_err().to_string();
         assert!(
             why.contains("vehicle.toml:2: advice.ring_deg = 0.05: must be a number from 0.1 to 1"),

@@ -3,29 +3,29 @@
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::time::DurNs;
 
-/// Subject of an alert.
+/// Class of an alert: its subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AlertClass {
-    /// The wall.
+    /// The alert is about coverage of the wall.
     Coverage,
-    /// The vehicle's speed.
+    /// The alert is about the vehicle's speed.
     Speed,
-    /// The vehicle's position.
+    /// The alert is about the vehicle's position.
     Position,
-    /// A sensor.
+    /// The alert is about a sensor.
     Sensor,
-    /// The log.
+    /// The alert is about the log recording.
     Recording,
-    /// A setting of the vehicle file, or a limit in it.
+    /// The alert is about a setting of the vehicle file, or a limit in it.
     Setting,
 }
 
 impl AlertClass {
-    /// All classes.
+    /// All alert classes.
     pub const ALL: [Self; 6] =
         [Self::Coverage, Self::Speed, Self::Position, Self::Sensor, Self::Recording, Self::Setting];
 
-    /// Name of the class in files and JSON.
+    /// Name of the alert class in files and JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Coverage => "coverage",
@@ -41,21 +41,21 @@ impl AlertClass {
 /// Delays before an alert becomes active and before it clears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClassTiming {
-    /// Duration of the situation before the alert becomes active.
+    /// Time for which the situation must last before the alert becomes active.
     pub hold: DurNs,
-    /// Duration without the situation before the alert clears.
+    /// Time for which the situation must be absent before the alert clears.
     pub off: DurNs,
 }
 
-/// Timing of all classes.
+/// Hold and clearing times of alerts, by class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AlertTiming([ClassTiming; AlertClass::ALL.len()]);
 
-/// Maximum delay of a class, seconds.
+/// Maximum delay that may be set for a class of alerts, seconds.
 const MOST_S: f64 = 600.0;
 
 impl Default for AlertTiming {
-    /// Default delays.
+    /// Default delays before alerts become active and clear.
     ///
     /// Speed and position fluctuate about their limits within seconds, so their alerts are delayed. The other classes
     /// have their own hysteresis.
@@ -74,7 +74,7 @@ impl Default for AlertTiming {
 }
 
 impl AlertTiming {
-    /// Returns the timing of a class.
+    /// Returns the delays of an alert class.
     pub fn of(&self, class: AlertClass) -> ClassTiming {
         let [coverage, speed, position, sensor, recording, setting] = self.0;
         match class {
@@ -87,7 +87,7 @@ impl AlertTiming {
         }
     }
 
-    /// Returns the timing with the delays of one class replaced.
+    /// Returns the timing with the delays of one alert class replaced.
     #[must_use]
     pub fn with(mut self, class: AlertClass, timing: ClassTiming) -> Self {
         if let Some(slot) = self.0.get_mut(class as usize) {
@@ -97,7 +97,7 @@ impl AlertTiming {
         self
     }
 
-    /// Reads `[alerts]`.
+    /// Reads the `[alerts]` table of a vehicle file.
     ///
     /// Errors: a key that is unknown or out of range.
     pub(super) fn parse(section: &Section<'_>) -> Result<Self, ConfigError> {
@@ -117,17 +117,17 @@ impl AlertTiming {
     }
 }
 
-/// Limits of cable and time.
+/// Limits of cable length and dive time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LimitsConfig {
-    /// Length of the cable, m from the portal.
+    /// Length of the cable, measured from the portal, m.
     pub cable_m: Option<f64>,
-    /// Duration of the dive.
+    /// Maximum duration of the dive.
     pub dive_time: Option<DurNs>,
 }
 
 impl LimitsConfig {
-    /// Reads `[limits]`.
+    /// Reads the `[limits]` table of a vehicle file.
     ///
     /// Errors: a key that is unknown or out of range.
     pub(super) fn parse(section: &Section<'_>) -> Result<Self, ConfigError> {

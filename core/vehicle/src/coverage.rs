@@ -1,11 +1,11 @@
 //! `[coverage]` and `[[openings]]` of a vehicle file: verdict parameters and declared openings.
 
 use headrace_config::{ConfigError, Section};
-use headrace_coverage::CONFIDENCE_SD;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::soundings::NODE_M;
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::target::{CONFIDENCE_SD, Target};
 
 /// Parameters for the verdicts on the wall.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,8 +18,6 @@ pub struct CoverageConfig {
     pub contradiction_m: f64,
     /// Edge length of a node of the sounding grid, m.
     pub node_m: f64,
-    /// Number of standard deviations of D between hole and target that a verdict requires: 1, 2 or 3.
-    pub confidence_sd: f64,
     /// Declared openings of the wall.
     pub openings: Vec<Opening>,
 }
@@ -30,13 +28,12 @@ impl Default for CoverageConfig {
             hole_tolerance_m: 0.0,
             contradiction_m: MOST_CONTRADICTION_M,
             node_m: NODE_M,
-            confidence_sd: CONFIDENCE_SD,
             openings: Vec::new(),
         }
     }
 }
 
-/// Default limit of the deviation from the profile: a share of the radius, but at most 0.5 m.
+/// Default limit of the deviation from the design profile: a share of the radius, but at most 0.5 m.
 ///
 /// The radius is that of a circle with the profile's perimeter.
 const CONTRADICTION_SHARE: f64 = 0.2;
@@ -47,31 +44,35 @@ const MAX_PLACES: i64 = 1_000_000;
 impl CoverageConfig {
     /// Returns the default deviation above which a sample contradicts a profile of this perimeter, m.
     ///
-    /// The value is larger than a lining, or the error of a design that is 6 % off. It is smaller than the deviation
-    /// of another tunnel.
+    /// The value exceeds the thickness of a lining, and the error of a design that is 6 % off. It is smaller
+    /// than the deviation expected in a different tunnel.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
-    /// Reads both tables from the root of a vehicle file.
+    /// Reads the tables `[coverage]` and `[[openings]]` from the root of a vehicle file.
     ///
-    /// `profile` or `target_m` is `None` if it is wrong in the file; the tables are then checked as far as possible.
+    /// The second value is the confidence of verdicts.
+    ///
+    /// `profile` or `target_m` is `None` if its keys in the file are invalid. The tables are then checked as
+    /// far as possible.
     ///
     /// Errors: a key that is missing, unknown or out of range.
     pub(super) fn of_root(
         root: &Section<'_>,
         profile: Option<&Profile>,
         target_m: Option<f64>,
-    ) -> Result<Self, ConfigError> {
+    ) -> Result<(Self, f64), ConfigError> {
         let perimeter_m = profile.map_or(TAU, Profile::perimeter_m);
         let contradiction_m = Self::usual_contradiction_m(perimeter_m);
         let mut config = Self { contradiction_m, ..Self::default() };
+        let mut confidence_sd = CONFIDENCE_SD;
         if let Some(section) = root.section("coverage")? {
             config.contradiction_m =
                 section.number("contradiction_m", 0.01..=100.0)?.unwrap_or(config.contradiction_m);
             config.node_m = section.number("node_m", 0.05..=10.0)?.unwrap_or(config.node_m);
             if let Some(confidence) = section.integer("confidence", 1..=3)? {
-                config.confidence_sd = confidence as f64;
+                confidence_sd = confidence as f64;
             }
             let tolerance_m = root.part(|| parse_tolerance_m(&section, target_m.unwrap_or(1.0)))?;
             config.hole_tolerance_m = tolerance_m.unwrap_or_default();
@@ -80,12 +81,13 @@ impl CoverageConfig {
         for section in root.sections("openings")? {
             config.openings.extend(root.part(|| parse_opening(&section, profile))?);
         }
-        let places = |opening: &Opening| opening.places(perimeter_m, target_m.unwrap_or(f64::INFINITY));
+        let target = Target::new(target_m.unwrap_or(f64::INFINITY));
+        let places = |opening: &Opening| opening.places(perimeter_m, target);
         if config.openings.iter().map(places).sum::<i64>() > MAX_PLACES {
             let problem = "take more than 2500 square metres together; leave them out of the tunnel";
             root.part::<()>(|| Err(root.invalid("openings", problem)))?;
         }
-        Ok(config)
+        Ok((config, confidence_sd))
     }
 }
 
@@ -137,14 +139,14 @@ mod tests {
     use headrace_config::Document;
     use headrace_geometry::tunnel::shapes;
 
-    fn parsed(text: &str) -> Result<CoverageConfig, ConfigError> {
+    fn parsed(text: &str) -> Result<(CoverageConfig, f64), ConfigError> {
         let root = Document::new("vehicle.toml", text).root().unwrap();
         CoverageConfig::of_root(&root, Some(&shapes::circle(3.0).unwrap()), Some(0.5))
     }
 
     #[test]
     fn confidence_is_1_2_or_3_standard_deviations() {
-        let confidence_sd = |text: &str| parsed(text).unwrap().confidence_sd;
+        let confidence_sd = |text: &str| parsed(text).unwrap().1;
         let whole = |value: f64| headrace_geometry::math::round_to_i64(value);
         assert_eq!(whole(confidence_sd("")), 2);
         for k in 1..=3 {

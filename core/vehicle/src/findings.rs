@@ -1,6 +1,7 @@
 //! Checks of a vehicle file as a whole, after its keys have been read.
 //!
-//! The checks find connections that cannot be shared, walls outside the heads' range limits, and heads out of step.
+//! The checks find connections that cannot be shared, wall outside the heads' range limits, and heads whose
+//! passes cannot interleave.
 
 use core::fmt;
 
@@ -18,18 +19,18 @@ use crate::vehicle::VehicleConfig;
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grade {
-    /// The file cannot work as written.
+    /// The vehicle file cannot work as written.
     Error,
-    /// The file works, but at a cost, or only if the setting is intended.
+    /// The vehicle file works, but at a cost, or only if the setting is intended.
     Warning,
 }
 
-/// A problem in a file whose keys are valid individually.
+/// A problem in a vehicle file whose keys are valid individually.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
     /// Severity of the finding.
     pub grade: Grade,
-    /// Dotted path of the key, which may be absent from its table.
+    /// Dotted path of the key that the finding is about; the key may be absent from its table.
     pub key: String,
     /// The problem, and what to do about it.
     pub problem: String,
@@ -41,19 +42,19 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Number of beams per turn that are checked.
+/// Number of beams per turn that the check of head ranges casts.
 const BEAMS: u32 = 720;
 /// Minimum share of the wall that a head must reach.
 ///
 /// If the share is lower, the range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
-/// Relative difference of turn durations below which heads stay in step for hours.
+/// Relative difference of turn periods below which heads stay in phase for hours.
 const SAME_TURN: f64 = 1e-6;
 /// Finest range step of a sonar, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet).
 ///
 /// No return resolves finer details of a wall.
 const FINEST_M: f64 = 0.002;
-/// Edge length that approximates a wall's curve to within [`FINEST_M`] at any radius, m.
+/// Edge length of a polyline that approximates a wall's curve to within [`FINEST_M`] at any radius, m.
 ///
 /// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, whose radius is 0.1 m.
 const ENOUGH_M: f64 = 0.01;
@@ -76,7 +77,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns the sensors that cannot share the connection of an earlier sensor, each with the reason.
+    /// Returns the sensors that cannot share the connection of an earlier sensor, each with the reason why.
     pub fn excluded_from_lines(&self) -> Vec<(usize, String)> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -115,7 +116,7 @@ impl VehicleConfig {
                 }
             }
         }
-        // A vehicle without any connection is only simulated or replayed.
+        // If no sensor has a connection, the vehicle is only simulated or replayed, which needs none.
         if silent.len() < self.sensors.len() {
             let problem = format!("have no connect, so `run` can't reach them: {}", silent.join(", "));
             found.extend((!silent.is_empty()).then(|| warning("sensors".to_owned(), problem)));
@@ -207,7 +208,7 @@ impl VehicleConfig {
         if tunnel.name != "polyline" {
             return None;
         }
-        // The first and the last piece are one edge, split at the floor's centre.
+        // The first and the last piece of the profile are one edge, split at the floor's centre.
         let pieces = tunnel.profile.pieces_m();
         let edges = pieces.len().saturating_sub(1);
         let whole = pieces.take(edges).skip(1);
@@ -266,7 +267,8 @@ fn warning(key: String, problem: String) -> Finding {
     Finding { grade: Grade::Warning, key, problem }
 }
 
-/// Names the end that both connections share; `None` if they lead to different ends.
+/// Names the end (port, address, interface or device) that two connections share. `None` if they lead to
+/// different ends.
 fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     match (a, b) {
         (Connect::Serial { port: a, .. }, Connect::Serial { port: b, .. }) => {
@@ -324,7 +326,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn connections_to_one_end_are_recognised_in_any_notation() {
+    fn connections_to_the_same_end_are_recognised_in_every_notation() {
         let parse = |text: &str| Connect::parse(text).unwrap();
         for (a, b, expected) in [
             ("serial:/dev/a?baud=9600", "serial:/dev/a", Some("serial port")),

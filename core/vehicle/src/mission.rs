@@ -3,6 +3,7 @@
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 use headrace_sampling::advice::Looks;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::occlusion::Obstacle;
@@ -13,48 +14,48 @@ use crate::coverage::CoverageConfig;
 /// Mission parameters of a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub profile: Profile,
-    /// Water, gravity and levels.
+    /// Water properties, gravity and levels of the site.
     pub site: Site,
     /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
-    /// Target T, m.
-    pub target_m: f64,
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
     /// Length of a section, m.
     pub section_m: f64,
     /// Length of the tunnel, m; samples beyond it are counted but not stored.
     pub length_m: f64,
-    /// Arrangement of the heads: phase shift or sector offset.
+    /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
     /// Speed for which the heads' phases are planned, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
-    /// Parts of the vehicle that may occlude a head, other than the other heads.
+    /// Parts of the vehicle, apart from the heads, that may occlude a head.
     pub hull: Vec<Obstacle>,
     /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// Resolution and update rate of the advice's view of the wall.
+    /// Resolution and recast interval of the rays that locate the wall for the speed advice.
     pub looks: Looks,
     /// Time limit of the dive, counted from the first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
-    /// Timing of alerts by class.
+    /// Delays of alerts by alert class.
     pub alerts: AlertTiming,
-    /// Limits of cable and time.
+    /// Limits of cable length and dive time.
     pub limits: LimitsConfig,
 }
 
 impl Mission {
     /// Creates a mission with defaults.
     ///
-    /// The tunnel is 100 m long, with sections of 0.25 m at the default site. The layout is phase shift; there are no
-    /// hull parts and no time limit, and holes are computed exactly.
+    /// The tunnel is 100 m long, with sections of 0.25 m at the default site. The heads are in phase-shift
+    /// mode. There are no hull parts and no time limit, and holes are computed exactly.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         let contradiction_m = CoverageConfig::usual_contradiction_m(profile.perimeter_m());
         Self {
             profile,
             site: Site::default(),
             sound_speed_from: None,
-            target_m,
+            target: Target::new(target_m),
             section_m: 0.25,
             length_m: 100.0,
             layout: HeadLayout::PhaseShift,
@@ -70,13 +71,14 @@ impl Mission {
 
     /// Whether lengths are positive, and speeds, tolerances and confidence aren't negative.
     pub fn is_valid(&self) -> bool {
-        let Self { target_m, section_m, length_m, planned_speed_mps, coverage, .. } = self;
-        let CoverageConfig { hole_tolerance_m, contradiction_m, node_m, confidence_sd, .. } = coverage;
-        [target_m, section_m, length_m, contradiction_m, node_m].iter().all(|length_m| **length_m > 0.0)
+        let Self { target, section_m, length_m, planned_speed_mps, coverage, .. } = self;
+        let Target { max_hole_m, confidence_sd } = target;
+        let CoverageConfig { hole_tolerance_m, contradiction_m, node_m, .. } = coverage;
+        [max_hole_m, section_m, length_m, contradiction_m, node_m].iter().all(|length_m| **length_m > 0.0)
             && [planned_speed_mps, hole_tolerance_m, confidence_sd].iter().all(|number| **number >= 0.0)
     }
 
-    /// Whether pings land on the same wall places as in another mission.
+    /// Whether pings land at the same places on the wall as with the settings of another mission.
     ///
     /// True if tunnel, water, layout and hull are the same.
     pub fn places_as(&self, other: &Self) -> bool {

@@ -14,17 +14,17 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 
 /// One degree, radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// Allowed noise settings.
+/// Allowed values of noise settings.
 ///
-/// Zero is excluded, because the filter would trust one sensor over all others.
+/// Zero is excluded, because the filter would then rely on that sensor alone.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
-/// Allowed lengths of an epoch and of a window, s; the filter's buffers suffice for both.
+/// Allowed lengths of a filter epoch and of a time window, s. The filter's buffers suffice for both.
 ///
-/// With epochs of 0.5 s, the estimate of a field dive was off by metres. With 0.2 s, the error was no larger than with
-/// 0.1 s (trade-off "Navigation" of `headrace cost`).
+/// With epochs of 0.5 s, the estimated position of a field dive was wrong by metres. With 0.2 s, the error
+/// was no larger than with 0.1 s (trade-off "Navigation" of `headrace cost`).
 const EPOCH_S: RangeInclusive<f64> = 0.02..=0.2;
 const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 
@@ -39,7 +39,7 @@ pub enum NavigationConfig {
 }
 
 impl NavigationConfig {
-    /// Reads the table; the default is the filter.
+    /// Reads the `[navigation]` table; the default method is the filter.
     ///
     /// Missing keys take the inertial unit's `noise` and the cable `counter` if these are known, and the defaults
     /// otherwise.
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn epoch_and_window_come_from_the_file() {
+    fn filter_epoch_and_window_come_from_the_vehicle_file() {
         assert_eq!(parsed("[navigation]\n").unwrap(), Settings::default());
         assert_eq!(
             parsed("[navigation]\nepoch_s = 0.1\nwindow_s = 0.2\n").unwrap(),

@@ -10,19 +10,19 @@ use headrace_sensor::device::{Device, DeviceKind};
 
 /// Allowed coordinates of a sensor in the body frame, m.
 pub(super) const SENSOR_DISTANCE_M: RangeInclusive<f64> = -20.0..=20.0;
-/// Allowed angles, degrees.
+/// Allowed mounting angles of a sensor, degrees.
 pub(super) const DEGREES: RangeInclusive<f64> = -360.0..=360.0;
 
-/// Sensors of a file, in the order of the file.
+/// Sensors of a vehicle file, in the order of the file.
 #[derive(Default)]
 pub(super) struct Sensors {
     pub(super) devices: Vec<Box<dyn Device>>,
     pub(super) configs: Vec<SensorConfig>,
 }
 
-/// Reads all sensor tables; `None` if one of them has an error.
+/// Reads all `[[sensors]]` tables; returns `None` if any of them has an error.
 ///
-/// Errors: there is no table; or, if errors are not collected, the first wrong table.
+/// Errors: the file has no such table. If the caller doesn't collect errors, also the first invalid table.
 pub(super) fn parse(
     root: &Section<'_>,
     tables: Vec<Section<'_>>,
@@ -45,7 +45,7 @@ pub(super) fn parse(
     Ok(complete.then_some(sensors))
 }
 
-/// Reads a sensor's table; `ids` contains the ids of earlier sensors.
+/// Reads one `[[sensors]]` table; `ids` contains the ids of earlier sensors.
 fn parse_sensor(
     section: &Section<'_>,
     ids: &mut Vec<String>,
@@ -84,7 +84,7 @@ fn parse_sensor(
 /// Id of the operator's input, which is recorded like a sensor.
 pub const CONSOLE_ID: &str = "console";
 
-/// Returns the problem with an id, if any.
+/// Returns the problem with a sensor's id, if any.
 fn id_problem(id: &str, ids: &[String]) -> Option<&'static str> {
     let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if id.is_empty() || id.len() > 32 || !id.chars().all(simple) {

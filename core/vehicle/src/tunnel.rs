@@ -4,14 +4,14 @@ use headrace_config::{ConfigError, Loader, Section};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
-/// The `[tunnel]` table.
+/// The `[tunnel]` table: profile and length of the tunnel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TunnelConfig {
-    /// Name of the profile in the file.
+    /// Name of the profile in the vehicle or scene file.
     pub name: String,
     /// Design profile of the cross-section.
     pub profile: Profile,
-    /// Length along the axis from the portal at chainage 0, m.
+    /// Length along the tunnel's axis from the portal at chainage 0, m.
     pub length_m: f64,
 }
 
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn polyline_has_line_numbers_and_errors_name_the_line() {
+    fn polyline_vertices_keep_their_line_numbers_and_errors_name_the_line() {
         let read = parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap();
         assert_eq!(read, (vec![[1.0, 2.0], [-1.0, 2.0]], vec![2, 4]));
         assert_eq!(parse_points(&"1,2\n".repeat(MOST_POINTS)).unwrap().0.len(), MOST_POINTS);

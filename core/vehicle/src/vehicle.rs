@@ -15,32 +15,33 @@ use headrace_fusion::Navigation;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
-use headrace_sampling::SamplingError;
 use headrace_sampling::advice::Looks;
 use headrace_sampling::head::{HeadProgram, HeadSpec};
 use headrace_sampling::layout::{self, HeadLayout};
 use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::Inspection;
+use headrace_sampling::{SamplingError, Target};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::{CounterSpec, Device, DeviceKind, Sense};
 
 /// A validated vehicle file.
 pub struct VehicleConfig {
-    /// Vehicle name.
+    /// Name of the vehicle.
     pub name: String,
-    /// Target T: the largest hole that passes, m.
-    pub target_m: f64,
+    /// Target.
+    pub target: Target,
     /// Length of a section along the tunnel, m.
     pub section_m: f64,
-    /// Water, gravity and levels.
+    /// Water properties, gravity and levels of the site.
     pub site: Site,
     /// Depth sensor whose temperature determines the speed of sound, instead of the site's value.
     pub sound_speed_from: Option<String>,
-    /// The tunnel.
+    /// The tunnel: profile and length.
     pub tunnel: TunnelConfig,
-    /// Arrangement of the heads: phase shift or sector offset.
+    /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
-    /// Speed for which the heads' phases are planned, m/s; zero ignores the heads' positions along the hull.
+    /// Speed for which the heads' phases are planned, m/s. With zero, the heads' positions along the hull are
+    /// ignored.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
@@ -48,17 +49,17 @@ pub struct VehicleConfig {
     pub coverage: CoverageConfig,
     /// Navigation method and settings.
     pub navigation: NavigationConfig,
-    /// Resolution and update rate of the advice's view of the wall.
+    /// Resolution and recast interval of the rays that locate the wall for the speed advice.
     pub looks: Looks,
-    /// Time limit of the dive.
+    /// Maximum duration of the dive.
     pub dive_time: Option<DurNs>,
-    /// Timing of alerts by class.
+    /// Delays of alerts by alert class.
     pub alerts: AlertTiming,
-    /// Limits of cable and time.
+    /// Limits of cable length and dive time.
     pub limits: LimitsConfig,
     /// The sensors, in the order of the file, which is also the order of their sources.
     pub sensors: Vec<Box<dyn Device>>,
-    /// The common part of each sensor's table, in the same order as `sensors`.
+    /// The keys common to all kinds of sensor, for each sensor, in the same order as `sensors`.
     pub sensor_configs: Vec<SensorConfig>,
     /// Step and noise of the cable counter; `None` without one.
     pub counter: Option<CounterSpec>,
@@ -66,13 +67,14 @@ pub struct VehicleConfig {
     pub attachments: Vec<(String, String)>,
 }
 
-/// The `[water]` table and levels; see [`Site`].
+/// The `[water]` table and the water levels; see [`Site`].
 pub type WaterConfig = Site;
 
-/// Allowed targets, m.
+/// Allowed values of the target, m.
 pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 
-/// Limits of the startup allocation: some hundred megabytes each for sections and wall cells.
+/// Limits on the number of sections and wall cells. They keep the startup allocation to some hundred
+/// megabytes for each.
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 
@@ -106,7 +108,7 @@ impl VehicleConfig {
 
     /// Reads everything except the attachments.
     ///
-    /// Checks that depend on a wrong part are skipped.
+    /// Checks that depend on an invalid part of the file are skipped.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -120,44 +122,24 @@ impl VehicleConfig {
         if let (Some(tunnel), Some(target_m), Some(section_m)) = (&tunnel, target_m, section_m) {
             root.part(|| check_fineness(root, tunnel, target_m, section_m))?;
         }
-        let water = match root.section("water")? {
-            Some(water) => root.part(|| parse_water(&water, axis_yaw_rad))?,
-            None => Some((Site { axis_yaw_rad, ..Site::default() }, None)),
-        };
-        let coverage =
+        let usual = (Site { axis_yaw_rad, ..Site::default() }, None);
+        let water = table_or(root, "water", usual, |water| parse_water(water, axis_yaw_rad))?;
+        let (coverage, confidence_sd) =
             CoverageConfig::of_root(root, tunnel.as_ref().map(|tunnel| &tunnel.profile), target_m)?;
-        let mut hull = Vec::new();
-        for section in root.sections("hull")? {
-            hull.extend(root.part(|| parse_hull(&section))?);
-        }
+        let hull = parse_hulls(root)?;
         let tables = root.sections("sensors")?.into_iter().map(|table| table.with_files(load)).collect();
         let sensors = sensors::parse(root, tables, kinds)?;
         let devices = sensors.as_ref().map(|sensors| sensors.devices.as_slice());
-        let noise =
-            devices.iter().flat_map(|devices| devices.iter()).find_map(|sensor| sensor.inertial_noise());
-        let counter = devices.iter().flat_map(|devices| devices.iter()).find_map(|sensor| sensor.counter());
-        let navigation = root.section("navigation")?;
-        let navigation = root.part(|| NavigationConfig::parse(navigation, noise, counter))?;
-        let heads = match root.section("heads")? {
-            Some(section) => root.part(|| parse_heads(&section, devices))?,
-            None => Some((HeadLayout::PhaseShift, 0.0)),
-        };
-        let looks = match root.section("advice")? {
-            Some(section) => root.part(|| parse_looks(&section))?,
-            None => Some(Looks::default()),
-        };
-        let alerts = match root.section("alerts")? {
-            Some(section) => root.part(|| AlertTiming::parse(&section))?,
-            None => Some(AlertTiming::default()),
-        };
-        let limits = match root.section("limits")? {
-            Some(section) => root.part(|| LimitsConfig::parse(&section))?,
-            None => Some(LimitsConfig::default()),
-        };
+        let counter = devices.unwrap_or_default().iter().find_map(|sensor| sensor.counter());
+        let navigation = parse_navigation(root, devices.unwrap_or_default(), counter)?;
+        let usual = (HeadLayout::PhaseShift, 0.0);
+        let heads = table_or(root, "heads", usual, |section| parse_heads(section, devices))?;
+        let looks = table_or(root, "advice", Looks::default(), parse_looks)?;
+        let alerts = table_or(root, "alerts", AlertTiming::default(), AlertTiming::parse)?;
+        let limits = table_or(root, "limits", LimitsConfig::default(), LimitsConfig::parse)?;
         if let Some(sensors) = &sensors {
             root.part(|| check_heads(root, &sensors.devices, &hull))?;
-            let sound_speed_from = water.as_ref().and_then(|(_, from)| from.as_deref());
-            root.part(|| check_sound(root, sound_speed_from, sensors))?;
+            root.part(|| check_sound(root, water.as_ref(), sensors))?;
         }
         root.finish()?;
         let (target_m, tunnel) = (root.required("target_m", target_m), root.required("tunnel", tunnel));
@@ -166,7 +148,7 @@ impl VehicleConfig {
         let sensors = root.required("sensors", sensors)?;
         Ok(Self {
             name,
-            target_m: target_m?,
+            target: Target { max_hole_m: target_m?, confidence_sd },
             section_m: root.required("section_m", section_m)?,
             site,
             sound_speed_from,
@@ -193,7 +175,7 @@ impl VehicleConfig {
             profile: self.tunnel.profile.clone(),
             site: self.site,
             sound_speed_from: self.sound_speed_from.clone(),
-            target_m: self.target_m,
+            target: self.target,
             section_m: self.section_m,
             length_m: self.tunnel.length_m,
             layout: self.layout,
@@ -230,7 +212,7 @@ impl VehicleConfig {
         self.sensors.iter().filter_map(|sensor| sensor.head()).collect()
     }
 
-    /// Returns the inspection with the heads as configured and the vehicle steady in the centre.
+    /// Returns the inspection with the heads as configured and the vehicle steady in the tunnel's centre.
     ///
     /// Errors: no modes are known for a head's range setting.
     pub fn inspection(&self) -> Result<Inspection, String> {
@@ -251,6 +233,16 @@ impl VehicleConfig {
     }
 }
 
+/// Reads a table. The result is `default` without the table, and `None` if the table is wrong.
+fn table_or<T>(
+    root: &Section<'_>,
+    name: &'static str,
+    default: T,
+    parse: impl FnOnce(&Section<'_>) -> Result<T, ConfigError>,
+) -> Result<Option<T>, ConfigError> {
+    root.section(name)?.map_or(Ok(Some(default)), |section| root.part(|| parse(&section)))
+}
+
 /// Reads the tunnel and the yaw of its axis, radians.
 ///
 /// The tunnel is `None` if it is missing or invalid.
@@ -260,7 +252,7 @@ fn parse_tunnel(root: &Section<'_>, load: Loader<'_>) -> Result<(Option<TunnelCo
     Ok((root.part(|| TunnelConfig::from_section(&section, load))?, axis_yaw_rad))
 }
 
-/// Checks that the loop can allocate its memory for sections and samples.
+/// Checks that sections and wall cells are not too small for the memory that the loop allocates.
 fn check_fineness(
     root: &Section<'_>,
     tunnel: &TunnelConfig,
@@ -297,6 +289,15 @@ fn parse_water(section: &Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option
     Ok((site, sound_speed_from))
 }
 
+/// Reads the boxes of the hull that are right.
+fn parse_hulls(root: &Section<'_>) -> Result<Vec<Obstacle>, ConfigError> {
+    let mut hull = Vec::new();
+    for section in root.sections("hull")? {
+        hull.extend(root.part(|| parse_hull(&section))?);
+    }
+    Ok(hull)
+}
+
 fn parse_hull(section: &Section<'_>) -> Result<Obstacle, ConfigError> {
     let corner = |key: &'static str| section.required(key, section.triple(key, SENSOR_DISTANCE_M)?);
     let (least, most) = (corner("least_m"), corner("most_m"));
@@ -309,9 +310,24 @@ fn parse_hull(section: &Section<'_>) -> Result<Obstacle, ConfigError> {
     Ok(Obstacle::Box { least: point(least), most: point(most) })
 }
 
+/// Reads the navigation for these sensors; `None` if its table is wrong.
+fn parse_navigation(
+    root: &Section<'_>,
+    devices: &[Box<dyn Device>],
+    counter: Option<CounterSpec>,
+) -> Result<Option<NavigationConfig>, ConfigError> {
+    let noise = devices.iter().find_map(|sensor| sensor.inertial_noise());
+    let section = root.section("navigation")?;
+    root.part(|| NavigationConfig::parse(section, noise, counter))
+}
+
 /// Checks that the sensor that supplies the speed of sound exists and is a depth sensor.
-fn check_sound(root: &Section<'_>, told_by: Option<&str>, sensors: &Sensors) -> Result<(), ConfigError> {
-    let Some(id) = told_by else { return Ok(()) };
+fn check_sound(
+    root: &Section<'_>,
+    water: Option<&(Site, Option<String>)>,
+    sensors: &Sensors,
+) -> Result<(), ConfigError> {
+    let Some(id) = water.and_then(|(_, from)| from.as_deref()) else { return Ok(()) };
     let told_by = sensors.configs.iter().zip(&sensors.devices).find(|(config, _)| config.id == id);
     if told_by.is_some_and(|(_, sensor)| sensor.sense() == Sense::Depth) {
         return Ok(());

@@ -11,7 +11,7 @@ pub enum Effort {
 }
 
 impl Effort {
-    /// Returns the value for this amount of measurement.
+    /// Returns `quick` for a quick check, and `full` for the full measurement.
     pub fn pick<T>(self, quick: T, full: T) -> T {
         match self {
             Self::Quick => quick,
@@ -24,7 +24,7 @@ impl Effort {
         self.pick(1, 5)
     }
 
-    /// Number of times that every setting is measured, in turns.
+    /// Number of rounds. In each round, every setting is measured once.
     ///
     /// At least six values are needed for a 95 % interval of the median. With three values, the interval is the least
     /// and the largest value.

@@ -1,4 +1,4 @@
-//! Errors of measuring a trade.
+//! Errors of measuring a trade (comparison of error and cost).
 
 use headrace_config::ConfigErrors;
 use headrace_oracle::TruthError;
@@ -32,9 +32,9 @@ pub enum CostError {
     /// A figure that a trade needs isn't available.
     #[error("measuring {what}: {why}")]
     Figure {
-        /// Name of the figure.
+        /// Name of the missing figure.
         what: String,
-        /// The reason.
+        /// The reason why the figure isn't available.
         why: String,
     },
 }

@@ -163,7 +163,7 @@ fn vehicle(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     Ok((text, vehicle))
 }
 
-/// Checks before the measurement that existing files in the folder were written by this program.
+/// Checks, before the measurement begins, that existing files in the folder were written by this program.
 fn may_write(folder: &Path, force: bool) -> Result<(), Failure> {
     let names = TRADES.iter().flat_map(|(name, _)| [format!("{name}.csv"), format!("{name}.svg")]);
     for name in names.chain(["README.md", "method.md", "cost.json"].map(str::to_owned)) {

@@ -1,4 +1,4 @@
-//! Measures the costs of settings in turns, and runs untimed work in parallel.
+//! Measures the costs of settings round by round, and runs untimed work in parallel.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -36,10 +36,10 @@ pub fn side_by_side<T: Sync, R: Send>(
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Measures each setting `rounds` times, in turns; returns the median cost of each setting with its 95 % interval.
+/// Measures each setting once per round; returns the median cost of each setting with its 95 % interval.
 ///
-/// Measuring in turns spreads other load on the machine evenly over the settings. `run` measures a setting once and
-/// returns its cost.
+/// Rounds spread other load on the machine evenly over the settings. `run` measures a setting once and returns
+/// its cost.
 ///
 /// Errors: an error of `run`; zero rounds.
 pub fn in_turns<T>(

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Interval {
     /// Lower bound.
     pub low: f64,
-    /// The figure itself.
+    /// The figure, between its bounds.
     pub middle: f64,
     /// Upper bound.
     pub high: f64,
@@ -118,7 +118,7 @@ pub struct Error {
 pub struct Point {
     /// Method: the line in the chart that the marker belongs to.
     pub method: String,
-    /// The setting's name.
+    /// Name of the varied parameter.
     pub knob: String,
     /// Value of the setting, with its unit.
     pub value: String,
@@ -164,12 +164,12 @@ impl Point {
     }
 }
 
-/// A setting that isn't measured.
+/// A setting without a measurement.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeftOut {
-    /// The setting.
+    /// The setting that was not measured.
     pub what: String,
-    /// The reason.
+    /// The reason for which the setting was not measured.
     pub why: String,
 }
 
@@ -182,14 +182,14 @@ pub struct OracleError {
     pub size: f64,
 }
 
-/// A question of the kind "what does more of this cost", with its answer.
+/// A trade: a question such as "what does a finer target cost", with measured points and an answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trade {
     /// Name of the trade in `--only` and in file names.
     pub name: String,
     /// Heading of the trade.
     pub title: String,
-    /// The question.
+    /// The question that the trade answers.
     pub question: String,
     /// Name and unit of the x axis.
     pub error_axis: String,
@@ -210,7 +210,7 @@ pub struct Trade {
     pub oracle: OracleError,
     /// For each default that another setting beats, a sentence that explains why the default is kept.
     pub reasons: Vec<String>,
-    /// The conclusion, with at least one number.
+    /// The conclusion of the trade, with at least one number.
     pub advice: String,
 }
 
@@ -220,7 +220,7 @@ impl Trade {
         self.error_axis.rsplit(", ").next().unwrap_or_default()
     }
 
-    /// Largest difference of the error that counts as no difference, in the unit of the error.
+    /// Difference of two errors up to which they count as equal, in the unit of the error.
     ///
     /// This is a tenth of the deciding error, and at least the reference's own error.
     pub fn resolution(&self) -> f64 {
@@ -255,7 +255,7 @@ impl Trade {
 pub struct Given {
     /// Heading of the table.
     pub title: String,
-    /// Explanation, one paragraph.
+    /// Explanation of the table, one paragraph.
     pub text: String,
     /// Headings of the columns.
     pub columns: Vec<String>,
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn method_slower_and_no_more_accurate_is_off_the_pareto_front() {
+    fn slower_method_without_better_accuracy_is_off_the_pareto_front() {
         let mut points = [
             point("fine", 0.01, [9.0, 10.0, 11.0]),
             point("fine but slow", 0.01, [90.0, 100.0, 110.0]),
@@ -368,13 +368,14 @@ mod tests {
         front(&mut points, 0.0);
         assert_eq!(knee(&points, "s", 0.0).map(|point| point.value.as_str()), Some("knee"));
         assert!(knee(&points[..2], "s", 0.0).is_none() && knee(&points, "another", 0.0).is_none());
-        // Otherwise the finest point and the knee have the same error, and the cheaper one becomes an end of the front.
+        // At this resolution the finest point and the knee have equal errors, so the cheaper one becomes an end
+        // of the front.
         assert_eq!(knee(&points, "s", 0.02).map(|point| point.value.as_str()), Some("near the line"));
         assert!(knee(&points, "s", 0.2).is_none());
     }
 
     #[test]
-    fn spreads_match_published_tables() {
+    fn confidence_intervals_match_published_tables() {
         let values = [4.0, 1.0, 3.0, 2.0, 5.0];
         assert_eq!(Interval::quartiles(&values), Some(Interval { low: 2.0, middle: 3.0, high: 4.0 }));
         // The mean is 3 and the variance 2.5; t for four degrees of freedom is 2.776.

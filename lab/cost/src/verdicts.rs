@@ -2,11 +2,13 @@
 //! not judged.
 
 use crate::point::{Error, Interval, quantile};
+use headrace_coverage::Verdict;
 use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
-/// Length at each end of a dive, beyond the target, in which sections have neighbours on one side only, m.
+/// Length that is left out at each end of a dive, in addition to a length equal to the target, m.
 ///
-/// This is the length of the hull plus the distance to the next pass.
+/// Sections there have neighbours on one side only. The length is that of the hull plus the distance to the
+/// next pass.
 pub const END_M: f64 = 2.0;
 
 /// A section as judged by a method, with its true hole.
@@ -18,7 +20,7 @@ pub struct Judged {
     pub hole_m: Option<f64>,
     /// Whether the section is within the target; `None` if undecided.
     pub passes: Option<bool>,
-    /// D_true, m.
+    /// D_true: the true diameter of the section's largest hole, m.
     pub true_hole_m: f64,
 }
 
@@ -29,8 +31,8 @@ impl Judged {
             length_m: section.report.end_m - section.report.start_m,
             hole_m: section.report.hole_m.filter(|_| section.report.hole_bounded),
             passes: match section.report.verdict {
-                "pass" => Some(true),
-                "fail" => Some(false),
+                Verdict::Pass => Some(true),
+                Verdict::Fail => Some(false),
                 _ => None,
             },
             true_hole_m: section.true_hole_m,

@@ -27,7 +27,7 @@ pub(crate) fn setting(point: &Point) -> String {
     if point.value.is_empty() { point.knob.clone() } else { format!("{} {}", point.knob, point.value) }
 }
 
-/// A setting with its error and cost.
+/// A setting as text, with its error and cost.
 fn whole(trade: &Trade, point: &Point) -> String {
     let unit = point.errors.first().map_or("", |error| error.unit.as_str());
     format!(
@@ -87,8 +87,11 @@ pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
             .filter(|point| point.scene == scene && point.error() <= default.error() + trade.resolution())
             .min_by(|a, b| a.cost.middle.total_cmp(&b.cost.middle));
         if let Some(better) = better {
+            let method = &better.method;
+            let is_named = *method == default.method || *method == better.knob;
+            let method = if is_named { String::new() } else { format!("{method}, ") };
             lines.push(format!(
-                "Cheaper with no more error ({scene}): {} instead of the shipped {}.",
+                "In \"{scene}\", {method}{} costs less than the shipped {}, without more error.",
                 whole(trade, better),
                 whole(trade, default)
             ));

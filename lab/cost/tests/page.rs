@@ -40,7 +40,7 @@ fn wrong(dive: &JudgedDive, judged: impl Fn(Judged) -> Judged) -> [f64; 2] {
 }
 
 #[test]
-fn planted_wrong_method_has_the_planted_error() {
+fn deliberately_wrong_method_has_the_expected_error() {
     const PLANTED_M: f64 = 0.1;
     let dive = ideal();
     let [right_m, _] = wrong(&dive, |judged| judged);
@@ -55,7 +55,7 @@ fn planted_wrong_method_has_the_planted_error() {
 
 /// `docs/why/cost` must be generated from `cost.json` by the current program, without manual changes.
 #[test]
-fn page_in_docs_matches_its_data() {
+fn cost_page_in_docs_matches_its_data() {
     let folder = root().join("docs/why/cost");
     let read =
         |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_else(|why| panic!("{name}: {why}"));
@@ -93,7 +93,7 @@ fn page_in_docs_matches_its_data() {
 
 /// Among sections whose D_true is over the target, the shipped defaults may pass only a small share.
 #[test]
-fn shipped_defaults_pass_few_sections_over_the_target() {
+fn shipped_defaults_falsely_pass_few_sections() {
     let text = std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap();
     let results: Results = serde_json::from_str(&text).unwrap();
     let mut told = 0;

@@ -51,7 +51,7 @@ fn filter_is_more_accurate_than_the_cable_and_each_setting_has_an_effect() {
     assert!(within("slack cable", "filter, sonar returns") < 60.0, "a cable looser than told shows");
     let slack = |scene: &str| of(scene, "cable only", "displacement between passes");
     assert!(slack("VITA 1, slack") > 2.0 * slack("VITA 1, field"), "a slack three times as large");
-    // A setting without effect would give exactly the default's result.
+    // A setting that has no effect would give exactly the same result as the default.
     let field = |method: &str, value: &str| {
         figure(&trade, ["VITA 1, field", method, value], "position across").to_bits()
     };
@@ -89,7 +89,7 @@ fn ticks_change_no_verdict_but_coarse_profiles_change_the_advice() {
 }
 
 #[test]
-fn result_without_omitted_effects_is_unchanged_and_converges_with_more_rays() {
+fn only_omitted_effects_change_the_result_and_more_rays_reduce_the_change() {
     let trade = measured(simulation::measure);
     is_whole(&trade);
     for scene in ["boulders", "small pipe"] {
@@ -117,7 +117,8 @@ fn result_without_omitted_effects_is_unchanged_and_converges_with_more_rays() {
     );
 }
 
-/// Confidence has a price: at k standard deviations sigma, the plan is for a hole of T - k (sigma - 2 mm).
+/// A verdict at a confidence of k standard deviations (sigma) makes the plan aim at a smaller hole, T - k (sigma - 2
+/// mm).
 #[test]
 fn survey_hours_with_confidence_equal_those_with_a_smaller_target() {
     let trade = measured(sureness::measure);

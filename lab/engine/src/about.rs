@@ -8,23 +8,23 @@ use std::collections::BTreeMap;
 use crate::error::Error;
 use crate::place::Place;
 
-/// Name of the file with the facts.
+/// Name of the file with facts about dives.
 pub const FILE: &str = "dives.csv";
-/// Columns of the file. The column `log` is required; the others may be missing or empty.
+/// Columns of `dives.csv`. Only the column `log` is required; the others may be missing or empty.
 const COLUMNS: [&str; 4] = ["log", "plant", "pilot", "day"];
 
 /// Facts about a dive that aren't in its log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct About {
-    /// The plant.
+    /// Name of the plant in which the dive took place.
     pub plant: Option<String>,
     /// The pilot's name.
     pub pilot: Option<String>,
-    /// The day, in days since 1970-01-01.
+    /// Day of the dive, in days since 1970-01-01.
     pub day: Option<i32>,
 }
 
-/// Facts about all dives, by log.
+/// Facts about all dives, by the log's path.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Abouts(BTreeMap<String, About>);
 
@@ -81,7 +81,7 @@ impl Abouts {
         about
     }
 
-    /// Logs that the file names but `logs` doesn't contain.
+    /// Logs that `dives.csv` names but that `logs` doesn't contain.
     pub fn beyond<'a>(&'a self, logs: &[String]) -> Vec<&'a str> {
         self.0.keys().filter(|log| !logs.contains(log)).map(String::as_str).collect()
     }
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dives_csv_overrides_the_path() {
+    fn dives_csv_overrides_facts_from_the_path() {
         let all =
             Abouts::parse("dives.csv", "log, pilot,day\na/x.mcap,Ada,1970-01-03\n\"b,c.mcap\",,\n").unwrap();
         let of = |log: &str, us| all.of(log, us);

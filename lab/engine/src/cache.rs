@@ -2,8 +2,8 @@
 //!
 //! The files are `CACHE/VERSION/PARAMETERS/DIVE/sections.parquet` and so on. A dive's folder is built elsewhere and
 //! then renamed. It therefore exists completely or not at all, even if a process is killed. The folder's `whole.json`
-//! has the length and digest of each file. A dive is made again if a file differs from its digest. `CACHE/known` stores
-//! the digests of logs by path, length and modification time.
+//! has the length and digest of each file. If a file differs from its digest, the dive is replayed again. `CACHE/known`
+//! stores the digests of logs by path, length and modification time.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -23,7 +23,7 @@ use crate::place::DiveLog;
 
 /// Name of the file that lists a dive's files.
 const WHOLE: &str = "whole.json";
-/// Folder for unfinished dives.
+/// Folder for dives whose files are still being written.
 const SCRATCH: &str = "unfinished";
 /// Folder for the digests of logs.
 const KNOWN: &str = "known";
@@ -44,11 +44,11 @@ struct Written {
 /// State of a dive in the cache.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Found {
-    /// Complete and unchanged.
+    /// All files of the dive are present and unchanged.
     Whole,
-    /// Missing from the cache.
+    /// The cache has no files of the dive.
     Nothing,
-    /// Changed after the dive was stored, with a description of the change.
+    /// A file has changed since the dive was stored; the text describes the change.
     Broken(String),
 }
 
@@ -70,7 +70,7 @@ impl Cache {
         &self.folder
     }
 
-    /// Folder for unfinished dives.
+    /// Folder for dives whose files are still being written.
     pub fn scratch(&self) -> PathBuf {
         self.folder.join(SCRATCH)
     }

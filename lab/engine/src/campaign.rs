@@ -29,7 +29,7 @@ use crate::provider::{ReplayFunction, ReplayTable, Replayed};
 /// Prefix of the tables of another program version.
 pub const BEFORE: &str = "before_";
 
-/// The dives of a place, and the parameters of their replays.
+/// The dives of a folder or bucket, and the parameters with which they are replayed.
 #[derive(Debug)]
 pub struct Campaign {
     /// Location of the logs.
@@ -38,7 +38,7 @@ pub struct Campaign {
     pub dives: Vec<DiveLog>,
     /// Parameters of the replays.
     pub parameters: Parameters,
-    /// Makes the tables.
+    /// Makes the tables of dives, by replaying or from the cache.
     pub maker: Arc<Maker>,
     threads: usize,
     elsewhere: Option<Elsewhere>,
@@ -65,7 +65,7 @@ pub struct Finished {
     pub copies: Vec<(String, String)>,
     /// Logs that `dives.csv` names but that are not among the dives.
     pub unknown: Vec<String>,
-    /// The table `dives`.
+    /// The table `dives`, with a row for each dive.
     pub table: RecordBatch,
 }
 
@@ -128,7 +128,7 @@ impl Campaign {
         Ok(Finished { dives, copies, unknown, table })
     }
 
-    /// Each dive with its tables, in order.
+    /// Each dive with its tables, in the order of the dives' paths.
     async fn made(&self, note: &mut dyn FnMut(&DiveLog, &Made)) -> Result<Vec<(DiveLog, Made)>, Error> {
         let mut sent = match &self.elsewhere {
             Some(elsewhere) => self.made_by(&elsewhere.session).await?,
@@ -245,12 +245,12 @@ impl Campaign {
         Ok(Made::Kept { sha256: sha256.to_owned(), folder })
     }
 
-    /// Number of simultaneous replays.
+    /// Number of replays that run at the same time.
     pub fn threads(&self) -> usize {
         self.threads
     }
 
-    /// Source of a table of all dives.
+    /// Describes a table of all dives by name, so that any process can make it.
     pub fn replayed(&self, table: &str) -> Replayed {
         Replayed {
             place: self.place.url().to_string(),

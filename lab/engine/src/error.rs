@@ -8,12 +8,12 @@ use datafusion::error::DataFusionError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Not a valid folder or URL.
+    /// The given place of the logs is not a valid folder or URL.
     #[error("opening {place}: {why}")]
     Place {
         /// Text of the invalid folder or URL.
         place: String,
-        /// The reason.
+        /// The reason why it is invalid.
         why: String,
     },
     /// The place contains no log.
@@ -24,7 +24,7 @@ pub enum Error {
     Store {
         /// Folder or file that was listed or read.
         what: String,
-        /// Error of the store.
+        /// Error returned by the store.
         source: object_store::Error,
     },
     /// A file can't be read or written.
@@ -32,19 +32,19 @@ pub enum Error {
     File {
         /// Attempted action: `reading`, `writing`, ...
         doing: &'static str,
-        /// The file.
+        /// The file that failed.
         path: PathBuf,
-        /// Error of the operating system.
+        /// Error returned by the operating system.
         source: std::io::Error,
     },
     /// `dives.csv` of the folder is invalid.
     #[error("{file}:{line}: {why}")]
     About {
-        /// The file.
+        /// The file that failed.
         file: String,
-        /// The line, from 1.
+        /// Number of the invalid line, from 1.
         line: usize,
-        /// The problem, and the allowed values.
+        /// The problem with the line, and the allowed values.
         why: String,
     },
     /// A parameter is invalid, or a table can't be made.
@@ -58,9 +58,9 @@ pub enum Error {
     Parquet {
         /// Attempted action: `reading` or `writing`.
         doing: &'static str,
-        /// The file.
+        /// The file that failed.
         path: PathBuf,
-        /// Error of Parquet.
+        /// Error returned by the Parquet library.
         source: datafusion::parquet::errors::ParquetError,
     },
     /// An argument is invalid.

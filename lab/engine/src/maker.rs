@@ -21,7 +21,7 @@ pub struct Maker {
     counts: Arc<Counts>,
 }
 
-/// Counts of a maker's work.
+/// Counts of the dives that a maker has replayed or has found in the cache.
 #[derive(Debug, Default)]
 pub struct Counts {
     replayed: AtomicU64,
@@ -46,7 +46,7 @@ impl Counts {
         self.cached.load(Ordering::Relaxed)
     }
 
-    /// Dives whose tables in the cache were broken and were made again.
+    /// Dives whose tables were broken in the cache and were made again.
     pub fn broken(&self) -> u64 {
         self.broken.load(Ordering::Relaxed)
     }
@@ -72,12 +72,12 @@ impl Maker {
         Self { cache, threads: Arc::new(Semaphore::new(threads.max(1))), counts: Arc::default() }
     }
 
-    /// Cache of the maker.
+    /// Cache that this maker uses.
     pub fn cache(&self) -> &Cache {
         &self.cache
     }
 
-    /// Counts of the maker's work so far.
+    /// Counts of dives replayed so far, and of dives found in the cache.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }

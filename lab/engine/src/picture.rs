@@ -1,4 +1,4 @@
-//! Draws answers.
+//! Draws the answer of an SQL query as a chart.
 //!
 //! A question's comment `-- picture: KIND key=column ...` selects the drawing:
 //!
@@ -20,7 +20,7 @@ use crate::error::Error;
 
 /// Maximum number of rows drawn. A line below states the number of further rows.
 const MOST_ROWS: usize = 60;
-/// Widest label, pixels.
+/// Maximum width of a label, pixels.
 const LABEL_PX: f64 = 260.0;
 const WIDTH_PX: u32 = 1000;
 /// Colours of verdicts, as on the page.
@@ -89,14 +89,14 @@ impl Answer<'_> {
     }
 }
 
-/// A label, shortened if it is wider than the margin.
+/// A row's label, shortened if it is wider than the margin of the chart.
 fn fitting(text: &str) -> String {
     let mut text = text.to_owned();
     while width_px(&text, NORMAL) > LABEL_PX && text.pop().is_some() {}
     text
 }
 
-/// Height of a row and of the whole sheet, pixels.
+/// Height of a row of the chart and of the whole chart, pixels.
 fn heights(rows: usize) -> (f64, u32) {
     let row_px = if rows > 30 { 15.0 } else { 22.0 };
     #[expect(clippy::cast_possible_truncation, reason = "at most some thousand pixels")]

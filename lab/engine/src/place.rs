@@ -15,13 +15,13 @@ use url::Url;
 
 use crate::error::{Error, of_file};
 
-/// Highest part number that is recognised in a file name.
+/// Highest number of a recording part that is recognised in a file name.
 const MOST_PARTS: u32 = 999;
 
 /// A folder of logs, on this machine or in an object store.
 #[derive(Debug, Clone)]
 pub struct Place {
-    /// URL of the place, ending in `/`.
+    /// URL of the folder or bucket, ending in `/`.
     url: Url,
     store: Arc<dyn ObjectStore>,
     prefix: StorePath,
@@ -32,28 +32,28 @@ pub struct Place {
 /// A dive of a campaign: a log, or the parts of a recording in order.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DiveLog {
-    /// Path of the log below the place. A recording in parts has the path of the whole recording.
+    /// Path of the log, relative to the place. A recording in parts has the path of the whole recording.
     pub log: String,
-    /// Files of the dive, in order.
+    /// Files of the dive, in the order of the recording.
     pub parts: Vec<Part>,
 }
 
 /// A file of a dive, with attributes that change if the content changes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
-    /// Path below the place, as stored.
+    /// Path of the file relative to the place, in the store's encoding.
     pub path: String,
-    /// Length of the file.
+    /// Length of the file, bytes.
     pub bytes: u64,
     /// Time of the last modification, microseconds of UTC.
     pub modified_us: i64,
-    /// The store's own tag of the content.
+    /// The object store's tag for this version of the content (ETag), if any.
     pub e_tag: Option<String>,
 }
 
 /// Local files of a dive. Dropping this value removes copied files.
 pub struct Fetched {
-    /// The files in order.
+    /// The files, in the order of the recording.
     pub files: Vec<PathBuf>,
     _copy: Option<tempfile::TempDir>,
 }
@@ -94,7 +94,7 @@ impl Place {
         Ok(Self { url, store: Arc::from(store), prefix, folder })
     }
 
-    /// URL of the place.
+    /// URL of the folder or bucket.
     pub fn url(&self) -> &Url {
         &self.url
     }
@@ -119,7 +119,7 @@ impl Place {
         Ok(grouped(parts))
     }
 
-    /// Reads a small text file below the place; `None` if there is no such file.
+    /// Reads a small text file of the place; `None` if there is no such file.
     ///
     /// Errors: the file can't be read.
     pub async fn text(&self, name: &str) -> Result<Option<String>, Error> {
@@ -163,7 +163,7 @@ impl Place {
         Ok(Fetched { files, _copy: Some(copy) })
     }
 
-    /// Path in the store of a path below the place.
+    /// Converts a path relative to the place to a path in the store.
     ///
     /// Errors: none for a listed path.
     fn location(&self, below: &str) -> Result<StorePath, object_store::Error> {

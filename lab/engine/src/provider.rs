@@ -28,7 +28,7 @@ use crate::place::{DiveLog, Place};
 /// Description of a replay table. It can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Replayed {
-    /// URL of the place.
+    /// URL of the folder or bucket with the logs.
     pub place: String,
     /// The dives, one per partition.
     pub dives: Vec<DiveLog>,
@@ -120,7 +120,7 @@ impl TableProvider for ReplayTable {
 pub struct Asked {
     /// Table and parameters. The list of dives is empty, since the dives come from the input plan.
     pub replayed: Replayed,
-    /// The requested columns; `None` means all.
+    /// The requested columns of the table; `None` means all columns.
     pub projection: Option<Vec<usize>>,
 }
 
@@ -161,7 +161,7 @@ impl ReplayExec {
         Ok(Self { maker, asked, table, listed, properties: Arc::new(properties) })
     }
 
-    /// The request for each dive.
+    /// The request, applied to each listed dive.
     pub fn asked(&self) -> &Asked {
         &self.asked
     }
@@ -186,7 +186,7 @@ impl ExecutionPlan for ReplayExec {
         vec![&self.listed]
     }
 
-    /// The list already has the required partitions.
+    /// The list of dives is already divided into the required partitions.
     fn benefits_from_input_partitioning(&self) -> Vec<bool> {
         vec![false]
     }
@@ -241,7 +241,7 @@ fn listed_dives(batch: &RecordBatch) -> Vec<Result<DiveLog>> {
     parsed.map(|dive| dive.map_err(|error| external(error.into()))).collect()
 }
 
-/// Rows of `dives`, with this path in the column `log`.
+/// Rows of the table `dives`, with the given path in the column `log`.
 fn under_path(batch: &RecordBatch, log: &str) -> Result<RecordBatch> {
     let columns =
         batch.schema_ref().fields().iter().zip(batch.columns()).map(|(field, column)| -> ArrayRef {
@@ -264,7 +264,7 @@ fn external(error: Box<dyn std::error::Error + Send + Sync>) -> DataFusionError 
 /// defaults to `sections`.
 #[derive(Debug)]
 pub struct ReplayFunction {
-    /// Makes the tables.
+    /// Makes the tables of the requested dives.
     pub maker: Arc<Maker>,
     /// The dives of the campaign, and the default parameters.
     pub all: Replayed,
@@ -302,7 +302,7 @@ impl TableFunctionImpl for ReplayFunction {
     }
 }
 
-/// Overrides some parameters by a text: a JSON object, or `key=value` pairs separated by commas.
+/// Overrides the parameters that a text names. The text is a JSON object, or `key=value` pairs separated by commas.
 fn overridden(base: &Parameters, text: &str) -> Result<Parameters> {
     let external = |error: serde_json::Error| DataFusionError::Plan(format!("parameters {text:?}: {error}"));
     let mut all = serde_json::to_value(base).map_err(external)?;

@@ -1,4 +1,4 @@
-//! Ready-made questions.
+//! Predefined SQL questions about dives.
 
 /// A question: a name and a SQL query, whose first comments describe the question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

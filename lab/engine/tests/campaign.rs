@@ -20,7 +20,7 @@ fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(name)
 }
 
-/// A folder with a plant of two dives and one of three.
+/// A folder with two plants: one has two dives, the other has three.
 fn dives() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (number, log) in LOGS.iter().enumerate() {
@@ -56,7 +56,7 @@ fn ask(folder: &Path, cache: &Path, sql: &str, more: &[&str]) -> (Vec<Value>, St
     (rows, stderr(&output).lines().last().unwrap_or_default().to_owned())
 }
 
-/// Content of every file of finished dives in a cache, by path below the version.
+/// Content of every file of finished dives in a cache, by path below the folder of the program version.
 fn files(cache: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     fn collect(folder: &Path, base: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {
         for entry in std::fs::read_dir(folder).into_iter().flatten() {
@@ -206,7 +206,7 @@ fn sigkill_loses_no_finished_dive() {
         assert!(running.try_wait().unwrap().is_none(), "it ended without a dive");
         std::thread::sleep(Duration::from_millis(2));
     }
-    // SIGKILL.
+    // `kill` sends SIGKILL.
     running.kill().unwrap();
     running.wait().unwrap();
     let there = finished(cache.path());
@@ -226,7 +226,7 @@ fn broken_cache_entries_are_found_and_remade() {
     let all = files(cache.path());
     let below = |path: &Path| cache.path().join(headrace_tables::program_version()).join(path);
     let sections: Vec<&PathBuf> = all.keys().filter(|path| path.ends_with("sections.parquet")).collect();
-    // A changed bit, a truncated file, and a deleted file.
+    // Three kinds of damage: a changed bit, a truncated file, and a deleted file.
     let mut flipped = all[sections[0]].clone();
     let middle = flipped.len() / 2;
     flipped[middle] ^= 1;

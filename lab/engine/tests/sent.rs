@@ -47,9 +47,9 @@ impl QueryPlanner for Lost {
     }
 }
 
-/// Runs a campaign of five dives whose session may be lost twice.
+/// Runs a campaign of five dives with a session that fails twice.
 ///
-/// `at_each` dives are finished before each loss. Returns the number of plans sent, and the result.
+/// `at_each` dives are finished before each failure. Returns the number of plans sent, and the result.
 async fn sent(at_each: usize) -> (usize, std::result::Result<usize, String>) {
     let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     for log in ["adrift", "murk", "sectors", "stalls", "steel"] {

@@ -1,4 +1,4 @@
-//! Tables 3 to 5: simulated runs beside the paper's, and the Wilcoxon tests of §8.1.
+//! Tables 3 to 5: simulated runs compared with the paper's runs, and the Wilcoxon tests of §8.1.
 
 use crate::paper::{Measured, PaperError, Printed, Spacings, Tables, measured, tables};
 use headrace_sampling::layout::HeadLayout;
@@ -13,7 +13,7 @@ use crate::{ExperimentError, Progress};
 const T_X_SHARE: f64 = 0.02;
 /// Tolerance of the mean T_y and the mean T relative to the paper's experiment.
 const MEAN_SHARE: f64 = 0.03;
-/// Length of a run, m, as in the paper.
+/// Length of each simulated run, m, as in the paper.
 const LENGTH_M: f64 = 130.0;
 /// Effects of the paper's simulator: a sonar with 1 cm of range noise, and a pilot who drifts.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
@@ -22,11 +22,11 @@ const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
 /// A run in Table 3 or 4, with its T from Table 5.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunRow {
-    /// The mode.
+    /// Name of the heads' mode.
     pub mode: &'static str,
     /// Number of heads.
     pub heads: u8,
-    /// Whether the heads share the turn in sectors.
+    /// Whether the heads are in the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
     /// T_x, m.
     pub t_x: Pair,
@@ -40,12 +40,12 @@ pub struct RunRow {
     pub misses: Vec<String>,
 }
 
-/// A figure of the paper and the recomputed one.
+/// A number from the paper beside the recomputed number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pair {
-    /// Figure printed in the paper.
+    /// Number printed in the paper.
     pub paper: f64,
-    /// Recomputed figure.
+    /// Recomputed number.
     pub ours: f64,
 }
 
@@ -54,7 +54,7 @@ impl Pair {
         Self { paper: paper.value(), ours }
     }
 
-    /// Relative difference, positive if the recomputed figure is larger.
+    /// Relative difference of the two numbers, positive if the recomputed one is larger.
     pub fn difference(&self) -> f64 {
         self.ours / self.paper - 1.0
     }
@@ -69,11 +69,11 @@ impl Pair {
 pub struct SignedRankRow {
     /// The compared quantity.
     pub what: &'static str,
-    /// Phase shift or sector offset.
+    /// Whether the test is for the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
     /// Two-sided p of the predictions against the paper's experiments; `None` if all differences are zero.
     pub p_paper: Option<f64>,
-    /// Two-sided p of the predictions against our experiments.
+    /// Two-sided p of the predictions against our simulated experiments.
     pub p_ours: Option<f64>,
 }
 
@@ -140,7 +140,7 @@ fn row(run: &Measured, layout: HeadLayout, paper: &Spacings, ours: &Spacing, tur
     row
 }
 
-/// The quantities that miss their targets, with reasons.
+/// The quantities (T_x, mean T_y, mean T) that miss their targets, with reasons.
 fn misses(row: &RunRow, seconds: f64) -> Vec<String> {
     let mut misses = Vec::new();
     let percent = |pair: &Pair| 100.0 * pair.difference();

@@ -8,7 +8,7 @@ use crate::runs::{Dive, Sample, Setting};
 use crate::spacing::{gaps_m, passes};
 use crate::{ExperimentError, Progress};
 
-/// Length of a run, m.
+/// Length of each simulated run, m.
 const LENGTH_M: f64 = 130.0;
 /// Number of lines around the perimeter on which passes are evaluated.
 const LINES: usize = 720;
@@ -18,17 +18,17 @@ const LINES: usize = 720;
 pub struct HiddenRow {
     /// Number of heads.
     pub heads: u8,
-    /// Phase between adjacent heads, degrees.
+    /// Phase difference between adjacent heads, degrees.
     pub side_by_side_deg: f64,
-    /// Angle that a head loses to its neighbour, degrees.
+    /// Angle of a head's turn that its neighbour occludes, degrees.
     pub angle_deg: f64,
-    /// Length of wall occluded from that head, m.
+    /// Arc length of wall that the neighbour occludes from the head, m.
     pub gap_m: f64,
     /// T_x / s without occlusion, m.
     pub t_x_m: f64,
-    /// The largest distance between passes anywhere, as a multiple of `t_x_m`.
+    /// The largest distance between passes on any line, as a multiple of `t_x_m`.
     pub times: f64,
-    /// Mean, over the lines in shadow, of the line's largest distance between passes, as a multiple of `t_x_m`.
+    /// Mean of the largest distances between passes on the occluded lines, as a multiple of `t_x_m`.
     pub times_in_shadow: f64,
 }
 
@@ -96,7 +96,8 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     for sample in samples {
         if sample.of_wall {
             if let (Some(from), Some(before)) = (began, last) {
-                // A shadow's edge falls between two pings, so half of the step at each edge is occluded.
+                // The edge of the occluded range falls between two pings, so half of the step at each edge counts as
+                // occluded.
                 let turned = math::wrap_signed(before.angle_rad - from.angle_rad, TAU).abs() + dive.step_rad;
                 angle_rad = angle_rad.max(turned);
                 let around = math::wrap_signed(before.arc_m - from.arc_m, dive.profile.perimeter_m());
@@ -111,7 +112,7 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     (angle_rad, gap_m)
 }
 
-/// Phase between the last two heads, radians in (0, pi]. These heads are adjacent.
+/// Phase difference between the last two heads, radians in (0, pi]. These heads are adjacent.
 fn side_by_side_rad(dive: &Dive) -> f64 {
     let firsts: Vec<f64> =
         dive.heads.iter().rev().take(2).filter_map(|samples| samples.first()).map(|s| s.angle_rad).collect();

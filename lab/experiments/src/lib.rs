@@ -43,28 +43,28 @@ pub type Progress<'a> = &'a dyn Fn(&str);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
-    /// An invalid scene.
+    /// A scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Invalid numbers in a table of the paper.
+    /// A table of the paper has invalid numbers.
     #[error(transparent)]
     Paper(#[from] PaperError),
-    /// An invalid profile.
+    /// A tunnel profile is invalid.
     #[error(transparent)]
     Profile(#[from] ProfileError),
-    /// No Poisson surface through the samples.
+    /// No Poisson surface can be made through the samples.
     #[error("a surface through the samples: {0}")]
     Surface(#[from] surface::poisson::PoissonError),
-    /// No Delaunay triangulation of the samples.
+    /// The samples have no Delaunay triangulation.
     #[error("interpolating between the samples: {0}")]
     Chart(#[from] surface::chart::ChartError),
-    /// An invalid argument of a formula.
+    /// An argument of a formula is invalid.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// A Poisson surface without a triangle.
+    /// The Poisson surface has no triangle.
     #[error("the surface through the samples has no triangle")]
     NoSurface,
-    /// A stationary turn without a closed contour.
+    /// The samples of a stationary turn don't form a closed contour.
     #[error("the perimeter from echoes: {0}")]
     Perimeter(#[from] perimeter::PerimeterError),
 }

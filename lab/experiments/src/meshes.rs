@@ -11,16 +11,16 @@ use crate::surface::wall::{self, Stretch};
 use crate::surface::{Mesh, MeshIndex, Xyz, normals};
 use crate::{ExperimentError, Progress};
 
-/// Length of a run, m, as in the paper.
+/// Length of each simulated run, m, as in the paper.
 pub(crate) const LENGTH_M: f64 = 130.0;
-/// The compared part of the surface, away from its ends.
+/// Chainages between which the surface is compared with the wall, away from its ends.
 const INNER: Stretch = Stretch { from_m: 20.0, to_m: 120.0, step_m: 0.1 };
-/// Range noise of the paper's simulator.
+/// Scene line for the range noise of the paper's simulator.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n";
 /// Number of repetitions of an unaligned dive, each with different phases.
 const SEEDS: u64 = 5;
 
-/// A configuration of §8.2 or §8.3.
+/// A configuration of heads from the paper's §8.2 or §8.3.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeshRow {
     /// Number of heads.
@@ -29,7 +29,7 @@ pub struct MeshRow {
     pub mode: &'static str,
     /// Whether the heads are in sector offset instead of phase shift.
     pub sectors: bool,
-    /// Whether the phases are aligned.
+    /// Whether the heads' phases are aligned.
     pub aligned: bool,
     /// Mean and standard deviation of the distance in the paper, m; `None` if the paper has none.
     pub paper_m: Option<[f64; 2]>,
@@ -38,11 +38,12 @@ pub struct MeshRow {
     pub poisson_m: [f64; 2],
     /// Distance from the wall to the linear interpolation in (x, arc length): mean and standard deviation, m.
     pub plain_m: [f64; 2],
-    /// Mean distance for each seed, m.
+    /// Mean distance from the Poisson surface for each seed, m.
     pub seeds_m: Vec<f64>,
 }
 
-/// Number of heads, mode, whether in sectors, whether aligned, and the paper's mean and standard deviation.
+/// Number of heads, their mode, whether they are in sector offset, whether their phases are aligned, and the paper's
+/// mean and standard deviation.
 type Configuration = (u8, &'static str, bool, bool, Option<[f64; 2]>);
 
 /// The paper's configurations, with its distances.
@@ -108,7 +109,7 @@ pub(crate) fn setting(
     Setting { heads, mode, layout, aligned, occlusion: heads > 2, length_m, effects, seed }
 }
 
-/// Measured positions of the wall.
+/// Positions of the wall as measured in the dive.
 pub(crate) fn cloud(dive: &Dive) -> Vec<Xyz> {
     let samples = dive.heads.iter().flatten().filter(|sample| sample.of_wall);
     samples.map(|sample| [sample.at.x(), sample.at.y(), sample.at.z()]).collect()

@@ -14,7 +14,7 @@ use crate::{ExperimentError, Progress};
 pub struct Experiments {
     /// Speed of the runs, m/s.
     pub speed_mps: f64,
-    /// Tables 3 to 5.
+    /// The runs of Tables 3 to 5.
     pub runs: Vec<RunRow>,
     /// Signed-rank tests (§8.1).
     pub signed_ranks: Vec<SignedRankRow>,

@@ -19,7 +19,7 @@ pub(crate) struct Setting {
     pub heads: u8,
     /// Mode of the heads.
     pub mode: &'static str,
-    /// Layout of the heads.
+    /// Layout of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
     /// Whether the heads' phases account for the dive's speed and the heads' positions along the hull.
     pub aligned: bool,
@@ -27,7 +27,7 @@ pub(crate) struct Setting {
     pub occlusion: bool,
     /// Distance travelled, m.
     pub length_m: f64,
-    /// Additional lines for the scene's effects; SONARS is a placeholder for the heads' ids.
+    /// Additional lines in the scene's table of effects; SONARS is a placeholder for the heads' ids.
     pub effects: String,
     /// Random seed.
     pub seed: u64,
@@ -56,9 +56,9 @@ pub(crate) struct Dive {
     pub profile: Profile,
     /// All pings with an echo, by head, in time order.
     pub heads: Vec<Vec<Sample>>,
-    /// Angle between pings, radians.
+    /// Angle between consecutive pings of a head, radians.
     pub step_rad: f64,
-    /// Time between pings, s.
+    /// Time between consecutive pings of a head, s.
     pub ping_period_s: f64,
 }
 

@@ -12,13 +12,13 @@ const LINES: usize = 72;
 /// Tolerance of the angle of a regular step, as a share of the usual step.
 const STEP_SHARE: f64 = 0.25;
 
-/// The quantities of the paper's Tables 3 to 5 for a run.
+/// The sample spacings of a run, as in the paper's Tables 3 to 5.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Spacing {
     /// T_x: mean distance along the tunnel from pass to pass.
     ///
-    /// In phase shift, passes are counted on lines along the wall. In sectors, a pass is a turning point of a head at
-    /// the same end of its sector.
+    /// In the phase-shift layout, passes are counted on lines along the wall. In the sector-offset layout, each turning
+    /// point of a head at one end of its sector counts as a pass.
     pub t_x_m: f64,
     /// T_y: distance across the tunnel from ping to ping, in the cross-section.
     pub t_y: Spread,
@@ -56,7 +56,7 @@ fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
 /// The chainages at which heads passed each line along the wall, ascending.
 pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
     let perimeter_m = dive.profile.perimeter_m();
-    // Only the stretch that all heads have passed counts, since passes of fewer heads are farther apart.
+    // Only the stretch that all heads have passed is used, since passes of fewer heads are farther apart.
     let ends = |pick: fn(&[Sample]) -> Option<&Sample>| {
         dive.heads.iter().filter_map(move |samples| pick(samples)).map(|s| s.at.x())
     };

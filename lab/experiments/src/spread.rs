@@ -6,15 +6,15 @@ use serde::Serialize;
 /// Statistics of absolute lengths, m; all zero if there are no lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(crate) struct Spread {
-    /// Count.
+    /// Number of lengths.
     pub count: usize,
-    /// Mean, m.
+    /// Mean of the lengths, m.
     pub mean_m: f64,
-    /// Population standard deviation, m.
+    /// Population standard deviation of the lengths, m.
     pub sd_m: f64,
-    /// The least, m.
+    /// The least length, m.
     pub min_m: f64,
-    /// The largest, m.
+    /// The largest length, m.
     pub max_m: f64,
 }
 

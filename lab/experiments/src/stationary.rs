@@ -9,29 +9,29 @@ use crate::perimeter::{self, Ping, Settings};
 
 /// Width of the beam at 1 MHz, degrees.
 const BEAM_DEG: f64 = 1.4;
-/// Rays of a beam.
+/// Number of rays per simulated beam.
 const RAYS: i32 = 61;
-/// Pings of a turn in SLOW.
+/// Number of pings per turn in mode SLOW.
 const PINGS: i32 = 1200;
-/// The paper's measurement, m.
+/// Perimeter measured in the paper, m.
 const PAPER_M: f64 = 33.09;
 
 /// The perimeter by several methods, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Perimeter {
-    /// The blueprint's perimeter.
+    /// Perimeter of the blueprint's profile.
     pub nominal_m: f64,
-    /// The paper's measurement.
+    /// Perimeter measured in the paper.
     pub paper_m: f64,
-    /// By the paper's method: the skeleton of the echo image, with steps of 1 or sqrt 2 pixels.
+    /// Perimeter by the paper's method: the skeleton of the echo image, with steps of 1 or sqrt 2 pixels.
     pub skeleton_m: f64,
-    /// By the same skeleton, corrected for the excess length of the pixel staircase.
+    /// Perimeter by the same skeleton, with lengths corrected for the staircase of pixels.
     pub skeleton_smooth_m: f64,
-    /// By a polygon through the first returns.
+    /// Perimeter of a polygon through the first return of each beam.
     pub first_returns_m: f64,
-    /// By a polygon through the mean ranges of each beam.
+    /// Perimeter of a polygon through the mean range of each beam.
     pub mean_ranges_m: f64,
-    /// By a polygon through ideal rays.
+    /// Perimeter of a polygon through the hits of ideal rays, without beam width.
     pub rays_m: f64,
 }
 

@@ -22,7 +22,7 @@ pub(crate) enum Zeros {
     Pratt,
 }
 
-/// Options of the test.
+/// Options of the signed-rank test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Options {
     /// Treatment of zeros.
@@ -31,7 +31,7 @@ pub(crate) struct Options {
     pub continuity: bool,
 }
 
-/// Distribution used for p.
+/// Distribution from which p is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Method {
     /// The exact distribution of W+ over all choices of signs.
@@ -57,20 +57,20 @@ pub(crate) struct SignedRank {
     pub p_greater: f64,
     /// Probability that W+ is at most as large.
     pub p_less: f64,
-    /// Distribution used.
+    /// Distribution from which p was computed.
     pub method: Method,
 }
 
-/// A reason why the test can't be made.
+/// A reason why the signed-rank test can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum WilcoxonError {
     /// Two lists differ in length.
     #[error("pairs need lists of equal length; these have {left} and {right}")]
     Lengths {
-        /// Length of the first.
+        /// Length of the first list.
         left: usize,
-        /// Length of the second.
+        /// Length of the second list.
         right: usize,
     },
     /// A difference isn't a finite number.

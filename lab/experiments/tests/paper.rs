@@ -55,7 +55,7 @@ fn no_line_is_wider_than_a_terminal() {
 }
 
 #[test]
-fn modes_are_formatted_as_text() {
+fn tables_of_modes_are_formatted_as_text() {
     insta::assert_snapshot!(said(&[0, 1, 2]), @"
     As printed in Jorge et al., Sensors 2021, 21, 1900 (CC BY 4.0), and ours; % is by how much ours is larger.
     = the printed digits are ours rounded and ours truncated, r rounded only, t truncated only.
@@ -85,7 +85,7 @@ fn modes_are_formatted_as_text() {
 }
 
 #[test]
-fn one_head_is_formatted_as_text() {
+fn table_of_one_head_is_formatted_as_text() {
     insta::assert_snapshot!(said(&[3]), @"
     Table 3. VITA 1, one head: the baseline at 0.197 m/s, metres
                 T_x                     mean T_y                T_ymin                  T_ymax
@@ -113,7 +113,7 @@ fn one_head_is_formatted_as_text() {
 }
 
 #[test]
-fn several_heads_are_formatted_as_text() {
+fn table_of_several_heads_is_formatted_as_text() {
     insta::assert_snapshot!(said(&[4]), @"
     Table 4. VITA 2, two to four heads: the baseline, metres
                  T_x / s, phase shift                     2 T_x / s, sector offset
@@ -165,7 +165,7 @@ fn several_heads_are_formatted_as_text() {
 }
 
 #[test]
-fn combined_distances_are_formatted_as_text() {
+fn table_of_combined_distances_is_formatted_as_text() {
     insta::assert_snapshot!(said(&[5]), @"
     Table 5. T = sqrt(T_x^2 + T_y^2) of Table 4's experiments, and as predicted at 0.197 m/s, metres
       phase shift; pred.: predicted by the baseline

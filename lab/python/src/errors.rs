@@ -30,7 +30,7 @@ pub(crate) enum Failure {
     NoSource {
         /// The requested source.
         source_id: String,
-        /// The log.
+        /// Path of the log.
         file: String,
         /// The sources in the log.
         known: String,
@@ -38,7 +38,7 @@ pub(crate) enum Failure {
     /// The log has no vehicle file.
     #[error("reading the vehicle file attached to {file}: none is attached, or it can't be read")]
     NoVehicleFile {
-        /// The log.
+        /// Path of the log.
         file: String,
     },
     /// The vehicle file has invalid keys.
@@ -47,9 +47,9 @@ pub(crate) enum Failure {
     /// A file can't be read.
     #[error("reading {}: {source}", path.display())]
     File {
-        /// The file.
+        /// The file that can't be read.
         path: PathBuf,
-        /// Cause.
+        /// Error that occurred while reading the file.
         source: io::Error,
     },
     /// The settings of the vehicle file are inconsistent.
@@ -57,7 +57,7 @@ pub(crate) enum Failure {
     Vehicle {
         /// The vehicle file.
         file: String,
-        /// The reason.
+        /// The inconsistency in the settings.
         why: String,
     },
     /// A dive can't be replayed.

@@ -12,9 +12,9 @@ use crate::arguments::{Coordinates, points, positive};
 use crate::errors::Failure;
 use crate::table::Table;
 
-/// Edge of a cell of the store, m. It equals that of a dive with a target of half a metre.
+/// Edge length of a cell in the sample store, m; the same as in a dive with a target of half a metre.
 const CELL_M: f64 = 0.25;
-/// Length of the stretch searched with one store, m.
+/// Length of the stretch whose points are put into one sample store, m.
 ///
 /// Together with the search radius on either side, the stretch is so short that the store packs no sample.
 const STRETCH_M: f64 = 32.0;

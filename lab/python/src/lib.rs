@@ -1,5 +1,5 @@
-//! headrace as a Python package: reads logs, replays them as Arrow tables, and computes sampling theory and holes of
-//! point clouds.
+//! headrace as a Python package: reads logs, replays them as Arrow tables, evaluates the sampling equations, and finds
+//! holes in point clouds.
 //!
 //! `python/headrace/_headrace.pyi` has the types for Python, and a test compares these types with this code. The
 //! interpreter's lock is released while a log is read or a wall is searched.

@@ -12,8 +12,8 @@ use crate::errors::Failure;
 use crate::spacing::Turn;
 use crate::vehicle;
 
-/// Number of soundings of a ring per step. With this number the largest step is found for any phase of the pings within
-/// the turn.
+/// Number of computed ranges per step of the head. With this number the largest step is found for any phase of the
+/// pings within the turn.
 const PER_STEP: u32 = 10;
 
 /// A tunnel's design profile: a closed cross-section in y (left) and z (up from the floor's centre), m.
@@ -126,8 +126,8 @@ impl Profile {
         self.profile.clock(arc_m)
     }
 
-    /// T_y at rest of a head at (y_m, z_m): the least, mean and largest straight distance between neighbouring samples of one
-    /// turn, m. The general case of the paper's Eq. 5, 6 and 10, by ray casting.
+    /// T_y at rest of a head at (y_m, z_m): the least, mean and largest straight distance between neighbouring samples
+    /// of one turn, m. The general case of the paper's Eq. 5, 6 and 10, by ray casting.
     ///
     /// Raises SamplingError for a head outside the profile.
     fn t_y_at_rest_m(&self, y_m: f64, z_m: f64, turn: &Turn) -> Result<(f64, f64, f64), Failure> {

@@ -13,7 +13,7 @@ use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
 
 use crate::Error;
 
-/// The first column of every table.
+/// Name of the first column of every table, which identifies the dive.
 pub(crate) const DIVE: &str = "dive";
 const DIVE_ABOUT: &str = "The dive: first 16 digits of its log's SHA-256; the key between tables";
 
@@ -23,7 +23,7 @@ pub(crate) enum Get<R> {
     Number(fn(&R) -> Option<f64>),
     Count(fn(&R) -> Option<i64>),
     Truth(fn(&R) -> Option<bool>),
-    /// Time in microseconds of UTC.
+    /// Time as microseconds of UTC since 1970.
     Moment(fn(&R) -> Option<i64>),
 }
 
@@ -54,10 +54,10 @@ impl<R> Get<R> {
 /// A column: its name with the unit, its description, and the function that takes its value.
 pub(crate) struct Column<R>(pub(crate) &'static str, pub(crate) &'static str, pub(crate) Get<R>);
 
-/// A table with rows of type `R`.
+/// A table whose rows are made from values of type `R`.
 pub(crate) struct Table<R> {
     pub(crate) name: &'static str,
-    /// Description of a row.
+    /// Description of one row of the table, for the documentation.
     pub(crate) about: &'static str,
     pub(crate) columns: Vec<Column<R>>,
 }

@@ -16,44 +16,44 @@ pub enum Error {
     /// A parameter is out of its range.
     #[error("{name} = {value}: must be from {from} to {to}")]
     Parameter {
-        /// The parameter.
+        /// Name of the parameter.
         name: &'static str,
-        /// Value of the parameter.
+        /// Invalid value of the parameter.
         value: f64,
         /// Least value allowed.
         from: f64,
         /// Greatest value allowed.
         to: f64,
     },
-    /// No file was named.
+    /// The request names no log file.
     #[error("replaying a dive: no log was named")]
     NoLog,
     /// A vehicle file can't be read.
     #[error("reading {}: {source}", path.display())]
     Read {
-        /// The file.
+        /// The vehicle file that can't be read.
         path: PathBuf,
-        /// Cause.
+        /// Error that occurred while reading the file.
         source: std::io::Error,
     },
     /// The log can't be opened or read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The log has no vehicle file, and the parameters have none.
+    /// Neither the log nor the parameters have a vehicle file.
     #[error("reading {}: no vehicle file {}; give one as the parameter vehicle", log.display(), match loss {
         Some(loss) => format!("can be read from this damaged log ({loss})"),
         None => "is attached to this log".to_owned(),
     })]
     NoVehicle {
-        /// The log.
+        /// Path of the log.
         log: PathBuf,
-        /// The first of the log's losses.
+        /// The first loss of data in the log, which may be the cause.
         loss: Option<String>,
     },
     /// The vehicle file is invalid.
     #[error(transparent)]
     Vehicle(#[from] ConfigErrors),
-    /// The loop can't be armed.
+    /// The live loop can't be started with the vehicle file's settings.
     #[error(transparent)]
     Arming(#[from] PluginError),
     /// The replay stopped early.
@@ -62,24 +62,24 @@ pub enum Error {
     /// The replay was stopped before the log's end.
     #[error("replaying {}: stopped before its end", log.display())]
     Stopped {
-        /// The log.
+        /// Path of the log.
         log: PathBuf,
     },
-    /// Smoothing was requested for a vehicle without a filter.
+    /// Smoothing was requested for a vehicle without a navigation filter.
     #[error("replaying {}: smooth needs [navigation] way = \"filter\"; the vehicle file has way = \"direct\"", log.display())]
     NoFilter {
-        /// The log.
+        /// Path of the log.
         log: PathBuf,
     },
     /// Smoothing failed.
     #[error("smoothing: {0}")]
     Smooth(#[from] SmoothError),
-    /// Columns don't form a table: a defect of this library.
+    /// The columns don't form a valid Arrow table, which is a defect of this library.
     #[error("making table {table}: {source}")]
     Table {
-        /// The table.
+        /// Name of the table.
         table: &'static str,
-        /// Error of Arrow.
+        /// Error returned by the Arrow library.
         source: ArrowError,
     },
 }

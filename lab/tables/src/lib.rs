@@ -51,7 +51,7 @@ pub struct Tables {
     pub dives: RecordBatch,
     /// A row for each section of the coverage extent.
     pub sections: RecordBatch,
-    /// A row for each hole that is the largest of a section.
+    /// A row for each hole that is the largest hole of a section.
     pub holes: RecordBatch,
     /// A row for each section that was flagged.
     pub flags: RecordBatch,
@@ -187,7 +187,7 @@ pub fn described() -> String {
     page
 }
 
-/// Formats the first bytes as hexadecimal digits.
+/// Formats the first bytes of a digest as hexadecimal digits.
 #[expect(clippy::format_collect, reason = "a few bytes")]
 fn hex(bytes: &[u8], most: usize) -> String {
     bytes.iter().take(most).map(|byte| format!("{byte:02x}")).collect()

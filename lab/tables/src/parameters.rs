@@ -57,12 +57,12 @@ impl Parameters {
         crate::hex(&hasher.finalize(), 8)
     }
 
-    /// Changes a vehicle's settings to the parameters.
+    /// Overrides a vehicle's settings by these parameters.
     ///
     /// Errors: a value is out of its range.
     pub(crate) fn apply(&self, vehicle: &mut VehicleConfig) -> Result<(), Error> {
         if let Some(target_m) = within("target_m", self.target_m, TARGET_M)? {
-            vehicle.target_m = target_m;
+            vehicle.target.max_hole_m = target_m;
         }
         if let Some(section_m) = within("section_m", self.section_m, SECTION_M)? {
             vehicle.section_m = section_m;

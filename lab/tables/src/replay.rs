@@ -30,7 +30,7 @@ pub(crate) struct Dive {
     pub(crate) about: About,
 }
 
-/// Facts that the log states about itself.
+/// Facts about a log, from the log's own metadata.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct About {
     /// The program that wrote the log.

@@ -223,7 +223,7 @@ fn losses_and_unreadable_logs_appear_as_rows() {
 
 /// The file must describe the tables as the code defines them. `RENEW=1 cargo test -p headrace_tables` rewrites it.
 #[test]
-fn page_has_every_column() {
+fn dive_tables_csv_lists_every_column() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/dive-tables.csv");
     if std::env::var_os("RENEW").is_some() {
         std::fs::write(&path, described()).unwrap();

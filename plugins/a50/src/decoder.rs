@@ -14,17 +14,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// Longest usual gap within a line. It allows for a TCP retransmission, whose timer is at least 200 ms.
+/// Longest usual gap between the bytes of a line. It allows for a TCP retransmission, whose timer is at least
+/// 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
-/// Minimum number of beams, since a velocity has three components.
+/// Minimum number of valid beams for a velocity, which has three components.
 const LEAST_BEAMS: u8 = 3;
 /// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
-/// Maximum delay within the device. It is far above the two-way travel time of sound, 70 ms.
+/// Largest plausible delay between the sound's reflection and the report. The two-way travel time is only 70
+/// ms.
 const MOST_DELAY_US: i64 = 2_000_000;
 
-/// Decoding settings.
+/// Decoding settings of an A50.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecoderSettings {
     /// Largest accepted figure of merit, m/s.
@@ -35,38 +37,38 @@ pub struct DecoderSettings {
     pub latency: DurNs,
 }
 
-/// Withheld reports, by reason.
+/// Number of withheld velocity reports, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Withheld {
-    /// Marked invalid by the device.
+    /// Reports marked invalid by the device.
     pub invalid: u64,
-    /// Status not zero: too hot.
+    /// Reports whose status isn't zero, because the device is too hot.
     pub status: u64,
-    /// Velocity relative to the water.
+    /// Reports whose velocity is relative to the water.
     pub water: u64,
-    /// Fewer than three valid beams.
+    /// Reports with fewer than three valid beams.
     pub beams: u64,
-    /// Altitude outside the measuring range.
+    /// Reports whose altitude is outside the measuring range.
     pub altitude: u64,
-    /// Figure of merit too large, or negative.
+    /// Reports whose figure of merit is too large, or negative.
     pub fom: u64,
-    /// Speed too large.
+    /// Reports whose speed is too large.
     pub speed: u64,
-    /// Contradictory timestamps.
+    /// Reports whose timestamps contradict each other.
     pub times: u64,
     /// Repeats of the previous report.
     pub repeated: u64,
 }
 
 impl Withheld {
-    /// Total of all reasons.
+    /// Number of withheld reports for all reasons together.
     pub fn total(&self) -> u64 {
         let Self { invalid, status, water, beams, altitude, fom, speed, times, repeated } = self;
         [invalid, status, water, beams, altitude, fom, speed, times, repeated].into_iter().sum()
     }
 }
 
-/// Decodes bytes into readings.
+/// Decodes an A50's bytes into readings of velocity.
 #[derive(Debug, Clone)]
 pub struct A50Decoder {
     codec: LineCodec,
@@ -85,19 +87,19 @@ struct State {
 
 stateful!(State { state: last, withheld; fixed: meaning; });
 
-/// Converts a vector from device axes to ours, or back.
+/// Converts a vector from device axes to headrace's, or back.
 pub fn to_ours([x, y, z]: [f64; 3]) -> Vec3<Sensor> {
     Vec3::new(x, -y, -z)
 }
 
 impl A50Decoder {
-    /// New decoder.
+    /// Creates a decoder with these settings.
     pub fn new(meaning: DecoderSettings) -> Self {
         let state = State { meaning, last: None, withheld: Withheld::default() };
         Self { codec: LineCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
-    /// Withheld reports, by reason.
+    /// Number of withheld velocity reports, by reason.
     pub fn left_out(&self) -> Withheld {
         self.state.withheld
     }
@@ -159,8 +161,8 @@ impl State {
     }
 }
 
-/// Whether a report repeats the previous one: it has the same timestamp, or its values are bit-identical. Values of new
-/// reports always differ.
+/// Whether a report repeats the previous one: true if it has the same timestamp, or if its values are
+/// bit-identical. The values of a new report always differ from those of the last one.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

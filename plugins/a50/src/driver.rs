@@ -1,4 +1,4 @@
-//! Host side of the connection. The driver only listens.
+//! Driver of an A50, which only listens to the connection.
 
 use headrace_sensor::codec::Framing as _;
 use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};
@@ -6,12 +6,12 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
 use crate::report::{Lines, MAX_LINE_BYTES, format_of};
 
-/// Supported carriers.
+/// Carriers over which an A50 can be connected.
 pub const CARRIERS: [Carrier; 2] = [Carrier::Tcp, Carrier::Udp];
 
-/// Longest usual gap within a line.
+/// Longest usual gap between the bytes of a line.
 const SILENCE: DurNs = DurNs::from_millis(200);
-/// Number of consecutive lines without a velocity after which the format counts as unknown.
+/// Number of consecutive lines without a velocity after which the device's format counts as unknown.
 ///
 /// The device reports several times a second.
 const NOT_UNDERSTOOD_FROM: u32 = 20;
@@ -26,7 +26,7 @@ pub struct A50Driver {
 }
 
 impl A50Driver {
-    /// New driver.
+    /// Creates a driver that has received nothing yet.
     pub fn new() -> Self {
         Self { cutter: Cutter::new(Lines, SILENCE), velocities: 0, others: 0, format: None }
     }

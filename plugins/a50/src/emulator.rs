@@ -1,4 +1,4 @@
-//! Device side of the connection: reports at a fixed rate.
+//! Emulates an A50, which sends reports at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -10,12 +10,13 @@ use crate::report::{Against, Velocity};
 const DELAY_US: i64 = 100_000;
 /// Device clock at power-on, microseconds since 1970.
 const BEGINS_US: i64 = 1_638_191_471_000_000;
-/// Altitude, m. It is constant, because the emulator has no model of the surface that the beams meet.
+/// Reported altitude, m. It is constant, because the emulator has no model of the surface that the beams
+/// meet.
 const ALTITUDE_M: f64 = 1.0;
-/// Alternating figures of merit, because the decoder withholds identical reports as repeats.
+/// Figures of merit, sent in turn, because the decoder withholds identical reports as repeats.
 const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
 
-/// Settings of the emulated device.
+/// Settings of the emulated A50.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
     /// Report rate, Hz.
@@ -53,7 +54,7 @@ impl Emulator<GroundVelocity> for A50Emulator {
     }
 
     fn tell(&mut self, moved: &GroundVelocity, line: LineSink<'_>) {
-        // Converts to device axes: y and z change sign, as in the opposite direction.
+        // Converts to device axes: y and z change sign, as in the conversion from device axes.
         let [x, y, z] = moved.velocity_mps.0.into();
         let at_us = BEGINS_US + moved.at.since(self.start).0 / 1000;
         let [even, odd] = FOMS_MPS;

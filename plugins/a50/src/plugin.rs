@@ -9,7 +9,7 @@ use crate::decoder::{A50Decoder, DecoderSettings};
 use crate::driver;
 use crate::emulator::{A50Emulator, Simulated};
 
-/// Name in vehicle files.
+/// Name of this device kind in vehicle files.
 pub const NAME: &str = "a50";
 
 /// Buffer for several seconds of reports at the highest rate.
@@ -19,7 +19,7 @@ const RING_BYTES: usize = 1 << 17;
 #[derive(Debug, Clone, Copy)]
 pub struct A50Kind;
 
-/// A configured A50.
+/// An A50 as configured in the vehicle file.
 #[derive(Debug, Clone)]
 pub struct A50 {
     sensor: SensorConfig,

@@ -1,5 +1,5 @@
-//! Lines of the device. Each line is a JSON object and a newline. Velocity reports are decoded; other objects are
-//! accepted but unused.
+//! Lines that an A50 sends. Each line is a JSON object and a newline. Velocity reports are decoded; other
+//! objects are accepted but unused.
 //!
 //! Source: Water Linked, "DVL A50/A125 TCP JSON API", json_v3 to json_v3.3.
 
@@ -22,7 +22,7 @@ const MAX_DEPTH: usize = 8;
 pub enum Against {
     /// The ground, or a wall.
     Bottom,
-    /// Layers of water.
+    /// Layers of water below the vehicle.
     Water,
 }
 
@@ -31,13 +31,13 @@ pub enum Against {
 pub struct Velocity {
     /// Reference of the velocity.
     pub against: Against,
-    /// Velocity, m/s.
+    /// Velocity of the vehicle in device axes, m/s.
     pub velocity_mps: [f64; 3],
     /// Figure of merit: error estimate of the velocity, m/s.
     pub fom_mps: f64,
     /// Distance to the reflecting surface along z, m.
     pub altitude_m: f64,
-    /// Number of valid beams.
+    /// Number of beams with a valid measurement.
     pub valid_beams: u8,
     /// Whether the device marks velocity and altitude as valid.
     pub is_valid: bool,
@@ -189,7 +189,8 @@ fn line(line: &[u8]) -> Option<Line> {
     found.whole().map(Line::Velocity)
 }
 
-/// Calls `field` for each key of an object, with the first byte of the key's value. `field` must consume the value.
+/// Calls `field` for each key of a JSON object, with the first byte of the key's value. `field` must consume
+/// the value.
 ///
 /// Escapes in the key are not decoded.
 fn object<'a>(
@@ -206,7 +207,7 @@ fn object<'a>(
     })
 }
 
-/// A string without its quotes. Escapes are not decoded.
+/// Parses a JSON string; returns it without quotes. Escapes are not decoded.
 fn text<'a>(next: u8, lexer: &mut SliceLexer<'a>) -> Result<&'a [u8], Error> {
     let mut text = <&[u8]>::default();
     lexer.expect(|_| Some(next), b'"').ok_or(Expect::String)?;
@@ -214,7 +215,7 @@ fn text<'a>(next: u8, lexer: &mut SliceLexer<'a>) -> Result<&'a [u8], Error> {
     Ok(text)
 }
 
-/// A number that is finite as a double.
+/// Parses a JSON number; it must be finite as a double.
 fn number(lexer: &mut SliceLexer<'_>) -> Result<f64, Error> {
     let (text, _) = lexer.num_string().validated()?;
     Ok(text.parse().ok().filter(|number: &f64| number.is_finite()).ok_or(Expect::Value)?)
@@ -225,7 +226,7 @@ fn boolean(next: u8, lexer: &mut SliceLexer<'_>) -> Result<bool, Error> {
     Ok(word.flatten().flatten().ok_or(Expect::Value)?)
 }
 
-/// Skips a value that has at most `depth` levels of arrays and objects.
+/// Skips a JSON value that has at most `depth` levels of arrays and objects.
 fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error> {
     match next {
         b'[' | b'{' if depth == 0 => Err(Error::Depth),
@@ -237,7 +238,7 @@ fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error>
     }
 }
 
-/// Longest displayed name of a format.
+/// Maximum length of a displayed format name, bytes.
 const MAX_FORMAT_BYTES: usize = 24;
 
 /// Name of the format that a line, or a part of one, states. The format may be unknown to the decoder.
@@ -374,7 +375,7 @@ pub(crate) mod tests {
         assert_eq!((got.len(), codec.counts().skipped_bytes), (1, endless.len() as u64));
     }
 
-    /// Whether a line with this value is good.
+    /// Whether a line whose unknown key has this JSON value is accepted.
     fn is_good(value: &str) -> bool {
         line(format!("{{\"a\":{value}}}\n").as_bytes()).is_some()
     }

@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated device.
+//! Tests the path from a vehicle file's table to an A50's readings, through the emulated device.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;
@@ -149,13 +149,13 @@ fn unusable_reports_are_withheld_by_reason() {
 }
 
 #[test]
-fn repeated_reports_count_once() {
+fn repeated_reports_are_withheld_and_counted() {
     let mut decoder = decoder();
     let later = Some([1_100_000, 1_220_000]);
     let reports = [
         (good(), 1),
         (good(), 0),
-        // Same timestamp as before, different velocity.
+        // This report has the previous report's timestamp, but another velocity.
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], ..good() }, 0),
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], times_us: later, ..good() }, 0),
         (Velocity { times_us: Some([1_200_000, 1_320_000]), ..good() }, 1),
@@ -168,7 +168,7 @@ fn repeated_reports_count_once() {
 }
 
 #[test]
-fn wrong_keys_are_named() {
+fn wrong_keys_of_the_vehicle_file_are_named() {
     let error = |own| configured(own).err().unwrap();
     assert!(error("fom_max_mps = 0\n").starts_with("v.toml:1: fom_max_mps = 0: must be a number from 0.001"));
     assert!(error("max_speed_mps = 20\n").contains("from 0.1 to 10"));

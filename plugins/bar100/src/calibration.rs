@@ -1,17 +1,18 @@
-//! Conversion of counts to pressure. Range and pressure mode come from the sensor's memory or the vehicle file.
+//! Conversion of a Bar100's counts to pressure. Range and pressure mode come from the sensor's memory or the
+//! vehicle file.
 
 use headrace_sensor::geometry::math;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::MemoryWord;
 
-/// Cell of the calibration date and pressure mode.
+/// Memory cell with the calibration date and pressure mode.
 pub const CELL_SCALING0: u8 = 0x12;
-/// Cells of the lower limit: high and low word of a float.
+/// Memory cells with the lower limit of the pressure range: high and low word of a float.
 pub const CELLS_P_MIN: [u8; 2] = [0x13, 0x14];
-/// Cells of the upper limit: high and low word of a float.
+/// Memory cells with the upper limit of the pressure range: high and low word of a float.
 pub const CELLS_P_MAX: [u8; 2] = [0x15, 0x16];
-/// All cells of the calibration.
+/// All memory cells of the calibration.
 pub const CALIBRATION_CELLS: [u8; 5] = [0x12, 0x13, 0x14, 0x15, 0x16];
 
 /// One standard atmosphere: the default ambient pressure of a vented sensor.
@@ -32,7 +33,7 @@ pub enum PressureMode {
     Absolute,
 }
 
-/// Content of cell 0x12: calibration date and pressure mode.
+/// Content of memory cell 0x12: calibration date and pressure mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scaling0 {
     /// Year of calibration, 2010 to 2041.
@@ -57,25 +58,25 @@ pub struct Calibration {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// Undefined pressure mode.
+    /// The sensor's memory has an undefined pressure mode.
     #[error("reading cell 0x12: pressure mode {0}; defined are 0 (PR), 1 (PA) and 2 (PAA)")]
     Mode(u8),
-    /// Impossible limits.
+    /// The limits of the pressure range are impossible.
     #[error(
         "reading the pressure limits: {p_min_bar} to {p_max_bar} bar; both must be finite, the second larger"
     )]
     Limits {
-        /// Lower limit.
+        /// Lower limit of the pressure range, bar.
         p_min_bar: f64,
-        /// Upper limit.
+        /// Upper limit of the pressure range, bar.
         p_max_bar: f64,
     },
 }
 
 impl PressureMode {
-    /// Converts the two bits of cell 0x12.
+    /// Converts the two mode bits of memory cell 0x12.
     ///
-    /// Errors: 3 or more. A wrong mode would shift the depth by ten metres.
+    /// Errors: a mode of 3 or more, since a wrong mode would shift the depth by ten metres.
     pub fn from_wire(mode: u8) -> Result<Self, CalibrationError> {
         match mode {
             0 => Ok(Self::Vented),
@@ -85,7 +86,7 @@ impl PressureMode {
         }
     }
 
-    /// Returns the two bits of cell 0x12.
+    /// Returns the two mode bits of memory cell 0x12.
     pub fn to_wire(self) -> u8 {
         match self {
             Self::Vented => 0,
@@ -104,7 +105,7 @@ impl PressureMode {
 }
 
 impl Scaling0 {
-    /// Unpacks a memory word.
+    /// Unpacks the word of memory cell 0x12.
     #[expect(clippy::cast_possible_truncation, reason = "each field is masked to less than a byte")]
     pub fn from_word(word: u16) -> Self {
         let bits = |shift: u16, mask: u16| (word >> shift) & mask;
@@ -116,7 +117,7 @@ impl Scaling0 {
         }
     }
 
-    /// Packs the values into a memory word. Each field is truncated to its number of bits.
+    /// Packs date and mode into the word of memory cell 0x12. Each field is truncated to its number of bits.
     pub fn to_word(self) -> u16 {
         (self.year.saturating_sub(2010) & 0x1F) << 11
             | (u16::from(self.month) & 0x0F) << 7
@@ -136,7 +137,8 @@ impl Calibration {
         Ok(Self { mode, p_min_bar, p_max_bar })
     }
 
-    /// Absolute pressure in Pa. A vented sensor uses `ambient_bar`, the pressure of the ambient air.
+    /// Absolute pressure of a number of counts, Pa. A vented sensor uses `ambient_bar`, the pressure of the
+    /// ambient air.
     pub fn pressure_pa(&self, counts: u16, ambient_bar: f64) -> f64 {
         let above_bar =
             (f64::from(counts) - COUNTS_AT_P_MIN) * (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN;
@@ -150,7 +152,7 @@ impl Calibration {
         u16::try_from(math::round_to_i64(counts).max(1)).unwrap_or(u16::MAX)
     }
 
-    /// Resolution: the pressure of one count, Pa.
+    /// Resolution of the pressure: one count, in Pa.
     pub fn resolution_pa(&self) -> f64 {
         (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN * PA_PER_BAR
     }
@@ -177,15 +179,15 @@ impl Calibration {
 /// Values of the vehicle file that override the sensor's memory. They are needed for logs that begin during a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Overrides {
-    /// Lower limit, bar.
+    /// Lower limit of the pressure range, bar.
     pub p_min_bar: Option<f64>,
-    /// Upper limit, bar.
+    /// Upper limit of the pressure range, bar.
     pub p_max_bar: Option<f64>,
-    /// Pressure mode.
+    /// Pressure mode of the sensor.
     pub mode: Option<PressureMode>,
 }
 
-/// The calibration cells read so far.
+/// The calibration's memory cells read so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CalibrationCells {
     scaling0: Option<u16>,

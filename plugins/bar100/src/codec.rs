@@ -9,7 +9,7 @@
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
-/// Command that starts a conversion.
+/// Command that starts a conversion of pressure and temperature.
 pub const MEASURE: u8 = 0xAC;
 
 /// Memory cells lie below the commands, so the first byte alone gives a transaction's length.
@@ -24,10 +24,10 @@ pub const MEMORY_BYTES: usize = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status(u8);
 
-/// The result of a conversion, in counts.
+/// The result of a conversion of pressure and temperature, in counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Measurement {
-    /// Sensor status.
+    /// Status byte of the sensor.
     pub status: Status,
     /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0: a sensor returns 0 before the
     /// conversion is done.
@@ -41,18 +41,18 @@ pub struct Measurement {
 pub struct MemoryWord {
     /// Cell address, 0x00 to 0x7F.
     pub cell: u8,
-    /// Sensor status.
+    /// Status byte of the sensor.
     pub status: Status,
-    /// Content of the cell.
+    /// Content of the memory cell.
     pub word: u16,
 }
 
 /// A successful transaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Transaction {
-    /// A conversion's result.
+    /// The result of a conversion of pressure and temperature.
     Measurement(Measurement),
-    /// A word of memory.
+    /// A word of the sensor's memory.
     Memory(MemoryWord),
 }
 
@@ -60,13 +60,13 @@ pub enum Transaction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransactionError {
-    /// The result was not ready.
+    /// The status is 0x00: the result was not ready.
     #[error("reading the status: 0x00, the sensor isn't ready; a good one is 0x40")]
     NotReady,
-    /// No device answered.
+    /// The status is 0xFF: no device answered.
     #[error("reading the status: 0xFF, the bus is held high or no device answers; a good one is 0x40")]
     BusHigh,
-    /// Bits 7 and 6 are not 01.
+    /// Bits 7 and 6 of the status are not 01.
     #[error("reading the status: {0:#04X}, bits 7 and 6 must be 01")]
     FixedBits(u8),
     /// The sensor isn't in normal mode.
@@ -75,14 +75,14 @@ pub enum TransactionError {
     /// The sensor's memory is corrupt, and with it the calibration.
     #[error("reading the status: {0:#04X}, bit 2 says that the memory's checksum is wrong; it must be 0")]
     Memory(u8),
-    /// Pressure or temperature of zero counts.
+    /// The measurement has a pressure or temperature of zero counts, which means no result.
     #[error(
         "reading a measurement: pressure {pressure} and temperature {temperature} counts; 0 means no result"
     )]
     Empty {
-        /// Pressure counts.
+        /// Counts of pressure.
         pressure: u16,
-        /// Temperature counts.
+        /// Counts of temperature.
         temperature: u16,
     },
     /// The first byte is neither the measure command nor a memory cell, or the length doesn't match the first byte.
@@ -90,7 +90,7 @@ pub enum TransactionError {
         "reading a transaction of {len} bytes that begins with {first:#04X}: allowed are AC with 6 bytes, and 00 to 7F with 4"
     )]
     Unknown {
-        /// First byte; 0 if the transaction is empty.
+        /// First byte of the transaction; 0 if it is empty.
         first: u8,
         /// Length of the transaction.
         len: usize,
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn worked_example_5_is_refused_with_each_reason() {
+    fn bad_status_bytes_of_worked_example_5_are_refused_with_their_reasons() {
         let measure = |status| Transaction::decode(&[MEASURE, status, 0x46, 0x46, 0x4F, 0xA0]);
         assert_eq!(Transaction::decode(&[MEASURE, 0, 0, 0, 0, 0]), Err(TransactionError::NotReady));
         let high = [MEASURE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];

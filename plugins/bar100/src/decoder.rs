@@ -9,10 +9,10 @@ use headrace_sensor::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use crate::calibration::{Calibration, CalibrationCells, CalibrationError, Overrides};
 use crate::codec::{Bar100Codec, Measurement, Transaction};
 
-/// Decoding settings.
+/// Decoding settings of a Bar100.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecoderSettings {
-    /// Values that override the sensor's memory.
+    /// Values of the vehicle file that override the sensor's memory.
     pub overrides: Overrides,
     /// Ambient air pressure, bar. Only a vented sensor uses it.
     pub ambient_bar: f64,
@@ -22,7 +22,8 @@ pub struct DecoderSettings {
     pub latency: DurNs,
 }
 
-/// Decodes bytes into readings. Measurements are withheld and counted until the calibration is known.
+/// Decodes a Bar100's transactions into readings. Measurements are withheld and counted until the calibration
+/// is known.
 #[derive(Debug, Clone)]
 pub struct Bar100Decoder {
     codec: Bar100Codec,

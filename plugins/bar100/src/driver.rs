@@ -1,4 +1,4 @@
-//! Host side of the bus. The driver reads the calibration and then measures at a fixed rate.
+//! Driver of a Bar100 on an I2C bus. It reads the calibration, and then requests measurements at a fixed rate.
 
 use headrace_sensor::driver::{Carrier, DeviceHealth, Driver, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -6,7 +6,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use crate::calibration::CALIBRATION_CELLS;
 use crate::codec::{MEASURE, MEASURE_BYTES, MEMORY_BYTES, Transaction, TransactionError};
 
-/// Supported carriers.
+/// Carriers over which a Bar100 can be connected.
 pub const CARRIERS: [Carrier; 2] = [Carrier::I2c, Carrier::Udp];
 
 /// Delay from requesting a memory cell to reading it. Source: Keller's protocol, at least 0.6 ms.
@@ -34,7 +34,7 @@ pub struct Bar100Driver {
 }
 
 impl Bar100Driver {
-    /// Creates a driver that measures `rate_hz` times a second.
+    /// Creates a driver that requests `rate_hz` measurements a second.
     pub fn new(rate_hz: f64) -> Self {
         let period = DurNs::from_secs_f64(1.0 / rate_hz);
         Self { period, next_at: MonoNs(0), cell: 0, bad_in_a_row: 0, good_frames: 0, complaint: None }
@@ -46,7 +46,7 @@ impl Bar100Driver {
                 self.good_frames += 1;
                 self.complaint = None;
                 self.bad_in_a_row = 0;
-                // A second answer to the same request must not count as the answer for the next cell.
+                // A second answer to the same request must not count as the answer for the next memory cell.
                 let asked = CALIBRATION_CELLS.get(self.cell);
                 if matches!(&transaction, Transaction::Memory(read) if Some(&read.cell) == asked) {
                     self.cell += 1;
@@ -88,7 +88,7 @@ impl Driver for Bar100Driver {
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
-        // If a cell's request gets no answer, it is sent again.
+        // If the request for a memory cell gets no answer, it is sent again.
         if let Some(cell) = CALIBRATION_CELLS.get(self.cell) {
             self.next_at = now + RETRY;
             wire.exchange(&[*cell], MEMORY_SETTLES, MEMORY_BYTES - 1);

@@ -1,4 +1,4 @@
-//! Sensor side of the bus. The emulator answers requests for calibration and measurements.
+//! Emulates a Bar100, which answers requests for its calibration and for measurements.
 //!
 //! Requests come from an emulated host at a fixed rate, or from a real host.
 
@@ -18,7 +18,7 @@ const TEMPERATURE_COUNTS: u16 = 0x4C80;
 /// Settings of the emulated sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
-    /// Range and pressure mode.
+    /// Pressure range and pressure mode.
     pub calibration: Calibration,
     /// Ambient air pressure, bar.
     pub ambient_bar: f64,
@@ -34,7 +34,7 @@ pub struct Bar100Emulator {
     sensor: Simulated,
     start: MonoNs,
     begun: u64,
-    /// Whether the host is emulated as well.
+    /// Whether the host that requests measurements is emulated, too.
     polled: bool,
     /// Measurements requested by a real host but not yet started.
     waiting: Vec<Pressure>,
@@ -87,7 +87,7 @@ impl Emulator<Pressure> for Bar100Emulator {
             return;
         }
         let words = self.sensor.calibration.to_words(CALIBRATED);
-        // Other cells return the value of erased memory.
+        // Cells outside the calibration return the value of erased memory.
         let word = words.iter().find(|(cell, _)| cell == asked).map_or(0xFFFF, |(_, word)| *word);
         let read = MemoryWord { cell: *asked, status: Status::IDLE, word };
         line(Direction::Received, at + self.sensor.latency, &read.encode());

@@ -10,20 +10,20 @@ use crate::decoder::{Bar100Decoder, DecoderSettings};
 use crate::driver::{Bar100Driver, CARRIERS};
 use crate::emulator::{Bar100Emulator, Simulated};
 
-/// Name in vehicle files.
+/// Name of this device kind in vehicle files.
 pub const NAME: &str = "bar100";
 
 /// Buffer for two minutes of measurements at the usual rate.
 const RING_BYTES: usize = 1 << 16;
 
-/// Pressure range of the part as sold, bar.
+/// Pressure range of a Bar100 as sold, bar.
 const PART_LIMITS_BAR: (f64, f64) = (0.0, 100.0);
 
 /// The Bar100 device kind.
 #[derive(Debug, Clone, Copy)]
 pub struct Bar100Kind;
 
-/// A configured Bar100.
+/// A Bar100 as configured in the vehicle file.
 #[derive(Debug, Clone)]
 pub struct Bar100 {
     sensor: SensorConfig,

@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated sensor.
+//! Tests the path from a vehicle file's table to a Bar100's readings, through the emulated sensor.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;
@@ -122,7 +122,7 @@ fn emulated_sensor_decodes_to_the_true_pressure() {
 }
 
 #[test]
-fn wrong_keys_are_named() {
+fn wrong_keys_of_the_vehicle_file_are_named() {
     let error = configured("p_mode = \"pax\"\n").err().unwrap();
     assert_eq!(error, "v.toml:1: p_mode = \"pax\": must be one of pr, pa, paa; did you mean \"pa\"?");
     let error = configured("p_min_bar = 50\np_max_bar = 10\n").err().unwrap();

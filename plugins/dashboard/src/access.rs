@@ -11,12 +11,12 @@ pub(crate) const COOKIE: &str = "headrace_token";
 /// Entropy of a random token, bytes.
 const TOKEN_BYTES: usize = 16;
 
-/// Role of a viewer, which decides what the viewer may do.
+/// Role of a viewer of the page, which decides about the viewer's rights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// May only watch.
+    /// A viewer who may only watch.
     Viewer,
-    /// May watch, acknowledge, take notes, and control a replay.
+    /// An operator, who may also acknowledge alerts, take notes, and control a replay.
     Operator,
 }
 
@@ -55,7 +55,7 @@ impl Token {
         }
     }
 
-    /// Text of the token, to show to the person who starts the program.
+    /// Text of the token, which is shown to the person who starts the program.
     pub fn text(&self) -> &str {
         &self.0
     }
@@ -72,9 +72,9 @@ impl Token {
 /// Tokens of viewers and operators.
 #[derive(Debug, Clone)]
 pub struct Tokens {
-    /// Token that gives the role of a viewer.
+    /// Token that admits its bearer as a viewer.
     pub viewer: Token,
-    /// Token that gives the role of an operator.
+    /// Token that admits its bearer as an operator.
     pub operator: Token,
 }
 
@@ -100,7 +100,7 @@ impl Access {
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }
 
-    /// Whether a token belongs to a role. Tokens of other roles aren't compared.
+    /// Whether a token is the token of a role. It isn't compared with other roles' tokens.
     pub(crate) fn is_token_of(&self, role: Role, token: &str) -> bool {
         self.tokens.as_ref().is_some_and(|tokens| match role {
             Role::Viewer => tokens.viewer.is(token),
@@ -108,7 +108,7 @@ impl Access {
         })
     }
 
-    /// Whether the request addresses this machine by an address or a known name. This prevents DNS rebinding.
+    /// Whether the request's host is an address or a known name of this machine. This prevents DNS rebinding.
     pub(crate) fn is_host(&self, headers: &HeaderMap) -> bool {
         let Some(host) = headers.get(header::HOST).and_then(|value| value.to_str().ok()) else {
             return false;
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn token_decides_the_role() {
+    fn token_determines_the_role_of_the_viewer() {
         let access = access(false);
         assert_eq!(access.role_of("viewer-0123456789"), Some(Role::Viewer));
         assert_eq!(access.role_of("operator-01234567"), Some(Role::Operator));

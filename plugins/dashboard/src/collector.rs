@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 
 use headrace_geometry::frames::{Mount, Point3, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::WallPoint;
 use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::live_text::{message_line, status_line};
@@ -29,15 +30,15 @@ use crate::wire::{NONE, Outcome, SampleRecord, SectionRecord};
 pub(crate) const WAITING: usize = 64;
 /// Maximum number of samples kept while the queue is full: ten seconds of four heads.
 const MOST_SAMPLES: usize = 20_000;
-/// Maximum number of events kept while the queue is full.
+/// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
 /// Maximum number of sections in one message.
 const SECTIONS_AT_ONCE: usize = 4096;
-/// Maximum interval between states, for times without an update.
+/// Maximum interval between two states sent to the page, even without an update.
 const EVERY: DurNs = DurNs(200_000_000);
-/// Averaging window for the rates of sensors.
+/// Averaging window for the sensors' rates of readings.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
-/// Minimum interval between lists of stretches to go back for.
+/// Minimum interval between two lists of missed stretches to go back to.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
 
 /// The last ping of an echosounder.
@@ -47,13 +48,13 @@ struct Ping {
     range_m: Option<f64>,
 }
 
-/// A sensor, with the data that its rate and its display need.
+/// A sensor, with the data for its displayed rate and range.
 #[derive(Debug)]
 struct Followed {
     id: String,
     mount: Mount,
     is_echosounder: bool,
-    /// Number of this sensor among the heads.
+    /// Index of this sensor among the heads.
     head: u8,
     ping: Option<Ping>,
     hz: f64,
@@ -65,7 +66,7 @@ struct Followed {
 #[expect(clippy::struct_excessive_bools, reason = "independent flags for what is due")]
 pub struct Collector {
     to: Sender<Fed>,
-    /// Whether the collector waits for room in the queue. A replay waits, a live dive does not.
+    /// Whether the collector waits if the queue is full. A replay waits, a live dive does not.
     waits: bool,
     is_playback: bool,
     sensors: Vec<Followed>,
@@ -137,12 +138,13 @@ impl Collector {
         }
     }
 
-    /// Also judges all sections for a second target, m.
+    /// Makes the collector send verdicts for a second target, m, too.
     pub(crate) fn compared_with(self, target_m: Option<f64>) -> Self {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Collects the live messages of a notice, a tick or the end. Call it before the method for that.
+    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call it before the
+    /// method for that event.
     pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let mut value =
@@ -168,7 +170,7 @@ impl Collector {
         }
     }
 
-    /// Collects the results of the last tick, and sends what is due.
+    /// Collects the results of the last tick, and sends the data that are due.
     pub fn tick(&mut self, dive: &Loop) {
         self.gather(dive);
         let now = dive.now();
@@ -245,12 +247,12 @@ impl Collector {
         }
         self.back_due = true;
         self.back_told = None;
-        // At the end, a live dive also has time to wait for room in the queue.
+        // At the end of the dive, a live dive also waits for room in the queue.
         self.waits = true;
         while !self.changed.is_empty() && self.send(dive) {}
     }
 
-    /// Marks all sections of the dive as changed, because some change without a notice.
+    /// Marks all sections of the dive as changed, because some sections change without a notice.
     fn change_all(&mut self, dive: &Loop) {
         let (sections, way) = (&dive.view().coverage().sections, dive.view().coverage().frontier.way());
         self.changed.extend(sections.sections_of(way));
@@ -290,7 +292,7 @@ impl Collector {
         }
     }
 
-    /// Collects the target point of each ping without a return.
+    /// Collects each ping without a return, with the point at which it was aimed.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn aims_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
@@ -314,7 +316,7 @@ impl Collector {
         u32::try_from(since).unwrap_or(u32::MAX)
     }
 
-    /// Returns the head number of a source.
+    /// Returns the index among the heads of a packet source.
     fn head(&self, source: u64) -> u8 {
         let sensor = usize::try_from(source).ok().and_then(|source| self.sensors.get(source));
         sensor.map_or(NONE, |sensor| sensor.head)
@@ -344,7 +346,6 @@ impl Collector {
         if self.to.is_closed() || !self.waits && self.to.capacity() == 0 {
             return false;
         }
-        let sections = &dive.view().coverage().sections;
         if let Some(compared) = &mut self.compared {
             compared.refresh(dive, |index| _ = self.changed.insert(index));
         }
@@ -353,7 +354,7 @@ impl Collector {
             && let Some(index) = self.changed.pop_first()
         {
             let other = self.compared.as_ref().and_then(|compared| compared.verdict(index));
-            let record = sections.get(index).and_then(|section| SectionRecord::of(index, section));
+            let record = dive.view().section_row(index).and_then(|row| SectionRecord::of(&row));
             changed.extend(record.map(|record| record.compared(other)));
         }
         let now = dive.now();
@@ -388,14 +389,14 @@ impl Collector {
         }
     }
 
-    /// Reads wall samples from the loop's store to replace dropped ones. The store has neither times nor head
-    /// numbers.
+    /// Reads wall samples from the loop's store to replace the dropped samples. The store has neither times
+    /// nor head numbers.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn mended(&mut self, dive: &Loop) -> Vec<SampleRecord> {
         let Some([from_m, to_m]) = self.lacking_m.take() else { return Vec::new() };
         let (profile, t_ms) = (&dive.mission().profile, self.t_ms(dive.now()));
         let mut mended = Vec::new();
-        dive.view().coverage().store.each_between(from_m, to_m, |x_m, arc_m, _| {
+        dive.view().coverage().store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
             if mended.len() < MOST_SAMPLES {
                 let [y_m, z_m] = profile.point_at(arc_m).map(|value| value as f32);
                 let arc = SampleRecord::arc_of(arc_m, profile.perimeter_m());
@@ -468,7 +469,8 @@ impl Collector {
         }
     }
 
-    /// Returns the stretches to go back for, from the far end to the portal, if the list has changed and is due.
+    /// Returns the missed stretches to go back to, from the far end to the portal, if the list has changed
+    /// and is due.
     fn back(&mut self, dive: &Loop) -> Option<Value> {
         let now = dive.now();
         let waits =

@@ -61,7 +61,7 @@ pub(crate) enum Request {
 pub enum Command {
     /// Acknowledges an alert; 0 acknowledges all alerts that need an acknowledgement.
     Acknowledge {
-        /// Number of the alert.
+        /// Number of the alert; 0 means all.
         alert: u32,
         /// Name of the sender, at most 16 bytes.
         by: String,
@@ -93,7 +93,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Keyword of the command.
+    /// Keyword that names the command in a message.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Acknowledge { .. } => "acknowledge",
@@ -124,7 +124,7 @@ pub enum Play {
     Seek(f64),
 }
 
-/// A validated request.
+/// A viewer's request, parsed and validated.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Asked {
     Command(Command),

@@ -20,14 +20,15 @@ use crate::model::Model;
 use crate::site::{May, Site};
 use crate::wire::sample_frame;
 
-/// Maximum number of samples in a file. A dive with more samples is thinned.
+/// Maximum number of samples in an exported file. A dive with more samples is thinned.
 const MOST_SAMPLES: usize = 500_000;
-/// Maximum number of states in a file: one per second for two hours. Longer dives keep every second state, every
-/// fourth, and so on.
+/// Maximum number of live states in an exported file: one per second for two hours. Longer dives keep every
+/// second state, every fourth, and so on.
 const MOST_STATES: usize = 7200;
 /// Attribute that marks the embedded dive in an exported page.
 pub const MARK: &str = "id=\"dive\"";
-/// Fields of a state that a file omits, because the file stores them only once or they have no meaning there.
+/// Fields of a live state that an exported file omits, because it stores them only once or they have no
+/// meaning there.
 const LEFT_OUT: [&str; 8] =
     ["type", "seq", "alert_list", "playback", "ended", "page_dropped", "rates", "recording"];
 
@@ -35,16 +36,16 @@ const LEFT_OUT: [&str; 8] =
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The thread can't be started.
+    /// The export's thread can't be started.
     #[error("exporting a dive: its thread can't be started: {0}")]
     Thread(io::Error),
-    /// The thread has panicked.
+    /// The export's thread has panicked.
     #[error("exporting a dive: its thread has ended early")]
     Ended,
     /// The program was built without the page.
     #[error("exporting a dive: this program was built without its page")]
     NoPage,
-    /// Compression fails.
+    /// The dive's data can't be compressed.
     #[error("exporting a dive: {0}")]
     Pack(#[from] io::Error),
 }
@@ -55,13 +56,13 @@ pub struct Export {
     thread: JoinHandle<Taken>,
 }
 
-/// Data collected by the thread.
+/// Data of the dive collected by the export's thread.
 struct Taken {
     model: Model,
     states: States,
 }
 
-/// States of the dive, at most one per second.
+/// Live states of the dive, at most one per second.
 struct States {
     every_s: f64,
     all: Vec<(f64, Map<String, Value>)>,
@@ -138,7 +139,7 @@ fn scripts_of(page: &str) -> impl Iterator<Item = &str> {
 }
 
 impl Taken {
-    /// Returns all frames, compressed.
+    /// Returns all messages and frames of the dive, compressed.
     fn frames(&self, alerts: &Value, voices: &[Voice], end: &Value) -> io::Result<Vec<u8>> {
         let model = &self.model;
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::default());
@@ -207,7 +208,7 @@ impl States {
     }
 }
 
-/// Rounds numbers to four decimal places.
+/// Rounds all numbers in a JSON value to four decimal places.
 fn short(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {

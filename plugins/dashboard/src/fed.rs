@@ -27,25 +27,26 @@ pub enum Fed {
 pub struct News {
     /// End time of the last tick.
     pub now: MonoNs,
-    /// Whether a seek skips this tick. Then only its samples are used; the state follows with the jump.
+    /// Whether a seek skips this tick. If so, only the tick's samples are used; the state follows with the
+    /// jump.
     pub is_skipped: bool,
-    /// First time of the dive; `None` while unknown.
+    /// Time at which the dive began; `None` while unknown.
     pub begun: Option<MonoNs>,
     /// The live state at the end of the tick.
     pub state: Box<LiveStateJson>,
     /// Displayed data besides the live state.
     pub beside: Beside,
-    /// New samples.
+    /// Samples since the last message.
     pub samples: Vec<SampleRecord>,
     /// Wall samples read from the loop's store to replace dropped samples.
     pub mended: Vec<SampleRecord>,
-    /// Changed sections.
+    /// Sections that have changed since the last message.
     pub sections: Vec<SectionRecord>,
-    /// Events, as JSON objects with a type.
+    /// Events since the last message, as JSON objects with a type.
     pub told: Vec<Value>,
     /// All notes of the dive; `None` if there is no new note.
     pub notes: Option<Vec<NoteJson>>,
-    /// Stretches to go back for; `None` if they haven't changed.
+    /// Missed stretches to go back to; `None` if they haven't changed.
     pub back: Option<Value>,
     /// Counts of data dropped so far.
     pub dropped: Dropped,
@@ -58,14 +59,14 @@ pub struct Beside {
     pub pose: Option<PoseJson>,
     /// Last pings of the echosounders.
     pub echosounders: Vec<EchoJson>,
-    /// Rate of each sensor.
+    /// Rate of readings of each sensor.
     pub rates: Vec<RateJson>,
     /// State of the recording.
     pub recording: RecordingJson,
     /// Verdicts of the same dive for a second target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compared: Option<ComparedJson>,
-    /// Status as one line of text.
+    /// Status of the dive as one line of text.
     pub text: String,
 }
 
@@ -115,18 +116,18 @@ pub struct RecordingJson {
     pub on: bool,
     /// Whether data is being lost, or would be lost in a power cut.
     pub fails: bool,
-    /// Displayed text, the same on all screens; `None` if recording works.
+    /// Text about the recording, the same on all screens; `None` if recording works.
     pub words: Option<String>,
     /// Path of the recording.
     pub path: Option<String>,
 }
 
-/// Counts of data dropped because the queue was full.
+/// Numbers of data dropped because the queue was full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Dropped {
-    /// Number of samples. Wall samples among these are sent again from the loop's store.
+    /// Number of dropped samples. Wall samples among these are sent again from the loop's store.
     pub samples: u64,
-    /// Number of events.
+    /// Number of dropped events.
     pub told: u64,
 }
 

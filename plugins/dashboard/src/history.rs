@@ -1,24 +1,24 @@
-//! History of speed, allowed speed and forecast T over the last half hour, with one value per second.
+//! History of speed, allowed speed and forecast spacing T over the last half hour, with one value per second.
 
 use std::collections::VecDeque;
 
 use headrace_monitor::live_state::json::LiveStateJson;
 use serde_json::{Value, json};
 
-/// Maximum number of values: half an hour.
+/// Maximum number of values kept: half an hour at one per second.
 const MOST: usize = 1800;
 
-/// History of a dive.
+/// History of a dive's speed, allowed speed and forecast spacing T.
 #[derive(Debug, Default)]
 pub struct History {
-    /// Time, s; then speed, m/s, allowed speed, m/s, and forecast T, m.
+    /// Time, s; then speed, m/s, allowed speed, m/s, and forecast spacing T, m.
     values: VecDeque<(f64, [Option<f64>; 3])>,
     /// Whether the whole dive is kept instead of the last half hour.
     pub(crate) whole: bool,
 }
 
 impl History {
-    /// Adds the values of a state, at most once a second.
+    /// Adds the values of a live state, at most once a second.
     pub(crate) fn take(&mut self, state: &LiveStateJson) {
         let Some(at_s) = state.at_s else { return };
         let second = at_s.floor();

@@ -4,7 +4,8 @@
 //! queue. In a live dive it never waits. On the page's thread, [`model`] holds the displayed data without I/O.
 //! [`server`] encodes each message once and sends it to all viewers.
 //!
-//! `docs/how-to/read-the-page.md` is for users, `docs/reference/page-feed.md` for authors of other clients.
+//! `docs/how-to/read-the-page.md` is for users of the page, `docs/reference/page-feed.md` for authors of
+//! other clients.
 
 pub mod access;
 pub mod assets;

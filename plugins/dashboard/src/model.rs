@@ -18,30 +18,30 @@ use crate::samples::Samples;
 use crate::site::{Greeting, May, Site};
 use crate::wire::{SectionRecord, sample_frame, section_frame};
 
-/// Maximum number of events kept for viewers that reconnect.
+/// Maximum number of events, such as live messages, kept for viewers that reconnect.
 const MOST_TOLD: usize = 256;
 /// Maximum number of samples in one message: 100 kB/s at five messages a second. More samples are thinned; `/samples`
 /// returns all of them.
 const MOST_AT_ONCE: usize = 1000;
 /// Maximum number of samples sent to a viewer that connects or reconnects.
 const MOST_BACK: usize = 10_000;
-/// Number of messages whose sample counts are kept: five minutes of messages.
+/// Number of messages for which the number of samples sent so far is kept: five minutes of messages.
 const MOST_PLACES: usize = 1500;
 /// Maximum number of samples in the answer to a request for a range of chainage.
 pub const MOST_IN_RANGE: usize = 200_000;
 
-/// Kind of a message, for viewers that want only some messages.
+/// Kind of a message to viewers, so that a viewer can get only some kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sort {
-    /// A state, which replaces the previous one.
+    /// A live state, which replaces the previous one.
     State,
-    /// New samples.
+    /// Samples since the last message.
     Samples,
     /// Any other message.
     Other,
 }
 
-/// A message, encoded once for all viewers.
+/// A message to viewers, encoded once for all of them.
 #[derive(Debug, Clone)]
 pub struct Message {
     /// Number of the message.
@@ -61,7 +61,8 @@ pub enum Body {
     Binary(Bytes),
 }
 
-/// A section, a bit mask of the parts that have samples, and the last message that contained the section.
+/// A section, a bit mask of the parts of its perimeter that have samples, and the number of the last message
+/// that contained it.
 #[derive(Debug, Clone, Copy)]
 struct Shown {
     record: SectionRecord,
@@ -393,7 +394,7 @@ impl Model {
             .unwrap_or_else(|error| json!({"error": error.to_string()}))
     }
 
-    /// Returns the state as a message.
+    /// Returns the live state as a message.
     pub fn state(&self) -> Option<Value> {
         let (state, beside) = &**self.state.as_ref()?;
         let mut value = serde_json::to_value(state).ok()?;
@@ -409,7 +410,7 @@ impl Model {
         Some(value)
     }
 
-    /// Returns the time of the state, seconds.
+    /// Returns the time of the live state, seconds.
     pub fn now_s(&self) -> Option<f64> {
         self.state.as_ref().map(|shown| shown.0.now_s)
     }
@@ -422,7 +423,7 @@ impl Model {
         (sample_frame(self.seq, &samples), step)
     }
 
-    /// Returns all samples.
+    /// Returns all samples of the dive.
     pub fn samples(&self) -> &Samples {
         &self.samples
     }
@@ -442,7 +443,7 @@ impl Model {
         self.sections.len()
     }
 
-    /// Returns the site.
+    /// Returns the constants of the dive.
     pub fn site(&self) -> &Site {
         &self.site
     }
@@ -453,7 +454,8 @@ impl Model {
         section_frame(self.seq, &all)
     }
 
-    /// Returns alerts, notes, history and the stretches to go back for as messages, for an exported file.
+    /// Returns alerts, notes, history and the missed stretches to go back to as messages, for an exported
+    /// file.
     pub fn closing(&self) -> Vec<Value> {
         let mut all = self.lists();
         all.push(self.history.message(self.seq));
@@ -467,7 +469,7 @@ impl Model {
     }
 }
 
-/// Returns a message with a number added.
+/// Returns a message with its message number added.
 fn numbered(value: &Value, seq: u64) -> Value {
     let mut value = value.clone();
     if let Some(object) = value.as_object_mut() {

@@ -3,38 +3,39 @@
 use headrace_coverage::{Cause, Unsure};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 use serde::Serialize;
 
-/// Number of profile points sent, spaced equally in arc length.
+/// Number of points of the tunnel's profile sent to the page, spaced equally in arc length.
 const POINTS: u32 = 128;
 
-/// Source of a dive's data.
+/// Kind of source of a dive's data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
-    /// Sensors on ports.
+    /// The data comes from sensors on ports.
     Live,
-    /// A simulation.
+    /// The data comes from a simulation.
     Demo,
-    /// A log.
+    /// The data comes from a log.
     Replay,
     /// A page that embeds the dive in its own file.
     File,
 }
 
-/// A profiling head.
+/// A profiling head, as described to the page.
 #[derive(Debug, Clone, Serialize)]
 pub struct HeadSite {
     /// Sensor id.
     pub id: String,
-    /// Source number of the head.
+    /// Number of the head's packet source.
     pub source: u16,
-    /// Angles that the vehicle hides from the head, in the vehicle's cross-section: from and to, degrees. 0 is down,
-    /// and angles grow to the left; `to` may exceed 360.
+    /// Sectors in which the vehicle hides the wall from the head, in the vehicle's cross-section: from and
+    /// to, degrees. 0 is down, and angles grow to the left; `to` may exceed 360.
     pub hidden_deg: Vec<[f64; 2]>,
 }
 
-/// A sensor.
+/// A sensor, as described to the page.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorSite {
     /// Sensor id.
@@ -54,17 +55,15 @@ pub struct Site {
     pub dive: String,
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Target T, m.
-    pub target_m: f64,
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
     /// Second target, for which all sections are judged too, m; `None` without one.
     pub compared_m: Option<f64>,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Number of standard deviations by which a passing hole must be below the target.
-    pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// Design profile.
+    /// Design profile of the tunnel's cross-section.
     pub profile: Profile,
     /// The heads, in the order of their source numbers.
     pub heads: Vec<HeadSite>,
@@ -72,7 +71,7 @@ pub struct Site {
     pub sensors: Vec<SensorSite>,
     /// UTC at time zero of the log's clock, seconds; `None` if unknown.
     pub utc_of_zero_s: Option<f64>,
-    /// First and last time of a log, seconds.
+    /// First and last time of the replayed log, seconds.
     pub span_s: Option<[f64; 2]>,
     /// Whether the dive accepts operator commands.
     pub takes_commands: bool,
@@ -119,9 +118,9 @@ pub(crate) struct Hello<'a> {
 /// Rights of a viewer.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct May {
-    /// Whether the viewer may acknowledge, silence and note.
+    /// Whether the viewer may acknowledge and silence alerts, and add notes.
     pub operate: bool,
-    /// Whether the viewer may pause, seek and so on.
+    /// Whether the viewer may control the playback of a replay.
     pub playback: bool,
 }
 
@@ -133,7 +132,7 @@ pub(crate) struct Greeting<'a> {
     pub(crate) may: May,
     pub(crate) begun_s: f64,
     pub(crate) tokens_needed: bool,
-    /// Thinning step of the samples in a file; `None` if the file has all samples.
+    /// Thinning step of the samples in an exported file; `None` if the file has all samples.
     pub(crate) thinned: Option<usize>,
 }
 
@@ -150,10 +149,10 @@ impl Site {
             mode: self.mode,
             dive: &self.dive,
             vehicle: &self.vehicle,
-            target_m: self.target_m,
+            target_m: self.target.max_hole_m,
             compared_m: self.compared_m,
             section_m: self.section_m,
-            confidence_sd: self.confidence_sd,
+            confidence_sd: self.target.confidence_sd,
             length_m: self.length_m,
             perimeter_m,
             profile: points.map(|arc_m| self.profile.point_at(arc_m).map(millimetres)).collect(),

@@ -2,13 +2,14 @@
 //!
 //! `docs/reference/page-feed.md` defines them.
 
-use headrace_coverage::{Cause, Section, Unsure, Verdict};
+use headrace_coverage::{Cause, Unsure, Verdict};
+use headrace_monitor::section_row::SectionRow;
 
 /// Kind byte of a frame of sections.
 pub const SECTIONS: u8 = 1;
 /// Kind byte of a frame of samples.
 pub const SAMPLES: u8 = 2;
-/// Version byte of both kinds.
+/// Version byte of both kinds of frames.
 const VERSION: u8 = 1;
 /// Length of a frame's header, bytes.
 const HEAD_BYTES: usize = 16;
@@ -16,29 +17,29 @@ const HEAD_BYTES: usize = 16;
 const SECTION_BYTES: usize = 32;
 /// Length of a sample record, bytes.
 const SAMPLE_BYTES: usize = 20;
-/// Byte that means "none".
+/// Byte that means "none" in a section or sample record.
 pub(crate) const NONE: u8 = 255;
-/// Number of steps in which arc length divides the perimeter.
+/// Number of steps into which the perimeter is divided for encoding an arc length.
 const ARC_PARTS: f64 = 65_536.0;
-/// Verdict byte of an open section that stays open if the vehicle goes on.
+/// Verdict byte of an open section that no further sample on the present course can close.
 const NOT_INSPECTED: u8 = 4;
 
-/// A section as displayed, without the mask of its parts that have samples.
+/// A section as displayed, without the bit mask of the parts that have samples.
 #[derive(Debug, Clone, Copy)]
 pub struct SectionRecord {
     /// Chainage of the section's start, as a multiple of the section length.
     pub index: i32,
     /// Verdict: 0 open, 1 pass, 2 fail, 3 can't say, 4 not inspected.
     pub verdict: u8,
-    /// Number of the main cause; 255 if there is none.
+    /// Number of the main cause of a miss; 255 if there is none.
     pub cause: u8,
     /// Number of the reason for "can't say"; 255 if there is none.
     pub why: u8,
     /// Bit 0: flagged. Bit 1: settled, which means that no further sample on the present course can change the
     /// verdict. Bits 2 to 4: verdict for a second target plus 1, or 0 without a second target.
     pub flags: u8,
-    /// Diameter of the hole, its standard deviation, and chainage and arc length of its centre, m; NaN if there is
-    /// none.
+    /// Diameter of the largest hole, its standard deviation, and chainage and arc length of its centre, m;
+    /// NaN if there is none.
     pub hole: [f32; 4],
 }
 
@@ -68,7 +69,7 @@ fn byte(verdict: Verdict) -> u8 {
 }
 
 impl SectionRecord {
-    /// A section without data.
+    /// Record of a section without data.
     pub fn blank(index: i32) -> Self {
         Self {
             index,
@@ -80,21 +81,17 @@ impl SectionRecord {
         }
     }
 
-    /// Converts a section of the loop; `None` if the index is out of range.
+    /// Converts a section of the loop to a record; `None` if its index is out of range.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
-    pub fn of(index: i64, section: &Section) -> Option<Self> {
-        let verdict = match section.verdict {
-            Verdict::Open if section.not_inspected => NOT_INSPECTED,
-            verdict => byte(verdict),
-        };
-        let cause =
-            section.evidence.filter(|_| section.verdict == Verdict::Fail).map(|evidence| evidence.cause);
-        let flags = u8::from(section.is_flagged()) | u8::from(section.settled) << 1;
-        let hole = section.hole.map_or([f32::NAN, section.hole_sd_m as f32, f32::NAN, f32::NAN], |hole| {
-            [hole.diameter_m, section.hole_sd_m, hole.x_m, hole.arc_m].map(|value| value as f32)
-        });
-        let (cause, why) = (number(&Cause::ALL, cause), number(&Unsure::ALL, section.unsure()));
-        Some(Self { index: i32::try_from(index).ok()?, verdict, cause, why, flags, hole })
+    pub fn of(row: &SectionRow) -> Option<Self> {
+        let verdict =
+            if row.not_inspected && row.verdict == Verdict::Open { NOT_INSPECTED } else { byte(row.verdict) };
+        let cause = number(&Cause::ALL, row.cause.map(|evidence| evidence.cause));
+        let why = number(&Unsure::ALL, row.cannot_say);
+        let flags = u8::from(row.is_flagged()) | u8::from(row.settled) << 1;
+        let or_nan = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
+        let hole = [or_nan(row.hole_m), row.hole_sd_m as f32, or_nan(row.hole_x_m), or_nan(row.hole_arc_m)];
+        Some(Self { index: i32::try_from(row.index).ok()?, verdict, cause, why, flags, hole })
     }
 
     /// Adds the verdict for a second target.
@@ -130,7 +127,7 @@ pub enum Outcome {
 pub struct SampleRecord {
     /// Milliseconds since the dive began.
     pub t_ms: u32,
-    /// Chainage, m.
+    /// Chainage of the sample, m.
     pub x_m: f32,
     /// Distance to the left of the axis, m; NaN without a return.
     pub y_m: f32,
@@ -138,9 +135,9 @@ pub struct SampleRecord {
     pub z_m: f32,
     /// Arc length, in steps of 1/65,536 of the perimeter.
     pub arc: u16,
-    /// Number of the head; 255 if unknown.
+    /// Number of the head that took the sample; 255 if unknown.
     pub head: u8,
-    /// Value of [`Outcome`].
+    /// Outcome of the ping, as a value of [`Outcome`].
     pub outcome: u8,
 }
 

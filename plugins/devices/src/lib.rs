@@ -1,4 +1,4 @@
-//! The list of device kinds. A new device adds a line here.
+//! The list of device kinds. A new kind of device is added here.
 
 use headrace_sensor::device::DeviceKind;
 

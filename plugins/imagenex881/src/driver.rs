@@ -1,4 +1,5 @@
-//! Host side of a head's line. The driver keeps one command in flight, and keeps the head on its program.
+//! Driver of a head. It keeps one command in flight, and keeps the head on its scan program: the planned
+//! sequence of pings.
 //!
 //! The driver first locates the head. It then homes the head, the short way, to the program's current position, and
 //! requests each ping of the program when due. After a late or lost answer the head lags. The driver then polls it as
@@ -19,34 +20,36 @@ use crate::settings::Settings;
 /// Supported carriers: Ethernet for the 881L, RS-485 or RS-232 for the 881A.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Tcp, Carrier::Serial, Carrier::Udp];
 
-/// Longest usual gap within a return.
+/// Longest usual gap between the bytes of a return.
 const SILENCE: DurNs = DurNs::from_millis(100);
 /// Allowance for the head's own processing in the answer timeout.
 const LEISURE: DurNs = DurNs::from_millis(60);
-/// Lower bounds of sound speed (m/s) and line rate (bit/s) for the answer timeout.
+/// Slowest sound (m/s) and slowest line (bit/s) for which the answer timeout is long enough.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
 const LINE_BAUD: f64 = 115_200.0;
-/// Number of unanswered commands after which the head is polled less often. Source: LSTS DUNE, which retries after a
-/// second.
+/// Number of unanswered commands after which the head is polled less often, and the interval then. Source:
+/// LSTS DUNE, which retries after a second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// Limits beyond which a head is homed. It may lag by at most 1/n of the program, and lead by at most a few pings.
+/// Limits beyond which a head is homed. It may lag behind its scan program by at most 1/n of the program's
+/// period, and lead by at most a few pings.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
-/// A head that answers but lags by more than 1/n of the program is reported as too slow for its settings.
+/// A head that answers but lags by more than 1/n of its scan program's period is reported as too slow for its
+/// settings.
 const TOO_SLOW_SHARE: u64 = 8;
 
-/// Number of unanswered commands, among the last 32, from which a lag is blamed on the line and not on the head.
+/// Minimum number of unanswered commands, among the last 32, at which a head's lag is attributed to the line.
 const LOSSY_FROM: u32 = 3;
 
-/// Purpose of a command.
+/// Purpose of a command to the head.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Aim {
     /// Find the head's position.
     Locate,
-    /// Move the head towards its program.
+    /// Move the head to the position that its scan program requires.
     Home,
-    /// Request the ping of this number in the program.
+    /// Request the ping with this number in the scan program.
     Ping(u64),
 }
 
@@ -62,12 +65,12 @@ pub struct HeadDriver {
     next_at: MonoNs,
     aim: Aim,
     way_home: VecDeque<Command>,
-    /// Number of the program's ping that follows homing.
+    /// Number of the scan program's ping that follows homing.
     joins_at: u64,
     unanswered: u32,
     /// Whether each of the last 32 commands was unanswered. The lowest bit is the latest command.
     losses: u32,
-    /// Whether the head has followed its program at least once.
+    /// Whether the head has followed its scan program at least once.
     joined: bool,
     last_position: Option<u16>,
     foreign_id: Option<u8>,
@@ -76,7 +79,8 @@ pub struct HeadDriver {
 }
 
 impl HeadDriver {
-    /// Creates a driver for a head. Without a program, the head rotates continuously, starting at the sensor frame's 0.
+    /// Creates a driver for a head. Without a scan program, the head rotates continuously from angle 0 of the
+    /// sensor frame.
     pub fn new(settings: Settings, setup: &DriverSetup) -> Self {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
@@ -113,7 +117,7 @@ impl HeadDriver {
         self.asked = Some((self.aim, now));
     }
 
-    /// Command for a ping without a step. Its settings are those of the dive, so the return counts.
+    /// Command for a ping without a step. It has the dive's settings, so its return is used as a measurement.
     fn standing_still(&self) -> Option<[u8; COMMAND_BYTES]> {
         Command { step_deg: 0.0, reverse: false, ..self.settings.command }.encode().ok()
     }
@@ -157,7 +161,7 @@ impl HeadDriver {
         self.timetable.ping(number).is_some_and(|ping| ping.position == position)
     }
 
-    /// Continues with a ping of the program when it is due, or at once if it is overdue.
+    /// Continues with a ping of the scan program when it is due, or at once if it is overdue.
     fn go_on(&mut self, number: u64, now: MonoNs) {
         self.joined = true;
         self.aim = Aim::Ping(number);
@@ -165,7 +169,7 @@ impl HeadDriver {
         self.behind = self.timetable.first_at(now).saturating_sub(number);
     }
 
-    /// Joins the program at the head's position, or homes the head if its position is too far off.
+    /// Continues the scan program at the head's position, or homes the head if that position is too far off.
     fn join(&mut self, position: u16, clockwise: bool, now: MonoNs) {
         let current = self.timetable.first_at(now);
         let most_behind = if self.joined { self.timetable.len() / BEHIND_SHARE } else { 1 };
@@ -208,7 +212,7 @@ impl HeadDriver {
         }
     }
 
-    /// Gives up the command in flight.
+    /// Stops waiting for the answer to the command in flight.
     fn give_up(&mut self, now: MonoNs) {
         self.asked = None;
         self.unanswered = self.unanswered.saturating_add(1);
@@ -299,7 +303,7 @@ impl Driver for HeadDriver {
     }
 }
 
-/// Answer timeout of a command.
+/// Time limit for the head's answer to a command.
 ///
 /// The timeout is twice the sum of three times: the two-way travel time at the range setting, the transmission of the
 /// command and the longest return on a serial line, and the processing allowance.

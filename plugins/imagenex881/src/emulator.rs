@@ -1,4 +1,4 @@
-//! An emulated head. An emulated host polls it once per ping period, or a real host polls it.
+//! An emulated head, which either an emulated host polls once per ping period, or a real host polls.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ use crate::program::Host;
 use crate::settings::Settings;
 use crate::stepping::{Head, Ping};
 
-/// Strength of an emulated echo at the wall. The strength elsewhere is zero.
+/// Echo strength of the point at the wall. All other points of an emulated echo are zero.
 const ECHO: u8 = 127;
 
 impl Ping {
@@ -86,9 +86,9 @@ struct Asked {
 }
 
 impl HeadEmulator {
-    /// Creates a head that is at its program's start and pings as soon as it is switched on.
+    /// Creates a head that is at the start of its scan program and pings as soon as it is switched on.
     ///
-    /// Without a program, the head rotates continuously, starting at the sensor frame's 0.
+    /// Without a scan program, the head rotates continuously from angle 0 of the sensor frame.
     pub fn new(settings: Settings, latency: DurNs, setup: &EmulatorSetup) -> Self {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
@@ -108,7 +108,7 @@ impl HeadEmulator {
         }
     }
 
-    /// Executes the next command of the emulated host.
+    /// Makes the head execute the next command of the emulated host.
     fn asked_now(&mut self) -> Option<Asked> {
         let command = self.host.as_mut()?.next_command();
         Some(Asked { command, ping: self.head.obey(&command) })
@@ -146,7 +146,8 @@ impl Emulator<Sounding> for HeadEmulator {
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        // Imported soundings come without `begin`, so the emulated host's command is requested here.
+        // Imported soundings come without a call of `begin`, so the emulated host's command is requested
+        // here.
         let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else {
             return;
         };

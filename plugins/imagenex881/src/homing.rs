@@ -1,11 +1,11 @@
-//! Homing of a head to its program's start.
+//! Homing of a head to the start of its scan program.
 
 use headrace_sensor::sampling::head::HeadProgram;
 
 use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
-/// Range setting while homing, m. It is the shortest one, and never the configured setting.
+/// Range setting while homing, m: the shortest one. It must differ from the configured setting.
 const RANGE_M: u8 = 1;
 
 /// Position and stepping direction of a head.
@@ -17,7 +17,8 @@ pub struct Standing {
     pub growing: bool,
 }
 
-/// Commands that move a head the short way to its program's start and leave it stepping in the program's direction.
+/// Commands that move a head the short way to the start of its scan program and leave it stepping in the
+/// program's direction.
 ///
 /// A head pings with every command. The range setting while homing differs from the configured one, so that these
 /// returns don't count as samples. If only the direction is wrong, a last command reverses the direction without a
@@ -61,9 +62,9 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
-    /// An emulated head executes the homing commands, and then the first command of its program.
+    /// An emulated head executes the homing commands, and then the first command of its scan program.
     #[test]
-    fn homed_head_continues_with_its_program() {
+    fn homed_head_continues_with_its_scan_program() {
         for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
             let settings = settings(text).unwrap();
             for (from, start) in [(0.3, 5.0), (5.0, 0.3), (1.0, 1.0), (1.0, 1.0052), (0.0, 3.1), (6.2, 0.01)]

@@ -19,10 +19,10 @@ pub struct LogFile<'a> {
     offset: usize,
 }
 
-/// One shot: a header and a return.
+/// One shot of a log file: a header and a return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot<'a> {
-    /// Three-letter model name.
+    /// Three-letter model name of the device.
     pub model: [u8; 3],
     /// Day, month (1 to 12) and year; `None` if the field isn't a date.
     pub date: Option<(u8, u8, u16)>,
@@ -41,19 +41,19 @@ pub enum LogFileError {
     /// There is no shot header at the expected offset.
     #[error("log file: shot at byte {offset} begins with {got:02X?}; allowed are 852, 81A, 81B, 81S, 31L")]
     Magic {
-        /// Offset in the file.
+        /// Offset of the shot in the file.
         offset: usize,
-        /// The three bytes found.
+        /// The three bytes found at this offset.
         got: [u8; 3],
     },
     /// The file ends within a shot.
     #[error("log file: shot at byte {offset} needs {needed} bytes and the file has {left} more")]
     Short {
-        /// Offset in the file.
+        /// Offset of the shot in the file.
         offset: usize,
-        /// Number of bytes needed.
+        /// Number of bytes that the shot needs.
         needed: usize,
-        /// Number of bytes left.
+        /// Number of bytes left in the file.
         left: usize,
     },
     /// The return is longer than the shot.
@@ -61,7 +61,7 @@ pub enum LogFileError {
         "log file: shot at byte {offset} has {total} bytes, but it needs more: a header of 100 and a return of {raw}"
     )]
     Lengths {
-        /// Offset in the file.
+        /// Offset of the shot in the file.
         offset: usize,
         /// Length of the shot as stated in its header.
         total: usize,
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn real_sounder_log_is_read() {
-        // Number of shots, and of shots with an echo.
+        // Number of shots in the file, and number of shots with an echo.
         let counts = [(300, 203), (917, 452)];
         let name = "imagenex852_cidco/19_26_51-2016_11_18-sonar.852";
         for (path, (shots, echoes)) in headrace_support::recordings::both(name, counts[0], counts[1]) {

@@ -19,13 +19,13 @@ use crate::emulator::HeadEmulator;
 use crate::probe::HeadProbe;
 use crate::settings::{Settings, range_setting};
 
-/// Name in vehicle files and logs.
+/// Name of this device kind in vehicle files and logs.
 const NAME: &str = "imagenex881";
 
 /// Buffer for several seconds of the longest returns.
 const RING_BYTES: usize = 1 << 17;
 
-/// Longest usual gap within a return. An unfinished return is dropped after this gap.
+/// Longest usual gap between the bytes of a return. An unfinished return is dropped after this gap.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// The Imagenex 881 device kind.
@@ -47,7 +47,7 @@ impl DeviceKind for Imagenex881Kind {
     }
 }
 
-/// A configured head.
+/// A head as configured in the vehicle file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Imagenex881 {
     sensor: SensorConfig,
@@ -136,7 +136,7 @@ fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     (shorter.len() < packet.len()).then_some(())
 }
 
-/// Number of whole returns without a reading, by reason.
+/// Number of whole returns that give no reading, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Rejected {
     /// The head rejected the command, or lost characters of the command.
@@ -157,7 +157,7 @@ impl Rejected {
     }
 }
 
-/// Decodes returns into readings.
+/// Decodes a head's returns into readings.
 #[derive(Debug, Clone)]
 pub struct HeadDecoder {
     codec: ReturnCodec,
@@ -167,7 +167,7 @@ pub struct HeadDecoder {
 
 stateful!(HeadDecoder { state: codec, clock, reader; });
 
-/// Converts whole returns to readings. It is separate from the codec, so that both can be borrowed.
+/// Converts whole returns to readings. This state is separate from the codec, so that both can be borrowed.
 #[derive(Debug, Clone)]
 struct Reader {
     settings: Settings,
@@ -185,7 +185,7 @@ impl HeadDecoder {
         Self { codec, clock: LineClock::new(SILENCE), reader }
     }
 
-    /// Number of whole returns without a reading so far, by reason.
+    /// Number of whole returns so far that gave no reading, by reason.
     pub fn rejected(&self) -> Rejected {
         self.reader.rejected
     }

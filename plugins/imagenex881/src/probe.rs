@@ -1,4 +1,4 @@
-//! Probes for a head with one short ping that moves the head by no step.
+//! Probes a line for a head, with one short ping that doesn't step the head.
 
 use headrace_sensor::codec::Codec as _;
 use headrace_sensor::driver::Probe;
@@ -8,7 +8,7 @@ use crate::codec::{Command, Header, Model, Points, ReturnCodec, ZERO_COUNT};
 /// Probed head ids: the default, and the usual ids of further heads on an RS-485 line.
 const HEAD_IDS: [u8; 4] = [0x10, 0x11, 0x12, 0x13];
 
-/// Degrees per position count.
+/// Degrees per count of a head's position.
 const DEGREES_A_COUNT: f64 = 0.3;
 
 /// Polls the probed head ids, and accepts the first whole return as the answer.
@@ -18,7 +18,7 @@ pub struct HeadProbe {
     found: Option<Header>,
 }
 
-/// A ping at minimum range and gain, without a step.
+/// Command for a ping at minimum range and gain, without a step.
 fn standing_still(head_id: u8) -> Command {
     Command {
         head_id,
@@ -54,7 +54,7 @@ impl Probe for HeadProbe {
 
     fn identity(&self) -> Option<String> {
         let Header { tag, head_id, status, position, .. } = self.found?;
-        // Sounders share this id, but their positions have no meaning.
+        // An echosounder may have this head id, too, but its position has no meaning.
         if Model::of_head_id(head_id) == Model::Sounder852 {
             return Some(format!("Imagenex 881 family or 852 sounder, head_id = {head_id:#04x}"));
         }

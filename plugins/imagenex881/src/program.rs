@@ -1,4 +1,4 @@
-//! A head's program as a sequence of commands, one per ping.
+//! A head's scan program as a sequence of commands, one per ping.
 
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::sampling::head::HeadProgram;
@@ -7,7 +7,7 @@ use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, step_at_most, step_d
 use crate::settings::{Settings, counts_of_rad};
 use crate::stepping::Head;
 
-/// Host side of a head: generates the commands that keep the head on its program.
+/// Generates the commands that keep a head on its scan program.
 ///
 /// Sectors are swept with steps and reversals. The head's own sector settings aren't used, because they allow multiples
 /// of 3 degrees only. Each sweep pings both ends of the sector, each end once. If the sector isn't a multiple of the
@@ -20,7 +20,7 @@ pub struct Host {
     sector: Option<Sector>,
 }
 
-/// A sector in counts, with the head's offset above the sector's lower end.
+/// A sector in counts of 0.3 degrees, with the head's offset above the sector's lower end.
 #[derive(Debug, Clone, Copy)]
 struct Sector {
     size: i32,
@@ -28,7 +28,8 @@ struct Sector {
 }
 
 impl Host {
-    /// Creates the host of a head that is at the program's start and steps in the program's initial direction.
+    /// Creates the host of a head that is at the start of its scan program and steps in the program's initial
+    /// direction.
     pub fn new(settings: &Settings, program: &HeadProgram) -> Self {
         let normal = settings.angle_sign > 0.0;
         Self {
@@ -48,7 +49,7 @@ impl Host {
         self.growing
     }
 
-    /// The next command. The head pings at its position and then steps.
+    /// The next command to the head, which pings at its position and then steps.
     pub fn next_command(&mut self) -> Command {
         let Some(Sector { size, along }) = &mut self.sector else { return self.command };
         let to_end = |growing| if growing { *size - *along } else { *along };
@@ -69,18 +70,18 @@ impl Sector {
     }
 }
 
-/// A planned ping of a program.
+/// A planned ping of a head's scan program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Planned {
     /// Head position, 0 to 1199.
     pub position: u16,
-    /// Whether the step that follows the previous ping, before this command, would increase the position.
+    /// Stepping direction of the head before this command: true if positions increase.
     pub clockwise: bool,
     /// Encoded command that requests the ping and sets the next step.
     pub command: [u8; COMMAND_BYTES],
 }
 
-/// A periodic program with times: ping k is due k ping periods after the dive's start.
+/// A periodic scan program with times: ping k is due k ping periods after the dive's start.
 #[derive(Debug, Clone)]
 pub struct Timetable {
     pings: Vec<Planned>,
@@ -88,11 +89,11 @@ pub struct Timetable {
     period: DurNs,
 }
 
-/// Maximum period of a program, in pings. A slow sector has 2,400.
+/// Maximum period of a scan program, in pings. A sector in the mode "slow" has 2,400.
 const MAX_PINGS: usize = 10_000;
 
 impl Timetable {
-    /// Creates the program of a head that is at the program's start when the dive begins.
+    /// Creates the timetable of a head that is at the start of its scan program when the dive begins.
     pub fn new(settings: &Settings, program: &HeadProgram, begun: MonoNs) -> Self {
         let mut host = Host::new(settings, program);
         let mut head = Head::new(settings.position(program.start_rad), host.growing());
@@ -112,17 +113,17 @@ impl Timetable {
         Self { pings, begun, period: settings.ping_period }
     }
 
-    /// Period of the program, in pings.
+    /// Period of the scan program, in pings.
     pub fn len(&self) -> u64 {
         self.pings.len() as u64
     }
 
-    /// Whether the program has no pings, which never happens.
+    /// Whether the scan program has no pings, which never happens.
     pub fn is_empty(&self) -> bool {
         self.pings.is_empty()
     }
 
-    /// Finds ping number `number` of the periodic program.
+    /// Finds ping number `number` of the periodic scan program.
     pub fn ping(&self, number: u64) -> Option<&Planned> {
         let place = number.checked_rem(self.len())?;
         self.pings.get(usize::try_from(place).ok()?)

@@ -11,11 +11,11 @@ use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, SOUND_SPEED_MPS, 
 /// A scan mode with its name, step and turn period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mode {
-    /// Name in vehicle files.
+    /// Name of the mode in vehicle files.
     pub name: &'static str,
-    /// Step in counts of 0.3 degrees.
+    /// Step between pings in counts of 0.3 degrees.
     pub step_counts: u8,
-    /// Turn period at the table's range setting, ms.
+    /// Turn period at a range setting of 10 m, ms.
     pub turn_ms: i64,
 }
 
@@ -39,7 +39,7 @@ struct MeasuredTurn {
     period: DurNs,
 }
 
-/// Default housing of the family's heads, relative to the beam. Source: radius from Jorge et al. 2021, §8.3. The
+/// Default size of a head's housing, measured from the beam. Source: radius from Jorge et al. 2021, §8.3. The
 /// lengths are estimates.
 const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 };
 
@@ -50,13 +50,13 @@ pub struct Settings {
     pub command: Command,
     /// Step in counts of 0.3 degrees, one of those supported by the command.
     pub step_counts: u8,
-    /// Ping period.
+    /// Time between two successive pings.
     pub ping_period: DurNs,
     /// +1 if device angles increase with the sensor frame's angles, else -1.
     pub angle_sign: f64,
-    /// Sensor angle at device angle 0, radians.
+    /// Angle in the sensor frame at device angle 0, radians.
     pub angle_offset_rad: f64,
-    /// Housing of the head.
+    /// Size of the head's housing.
     pub body: HeadBody,
     measured: Vec<MeasuredTurn>,
 }
@@ -68,7 +68,7 @@ impl Settings {
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let choices = MODES.map(|mode| (mode.name, mode));
         let known = own.required("mode", own.choice("mode", &choices)?);
-        // Without a mode, the other keys are checked with an arbitrary mode.
+        // If the key `mode` is missing, the remaining keys are checked with an arbitrary mode.
         let mode = *known.as_ref().unwrap_or(&MODES[0]);
         let command = command(mode, own)?;
         let measured = measured_turns(mode, command.range_m, own)?;
@@ -103,12 +103,12 @@ impl Settings {
         modes(range_m, &self.measured)
     }
 
-    /// Full beam width at the configured frequency, radians.
+    /// Full width of the beam at the configured frequency, radians.
     pub fn beam_rad(&self) -> f64 {
         beam_rad(self.command.frequency_khz)
     }
 
-    /// Step, radians.
+    /// Step between pings, radians.
     pub fn step_rad(&self) -> f64 {
         rad_of_counts(i32::from(self.step_counts))
     }
@@ -147,7 +147,7 @@ pub fn range_setting(range_m: f64) -> Result<u8, String> {
         .ok_or_else(|| format!("{range_m} m is not a range setting of the head; it has {RANGES_M:?}"))
 }
 
-/// Modes at a range setting for a head without measured turn periods.
+/// All modes at a range setting, for a head without measured turn periods.
 pub fn usual_modes(range_m: u8) -> Vec<HeadMode> {
     modes(range_m, &[])
 }
@@ -250,7 +250,7 @@ fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<Meas
     Ok(measured)
 }
 
-/// Allowed turn periods, seconds.
+/// Shortest and longest allowed turn period, seconds.
 const TURN_S: core::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
@@ -273,7 +273,7 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
         [("profile", (true, Points::P250)), ("imx", (false, Points::P250)), ("igx", (false, Points::P500))];
     let (profile, points) = own.choice("returns", &returns)?.unwrap_or((true, Points::P250));
     let command = Command {
-        // The maximum is 252, since 253 terminates a command.
+        // The largest head id is 252, since the byte 253 terminates a command.
         head_id: byte("head_id", 0..=252, 0x10)?,
         range_m,
         reverse: false,

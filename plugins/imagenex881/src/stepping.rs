@@ -6,7 +6,7 @@ use crate::settings::counts_of_rad;
 /// Position of a ping, and direction of the step after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ping {
-    /// Position, 0 to 1199.
+    /// Head position of the ping, 0 to 1199.
     pub position: u16,
     /// Whether the step after the ping increases the position.
     pub clockwise: bool,
@@ -25,7 +25,7 @@ impl Head {
         Self { position: position.rem_euclid(COUNTS_PER_TURN), growing }
     }
 
-    /// Position, 0 to 1199.
+    /// Present head position, 0 to 1199.
     pub fn position(&self) -> i32 {
         self.position
     }

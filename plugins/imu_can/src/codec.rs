@@ -1,4 +1,4 @@
-//! Decodes frames into the messages of one maker's set.
+//! Decodes CAN frames into the messages of one maker's set.
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
@@ -18,7 +18,7 @@ pub enum MessageSet {
     Bosch,
 }
 
-/// A message of any set.
+/// A message of any maker's set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Message of the Xsens set.
@@ -32,7 +32,8 @@ pub enum Message {
 }
 
 impl MessageSet {
-    /// Decodes a frame; `None` if the frame isn't of this set. Remote and error frames are of no set.
+    /// Decodes a CAN frame; `None` if the frame isn't of this message set. Remote and error frames belong to
+    /// no set.
     ///
     /// Errors: the identifier is of this set, but the length is wrong.
     pub fn decode(&self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {
@@ -56,7 +57,7 @@ impl MessageSet {
     }
 }
 
-/// Decodes bytes into messages of one set.
+/// Decodes bytes into messages of one maker's set.
 ///
 /// Other devices' frames, remote frames and error frames are good frames without a message. A frame of the set with a
 /// wrong length is bad. A message that holds no classic frame is bad, too.

@@ -1,4 +1,4 @@
-//! Decodes messages into readings on arrival. A unit sends the frames of one sample back to back.
+//! Decodes a maker's messages into readings on arrival. A unit sends the frames of one sample back to back.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_sensor::device::Decoder;
@@ -24,12 +24,12 @@ pub enum AxisOrder {
     Xyz,
 }
 
-/// Decoding settings.
+/// Decoding settings of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DecoderSettings {
-    /// The maker's set.
+    /// The maker's message set.
     pub set: MessageSet,
-    /// Axis order; used for the J1939 set.
+    /// Axis order of the unit; used only for the J1939 set.
     pub axis_order: AxisOrder,
     /// Tick of the sample time; used for the Xsens set.
     pub sample_time_tick: DurNs,
@@ -37,7 +37,7 @@ pub struct DecoderSettings {
     pub latency: DurNs,
 }
 
-/// Decodes bytes into readings.
+/// Decodes an inertial unit's bytes into readings.
 #[derive(Debug, Clone)]
 pub struct ImuDecoder {
     codec: ImuCodec,
@@ -47,7 +47,7 @@ pub struct ImuDecoder {
 
 stateful!(ImuDecoder { state: codec, state, passed_over; });
 
-/// State updated by messages.
+/// State of the decoder, updated by each message.
 #[derive(Debug, Clone)]
 struct State {
     meaning: DecoderSettings,
@@ -74,7 +74,7 @@ struct Invalid {
     force: bool,
 }
 
-/// A reading and the delay within the device, which is zero if the device sends none.
+/// A reading and its delay within the device. The delay is zero if the device sends none.
 type Told = Option<(Reading, DurNs)>;
 
 impl AxisOrder {
@@ -88,7 +88,7 @@ impl AxisOrder {
 }
 
 impl ImuDecoder {
-    /// Creates a decoder.
+    /// Creates a decoder with these settings.
     pub fn new(meaning: DecoderSettings) -> Self {
         let state = State {
             meaning,
@@ -259,7 +259,7 @@ impl State {
         }
     }
 
-    /// Processes a timestamp of the unit's 32-bit clock.
+    /// Processes a timestamp of the unit's 32-bit clock, which wraps.
     fn stamp(&mut self, ticks: u32, tick: DurNs) {
         let clock = self.clock.get_or_insert_with(|| SampleTimes::new(u32::BITS, tick));
         clock.stamp(u64::from(ticks), self.received);

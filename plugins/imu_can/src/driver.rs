@@ -1,16 +1,16 @@
-//! Host side of the bus. The driver only listens.
+//! Driver of an inertial unit, which only listens to the CAN bus.
 
 use headrace_sensor::driver::{Carrier, MessageListener};
 use headrace_sensor::geometry::time::DurNs;
 
 use crate::frame::{CanFrame, FRAME_BYTES};
 
-/// Supported carriers. Each frame is a `can_frame` of 16 bytes.
+/// Carriers over which an inertial unit can be connected. Each frame is a `can_frame` of 16 bytes.
 pub const CARRIERS: [Carrier; 2] = [Carrier::Can, Carrier::Udp];
 
 const PATIENCE: DurNs = DurNs::from_millis(5_000);
 
-/// Driver of a unit.
+/// Driver of an inertial unit.
 pub fn listener() -> MessageListener {
     MessageListener::new(Box::new(judge), PATIENCE)
 }

@@ -1,4 +1,4 @@
-//! Unit side of the bus. The emulator sends the frames of one sample at a fixed rate.
+//! Emulates an inertial unit on the CAN bus. At a fixed rate, it sends all frames of one sample.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;
@@ -128,12 +128,12 @@ fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
-/// Value of a 32-bit device clock.
+/// Value of a device's 32-bit clock after this time.
 fn wrapped(ticks: i64) -> u32 {
     u32::try_from(ticks.rem_euclid(1 << 32)).unwrap_or_default()
 }
 
-/// Nearest count within the wire's range.
+/// Counts nearest to these values, within the range of the wire format.
 fn counts<const N: usize>(values: [f64; N], quantum: f64) -> Option<[i16; N]> {
     let counts = |value| {
         let counts = math::round_to_i64(value / quantum);

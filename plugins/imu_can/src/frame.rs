@@ -8,7 +8,7 @@
 //! ```
 //! Source: linux/can.h.
 
-/// Length of a frame in the log.
+/// Length of a CAN frame in the log, bytes.
 pub const FRAME_BYTES: usize = 16;
 
 const MAX_DATA_BYTES: u8 = 8;
@@ -18,21 +18,21 @@ const ERROR: u32 = 1 << 29;
 const STANDARD_IDS: u16 = 0x7FF;
 const EXTENDED_IDS: u32 = 0x1FFF_FFFF;
 
-/// An arbitration identifier.
+/// The arbitration identifier of a CAN frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CanId {
-    /// 11 bits.
+    /// Standard identifier of 11 bits.
     Standard(u16),
-    /// 29 bits.
+    /// Extended identifier of 29 bits.
     Extended(u32),
 }
 
 /// Kind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameKind {
-    /// Data from a device.
+    /// A data frame from a device.
     Data(CanId),
-    /// A request for data.
+    /// A remote frame, which requests data.
     Remote(CanId),
     /// An error frame from the controller, with its error class bits.
     Error(u32),
@@ -46,7 +46,7 @@ pub struct CanFrame {
     data: [u8; 8],
 }
 
-/// A reason why bytes are no frame.
+/// A reason why bytes are no CAN frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
@@ -60,7 +60,7 @@ pub enum FrameError {
     Id(u32),
 }
 
-/// A payload of up to eight bytes, built piece by piece.
+/// Data of a frame, up to eight bytes, built piece by piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Payload {
     len: u8,
@@ -85,7 +85,7 @@ impl CanId {
 }
 
 impl Payload {
-    /// Appends bytes. Bytes beyond eight are dropped.
+    /// Appends bytes to the data. Bytes beyond eight are dropped.
     #[must_use]
     pub fn with(mut self, bytes: &[u8]) -> Self {
         for byte in bytes {
@@ -162,7 +162,7 @@ impl CanFrame {
         Self::of_kind(kind, data.get(..usize::from(*len)).ok_or(FrameError::Length(usize::from(*len)))?)
     }
 
-    /// Encodes a `can_frame`.
+    /// Encodes the frame as a `can_frame`.
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
         let bits = match self.kind {
             FrameKind::Data(id) => id.bits(),
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flags_give_the_kind_of_a_frame() {
+    fn identifier_flags_give_the_kind_of_a_can_frame() {
         let kind = |id: [u8; 4]| {
             let mut bytes = [0; FRAME_BYTES];
             bytes[..4].copy_from_slice(&id);

@@ -15,14 +15,14 @@ const MICRO_G: f64 = 9.806_65e-6;
 const WANDERS_OVER_S: f64 = 300.0;
 /// Constant bias of a factory-calibrated unit after power-on, rad/s.
 ///
-/// The value is what a unit at rest on deck shows. Data sheets bound the bias by the worst case of a year (0.2
-/// degrees/s, 30 mm/s^2).
+/// The value is the rate that a unit at rest on deck reads. Data sheets bound the bias by the worst case of a
+/// year (0.2 degrees/s, 30 mm/s^2).
 const GYRO_TURN_ON: f64 = 0.05 * DEGREE;
 const ACCEL_TURN_ON_MPS2: f64 = 0.02;
 /// In-run instability of accelerometers, increased for mounting, temperature and resolution, m/s^2.
 const ACCEL_IN_RUN_MPS2: f64 = 2e-3;
 
-/// Noise of the unit after which a message set is named; `None` if the set covers many units.
+/// Noise of the inertial unit after which a message set is named; `None` if the set covers many units.
 pub(crate) fn of(set: MessageSet) -> Option<InertialNoise> {
     match set {
         // MT1603P: 0.007 degrees/s/sqrt(Hz), 8 degrees/h, 60 ug/sqrt(Hz). A resolution of 2^-9 rad/s at 100 Hz adds

@@ -19,7 +19,7 @@ use crate::emulator::ImuEmulator;
 use crate::noise;
 use crate::sets::{j1939, xsens};
 
-/// Name in vehicle files.
+/// Name of this device kind in vehicle files.
 pub const NAME: &str = "imu_can";
 
 /// Buffer for several seconds of four frames per sample at the usual rate.
@@ -31,7 +31,7 @@ const USUAL_TICK_US: i64 = 100;
 #[derive(Debug, Clone, Copy)]
 pub struct ImuCanKind;
 
-/// A configured inertial unit.
+/// An inertial unit as configured in the vehicle file.
 #[derive(Debug, Clone)]
 pub struct CanImu {
     sensor: SensorConfig,

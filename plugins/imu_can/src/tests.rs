@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated unit.
+//! Tests the path from a vehicle file's table to an inertial unit's readings, through the emulated unit.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;
@@ -96,7 +96,7 @@ fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> 
     readings
 }
 
-/// Readings from `samples` samples of the emulated unit, whose motion is `truth`.
+/// Readings decoded from `samples` samples of the emulated unit, whose motion is `truth`.
 fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) -> Vec<Decoded> {
     let start = MonoNs(2_000_000_000);
     let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };
@@ -120,7 +120,7 @@ fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) 
     readings
 }
 
-/// Compares every reading with the truth. The tolerances of rate and force are one quantum each.
+/// Compares every reading with the unit's true motion. The tolerances of rate and force are one quantum each.
 fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: f64) {
     for decoded in readings {
         let felt = truth.felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
@@ -157,7 +157,7 @@ fn emulated_xsens_round_trips() {
 }
 
 #[test]
-fn constant_motion_gives_zero_rate_and_gravity() {
+fn unit_at_rest_gives_zero_rate_and_constant_readings() {
     let truth = Going::new(0.0, 0.0);
     let mut decoder = ImuDecoder::new(meaning(XSENS));
     let readings = emulated("preset = \"xsens_mti600\"\n", &mut decoder, &truth, 500);
@@ -283,7 +283,7 @@ fn invalid_j1939_values_are_withheld_and_latency_is_subtracted() {
 }
 
 #[test]
-fn bosch_force_is_reported_once_complete() {
+fn bosch_force_is_reported_when_its_last_component_arrives() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Bosch));
     let (rate, force) = (bosch::RawRate::nearest(0.0), bosch::RawAcceleration::nearest(1.0));
     let messages = [
@@ -298,7 +298,7 @@ fn bosch_force_is_reported_once_complete() {
 }
 
 #[test]
-fn wrong_keys_are_named() {
+fn wrong_keys_of_the_vehicle_file_are_named() {
     let error = |own| configured(own).err().unwrap();
     assert_eq!(error("rate_hz = 100\n"), "v.toml:1: preset: is missing");
     assert!(error("preset = \"vectornav\"\n").contains("xsens_mti600, sbg_ellipse, j1939, bosch_mm5"));
@@ -335,7 +335,7 @@ fn only_the_first_received_kind_of_sbg_time_is_followed() {
 }
 
 #[test]
-fn unmeasured_values_are_sent_in_no_frame() {
+fn emulated_unit_sends_no_unmeasured_values() {
     let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
     for (own, set, whole, without) in [
         ("preset = \"xsens_mti600\"", XSENS, 4, 3),

@@ -1,4 +1,5 @@
-//! Decodes frames into readings of one part of the vehicle. Other good frames are ignored.
+//! Decodes MAVLink frames into readings of one sensor that the autopilot reports. Good frames of other
+//! sensors are ignored.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::device::Decoder;
@@ -16,44 +17,44 @@ use crate::message::{
 };
 use mavlink::dialects::ardupilotmega::ATTITUDE_DATA;
 
-/// Longest usual gap within a frame. The longest frame takes 50 ms at 57,600 baud.
+/// Longest usual gap between the bytes of a frame. The longest frame takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
-/// Tolerance of angle limits, which allows for rounding.
+/// Amount by which an angle may exceed its limits because of rounding, radians.
 const ANGLE_TOLERANCE_RAD: f64 = 1e-3;
 
 /// Quality value that marks a distance as invalid, per cent.
 const QUALITY_INVALID_PERCENT: u8 = 1;
 
-/// Decoding settings of a part.
+/// Decoding settings of one sensor that the autopilot reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecoderSettings {
-    /// Decoded part of the vehicle.
+    /// Sensor whose messages are decoded.
     pub part: Part,
-    /// Accepted system id; `None` for the system id of the first autopilot received.
+    /// Accepted MAVLink system id; `None` for that of the first autopilot received.
     pub system_id: Option<u8>,
-    /// Accepted component id; `None` for any.
+    /// Accepted MAVLink component id; `None` for any.
     pub component_id: Option<u8>,
     /// Delay from a reading's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// A part of the vehicle reported by the autopilot.
+/// A sensor that the autopilot reports: the value of the key `part`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Part {
-    /// Attitude, turn rate, specific force.
+    /// The inertial unit: attitude, turn rate and specific force.
     Imu {
         /// Message with rates and forces. With `None`, the rates come from ATTITUDE, and there are no forces.
         message: Option<ImuMessage>,
     },
-    /// Water pressure.
+    /// A depth sensor: water pressure.
     Pressure {
-        /// Message of the barometer.
+        /// MAVLink message of the barometer that measures the water pressure.
         message: PressureMessage,
         /// Resolution of the barometer's sensor, Pa.
         resolution_pa: f64,
     },
-    /// A distance.
+    /// An echosounder: a distance.
     Distance(DistancePart),
 }
 
@@ -70,7 +71,7 @@ pub struct DistancePart {
     pub sound_speed_mps: f64,
 }
 
-/// Decodes bytes into readings.
+/// Decodes bytes into readings of one sensor.
 #[derive(Debug, Clone)]
 pub struct MavlinkDecoder {
     codec: MavlinkCodec,
@@ -84,7 +85,7 @@ stateful!(MavlinkDecoder { state: codec, clock, state; });
 struct State {
     meaning: DecoderSettings,
     boot: BootClock,
-    /// Accepted system id, once it is known.
+    /// Accepted MAVLink system id, once it is known.
     system_id: Option<u8>,
     passed_over: u64,
     withheld: u64,
@@ -100,7 +101,8 @@ struct BootClock {
 }
 
 impl BootClock {
-    /// Processes a timestamp. A small backward step is no wrap, since messages may be sent out of order.
+    /// Processes a timestamp of the clock. A small backward step is no wrap, since messages may be sent out
+    /// of order.
     fn note(&mut self, time_ms: u32) {
         self.since_boot_ms = match self.last_ms {
             None => i64::from(time_ms),
@@ -111,19 +113,19 @@ impl BootClock {
 }
 
 impl MavlinkDecoder {
-    /// Creates a decoder.
+    /// Creates a decoder with these settings.
     pub fn new(meaning: DecoderSettings) -> Self {
         let system_id = meaning.system_id;
         let state = State { meaning, boot: BootClock::default(), system_id, passed_over: 0, withheld: 0 };
         Self { codec: MavlinkCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
-    /// Number of good frames that don't belong to this part.
+    /// Number of good frames that don't belong to this sensor.
     pub fn passed_over(&self) -> u64 {
         self.state.passed_over
     }
 
-    /// Autopilot timestamp of the part's last message, since boot.
+    /// Time since the autopilot's boot, as stated in the sensor's last message.
     pub fn since_boot(&self) -> Option<DurNs> {
         self.state.boot.last_ms.map(|_| DurNs::from_millis(self.state.boot.since_boot_ms))
     }
@@ -143,7 +145,7 @@ impl Decoder for MavlinkDecoder {
         self.codec.counts()
     }
 
-    /// Number of withheld messages of the part.
+    /// Number of withheld messages of the sensor.
     ///
     /// Messages are withheld if they are from another system or have invalid values: angles beyond their range,
     /// non-finite numbers, a pressure not above zero, contradictory limits.
@@ -163,14 +165,14 @@ impl State {
         } else {
             self.passed_over += 1;
         }
-        // In headrace's own logs all messages are from one system. Other logs may lack a heartbeat, so the part's first
-        // message also decides.
+        // In headrace's own logs all messages are from one system. Other logs may lack a heartbeat, so the
+        // sensor's first message also decides the accepted system.
         if is_ours && (is_autopilots_heartbeat(frame) || self.passed_over == before) {
             self.system_id = Some(system_of(frame));
         }
     }
 
-    /// Whether a frame belongs to this part, whatever its sender.
+    /// Whether a frame's message belongs to this sensor, whatever its sender.
     fn is_of_part(&self, frame: &Frame) -> bool {
         let mut same = Self { system_id: None, passed_over: 0, ..self.clone() };
         same.take_own(frame, &mut |_| ());

@@ -1,4 +1,5 @@
-//! Host side of a telemetry link. The driver receives its part's messages and sends heartbeats.
+//! Driver of one sensor that an autopilot reports on a telemetry link. It receives the sensor's messages and
+//! sends heartbeats.
 
 use headrace_sensor::codec::Framing as _;
 use headrace_sensor::device::Decoder as _;
@@ -14,10 +15,10 @@ use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, MavAutopilot, MavComponent, MavModeFlag, MavState, MavType,
 };
 
-/// Supported carriers.
+/// Carriers over which an autopilot can be connected.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];
 
-/// Longest usual gap within a frame. The longest frame takes 50 ms at 57,600 baud.
+/// Longest usual gap between the bytes of a frame. The longest frame takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 /// Period of the heartbeats, without which routers send nothing. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
@@ -25,13 +26,13 @@ const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
 const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
 const SYSTEM_ID: u8 = 1;
 
-/// Driver of a part. The driver delivers only messages of its part, so that each message on a shared line is recorded
-/// once.
+/// Driver of one sensor that an autopilot reports. The driver delivers only messages of its sensor, so that
+/// each message on a shared line is recorded once.
 ///
 /// The driver drops messages of other systems. It also drops all messages until the accepted system is known.
 pub struct MavlinkDriver {
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
-    /// Decides which messages belong to the part.
+    /// Decides which messages belong to the sensor.
     decoder: MavlinkDecoder,
     own_frames: u64,
     next_at: MonoNs,
@@ -42,7 +43,7 @@ pub struct MavlinkDriver {
 }
 
 impl MavlinkDriver {
-    /// Creates the driver of a part.
+    /// Creates the driver of a sensor with these settings.
     pub fn new(meaning: DecoderSettings) -> Self {
         Self {
             cutter: Cutter::new(Frames, SILENCE),

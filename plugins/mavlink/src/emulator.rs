@@ -1,4 +1,4 @@
-//! Autopilot side of the line. The emulator sends the messages of one part at a fixed rate.
+//! Emulates an autopilot, which sends the messages of one sensor at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_sensor::geometry::math;
@@ -46,7 +46,8 @@ impl AutopilotEmulator {
             Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
             _ => 1.0,
         };
-        // Without a real host there are no heartbeats, since a part's driver records only its own messages.
+        // Without a real host there are no heartbeats, since a sensor's driver records only that sensor's
+        // messages.
         let heartbeat_at = (!setup.polled).then_some(setup.start);
         Self { meaning, rate_hz, start: setup.start, device_per_site, begun: 0, sequence: 0, heartbeat_at }
     }
@@ -176,7 +177,7 @@ fn heartbeat(header: MavHeader) -> MAVLinkV2MessageRaw {
     encode(header, &heartbeat)
 }
 
-/// Nearest value within the wire's range.
+/// Whole number nearest to a value, within the range of the wire format.
 fn counts(value: f64) -> i16 {
     let counts = math::round_to_i64(value);
     i16::try_from(counts).unwrap_or(if counts < 0 { i16::MIN } else { i16::MAX })

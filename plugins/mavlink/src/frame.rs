@@ -25,12 +25,12 @@ pub const MAX_FRAME_BYTES: usize = V2_HEADER_BYTES + MAX_PAYLOAD_LEN + CHECKSUM_
 const V1_HEADER_BYTES: usize = STX_SIZE + v1::HEADER_SIZE;
 const V2_HEADER_BYTES: usize = STX_SIZE + v2::MIN_HEADER_SIZE;
 
-/// A frame with a correct checksum.
+/// A MAVLink frame with a correct checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// Protocol version.
+    /// MAVLink version of the frame.
     pub version: MavlinkVersion,
-    /// Sender and sequence number.
+    /// Sender and sequence number of the frame.
     pub header: MavHeader,
     /// Message id: up to 24 bits, or 8 bits in version 1.
     pub message_id: u32,
@@ -83,7 +83,8 @@ impl Header {
         self.summed_bytes() + CHECKSUM_SIZE + if self.signed { v2::SIGNATURE_SIZE } else { 0 }
     }
 
-    /// Whether the message's checksum can be checked. In version 1 the length must also be exactly the message's.
+    /// Whether the checksum of the frame's message can be checked. In version 1 the length must also be
+    /// exactly the message's.
     fn is_known(&self) -> bool {
         match self.version {
             MavlinkVersion::V1 => v1_payload_bytes(self.message_id) == Some(self.payload_bytes),
@@ -232,7 +233,7 @@ mod tests {
         bytes
     }
 
-    /// Adds the signing flag and a signature of the given bytes.
+    /// Adds the signing flag and a signature of these bytes to a frame.
     fn signed(frame: &[u8], signature: [u8; v2::SIGNATURE_SIZE]) -> Vec<u8> {
         let message = Frames.read(frame).unwrap().message_id;
         let (front, _) = frame.split_at(frame.len() - CHECKSUM_SIZE);
@@ -305,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn uncheckable_frame_is_skipped_without_hiding_others() {
+    fn unverifiable_frame_is_skipped_and_the_following_frames_are_read() {
         let mut unknown = RECORDED_ATTITUDE.to_vec();
         unknown[7] = 0xFF;
         unknown[8] = 0xFF;

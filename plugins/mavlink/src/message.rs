@@ -1,4 +1,4 @@
-//! Supported messages, in wire units and axes: x forward, y right, z down, and north, east, down.
+//! Supported MAVLink messages, in wire units and axes: x forward, y right, z down, and north, east, down.
 //!
 //! [`to_ours`] converts vectors and angles to headrace's axes (x forward, y left, z up), and back.
 //! Source: MAVLink common message set (common.xml): ATTITUDE, RAW_IMU, SCALED_IMU to SCALED_IMU3, SCALED_PRESSURE to
@@ -13,14 +13,14 @@ use mavlink::dialects::ardupilotmega::{
     SCALED_IMU2_DATA, SCALED_IMU3_DATA, SCALED_PRESSURE_DATA, SCALED_PRESSURE2_DATA, SCALED_PRESSURE3_DATA,
 };
 
-/// Unit of acceleration: a thousandth of standard gravity, m/s^2.
+/// Acceleration of one count: a thousandth of standard gravity, m/s^2.
 pub const MILLI_G_MPS2: f64 = 9.806_65e-3;
-/// Unit of turn rate, rad/s.
+/// Turn rate of one count: a milliradian per second, in rad/s.
 pub const MILLIRADPS: f64 = 1e-3;
-/// Unit of pressure, Pa.
+/// Pressure of one wire unit: a hectopascal, in Pa.
 pub const HECTOPASCAL: f64 = 100.0;
 
-/// One message.
+/// One supported MAVLink message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
     /// Attitude and turn rate estimated by the autopilot.
@@ -33,12 +33,12 @@ pub enum Message {
     Distance(Distance),
 }
 
-/// RAW_IMU and SCALED_IMU to SCALED_IMU3.
+/// Content of RAW_IMU and of SCALED_IMU to SCALED_IMU3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Imu {
-    /// Message type.
+    /// Type of the message.
     pub message: ImuMessage,
-    /// Time since boot, or since 1970. The SCALED_IMU messages have it in milliseconds.
+    /// Time since the autopilot's boot, or since 1970. The SCALED_IMU messages have it in milliseconds.
     pub time_us: u64,
     /// Specific force, milli-g.
     pub force_mg: [i16; 3],
@@ -48,12 +48,12 @@ pub struct Imu {
     pub unit: u8,
 }
 
-/// SCALED_PRESSURE to SCALED_PRESSURE3.
+/// Content of SCALED_PRESSURE to SCALED_PRESSURE3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
-    /// Message type.
+    /// Type of the message.
     pub message: PressureMessage,
-    /// Time since boot.
+    /// Time since the autopilot's boot.
     pub time_boot_ms: u32,
     /// Absolute pressure.
     pub absolute_hpa: f32,
@@ -61,10 +61,10 @@ pub struct Pressure {
     pub temperature_cdegc: i16,
 }
 
-/// DISTANCE_SENSOR.
+/// Content of DISTANCE_SENSOR.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Distance {
-    /// Time since boot.
+    /// Time since the autopilot's boot.
     pub time_boot_ms: u32,
     /// Minimum measurable distance.
     pub least_cm: u16,
@@ -80,7 +80,7 @@ pub struct Distance {
     pub quality_percent: u8,
 }
 
-/// Messages with rates and forces.
+/// Types of messages with rates and forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImuMessage {
     /// RAW_IMU.
@@ -93,7 +93,7 @@ pub enum ImuMessage {
     Scaled3,
 }
 
-/// Messages with pressures.
+/// Types of messages with pressures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressureMessage {
     /// SCALED_PRESSURE.

@@ -13,26 +13,27 @@ use mavlink::dialects::ardupilotmega::{
     STATUSTEXT_DATA,
 };
 
-/// MAV_COMP_ID_ONBOARD_COMPUTER. Source: MAVLink, MAV_COMPONENT.
+/// Component id of an onboard computer. Source: MAVLink, MAV_COMP_ID_ONBOARD_COMPUTER.
 pub const COMPONENT_ID: u8 = 191;
-/// Longest text of a STATUSTEXT. Longer texts are sent in parts. Source: MAVLink, STATUSTEXT.
+/// Maximum length of the text in a STATUSTEXT. Longer texts are sent in parts. Source: MAVLink, STATUSTEXT.
 pub const TEXT_BYTES: usize = 50;
-/// Longest name of a value. Source: MAVLink, NAMED_VALUE_FLOAT.
+/// Maximum length of a value's name. Source: MAVLink, NAMED_VALUE_FLOAT.
 pub const NAME_BYTES: usize = 10;
-/// Names that QGroundControl attributes to the autopilot, whoever sends them. Source: its ArduSub plugin, August 2026.
+/// Names of values that QGroundControl attributes to the autopilot, whoever sends them. Source: its ArduSub
+/// plugin, August 2026.
 pub const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
-/// Severity of a text.
+/// Severity of a text sent to ground stations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gravity {
-    /// Act immediately.
+    /// The pilot must act immediately.
     Emergency,
-    /// Act.
+    /// The pilot must act.
     Alarm,
-    /// Be careful.
+    /// The pilot must be careful.
     Warning,
-    /// Take note.
+    /// For the pilot's information.
     Caution,
 }
 
@@ -47,7 +48,7 @@ impl From<Gravity> for MavSeverity {
     }
 }
 
-/// Encodes messages in the order in which they are sent.
+/// Encodes the program's MAVLink messages in the order in which they are sent.
 #[derive(Debug)]
 pub struct Speaker {
     system_id: u8,

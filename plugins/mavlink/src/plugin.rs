@@ -1,4 +1,4 @@
-//! A MAVLink part's table in the vehicle file, and its registration with the loop.
+//! Table in the vehicle file of a sensor reported over MAVLink, and the sensor's registration with the loop.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
@@ -13,7 +13,7 @@ use crate::emulator::AutopilotEmulator;
 use crate::frame::without_identity;
 use crate::message::{ImuMessage, PressureMessage};
 
-/// Name in vehicle files.
+/// Name of this device kind in vehicle files.
 pub const NAME: &str = "mavlink";
 
 /// Buffer for several seconds of an autopilot's full output.
@@ -22,11 +22,11 @@ const RING_BYTES: usize = 1 << 17;
 /// Resolution of the pressures that ArduSub sends for a Bar30, Pa.
 const USUAL_RESOLUTION_PA: f64 = 10.0;
 
-/// The MAVLink device kind: parts reported by an autopilot.
+/// The MAVLink device kind: sensors that an autopilot reports.
 #[derive(Debug, Clone, Copy)]
 pub struct MavlinkKind;
 
-/// A configured part.
+/// A sensor reported by an autopilot, as configured in the vehicle file.
 #[derive(Debug, Clone)]
 pub struct Autopilot {
     sensor: SensorConfig,

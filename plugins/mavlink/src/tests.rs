@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated autopilot.
+//! Tests the path from a vehicle file's table to the readings of its sensors, through the emulated autopilot.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::codec::CodecCounts;
@@ -75,7 +75,7 @@ fn decode_message(decoder: &mut MavlinkDecoder, message: &Message) -> Vec<Readin
     readings.into_iter().map(|decoded| decoded.reading).collect()
 }
 
-/// Readings of one part of the vehicle, sent by the emulated autopilot. `feel` fills in the measurements.
+/// Readings of one sensor, sent by the emulated autopilot. `feel` fills in the measurements.
 fn emulated<M: Measurement>(
     emulator: &mut dyn Emulator<M>,
     decoder: &mut MavlinkDecoder,
@@ -201,7 +201,7 @@ fn distances_round_trip_and_a_missing_echo_gives_no_distance() {
 }
 
 #[test]
-fn wire_axes_are_converted() {
+fn mavlink_axes_are_converted_to_headrace_axes() {
     let attitude = ATTITUDE_DATA {
         time_boot_ms: 1,
         roll: 0.1,
@@ -301,7 +301,7 @@ fn distance_confidence_follows_the_sensor_quality() {
 }
 
 #[test]
-fn wrong_keys_are_named() {
+fn wrong_keys_of_the_vehicle_file_are_named() {
     let error = |own| configured(own).err().unwrap();
     assert_eq!(error("rate_hz = 10\n"), "v.toml:1: part: is missing");
     assert!(error("part = \"gps\"\n").contains("must be one of imu, pressure, distance"));
@@ -382,7 +382,7 @@ fn first_autopilot_is_used_and_others_are_counted() {
 }
 
 #[test]
-fn log_of_many_systems_gives_the_readings_of_one() {
+fn log_of_many_systems_gives_the_readings_of_one_system() {
     let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
     for (first, believed) in [(autopilot, 1100.0), (Vec::new(), 800.0)] {
         let mut decoder = decoder(PRESSURE);

@@ -29,7 +29,7 @@ pub enum TlogError {
     /// The file ends within an entry.
     #[error("reading a telemetry log: the entry at byte {offset} is cut off")]
     Short {
-        /// Offset of the entry.
+        /// Offset of the entry in the file.
         offset: usize,
     },
     /// There is no frame at the expected offset.
@@ -37,9 +37,9 @@ pub enum TlogError {
         "reading a telemetry log: the entry at byte {offset} has 0x{got:02X} for a frame's start; 0xFE and 0xFD are allowed"
     )]
     Start {
-        /// Offset of the entry.
+        /// Offset of the entry in the file.
         offset: usize,
-        /// Byte found.
+        /// Byte found at the place of the frame's start.
         got: u8,
     },
 }

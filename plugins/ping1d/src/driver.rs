@@ -1,4 +1,4 @@
-//! Host side of an echosounder's line. The driver sends the settings first, and then gets a distance in each interval.
+//! Driver of a Ping echosounder. It sends the settings first, and then gets a distance in each ping interval.
 //!
 //! The device must acknowledge each setting. The driver requests distances, or the device sends them continuously.
 
@@ -10,16 +10,17 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use crate::codec::{Addressed, DeviceInformation, Frame, Frames, MAX_FRAME_BYTES, Message, id};
 use crate::settings::{Polling, Settings};
 
-/// Supported carriers.
+/// Carriers over which a Ping echosounder can be connected.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Udp, Carrier::Tcp];
 
-/// Longest usual gap within a frame.
+/// Longest usual gap between the bytes of a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
-/// Timeout of the answer to a setting or request. Source: Ping protocol, 50 ms, plus an allowance for a bridge.
+/// Timeout of the device's answer to a setting or request. Source: Ping protocol, 50 ms, plus an allowance
+/// for a bridge.
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
-/// Time that a distance may take beyond the interval.
+/// Time beyond the ping interval that the device has to answer a distance request.
 const PING_TIME: DurNs = DurNs::from_millis(250);
-/// Number of times that a setting is sent before the driver goes on to the next one.
+/// Number of times that a setting without an acknowledgement is sent before the next one is tried.
 const TRIES: u32 = 4;
 /// Interval at which the speed of sound is checked, since other clients of a bridge can change it.
 const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
@@ -35,14 +36,14 @@ enum Asked {
     Distance,
 }
 
-/// Driver of an echosounder.
+/// Driver of a Ping echosounder.
 pub struct PingDriver {
     settings: Settings,
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
     /// Messages to send before the next distance request.
     to_say: VecDeque<(Asked, Vec<u8>)>,
     asked: Option<(Asked, MonoNs)>,
-    /// The setting in flight, and its remaining retries.
+    /// The setting that awaits an acknowledgement, and its remaining retries.
     again: Option<(Vec<u8>, u32)>,
     next_at: MonoNs,
     look_at: MonoNs,
@@ -162,7 +163,7 @@ impl PingDriver {
         }
     }
 
-    /// Timeout of the answer to a message.
+    /// Timeout of the device's answer to this message.
     fn timeout(&self, asked: Asked) -> DurNs {
         match asked {
             Asked::Setting(_) => ANSWER_TIME,

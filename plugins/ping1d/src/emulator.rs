@@ -1,4 +1,4 @@
-//! An emulated echosounder, polled by an emulated or real host.
+//! An emulated Ping echosounder, polled by an emulated or real host.
 
 use std::collections::VecDeque;
 
@@ -17,7 +17,7 @@ use crate::settings::Settings;
 /// Listening range of an emulated device. It extends to the practical limit of a `Ping1D`.
 const SCAN: ScanRange = ScanRange { start_mm: 0, length_mm: 30_000 };
 
-/// Longest usual gap within a frame.
+/// Longest usual gap between the bytes of a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
 
 /// Broadcast device id.
@@ -59,10 +59,10 @@ pub struct PingEmulator {
     ping_at: Option<MonoNs>,
     /// Pings requested by a real host, not yet started.
     waiting: Vec<Sounding>,
-    /// Message ids of the answers to these pings.
+    /// Message ids of the answers to the pings that a real host has requested.
     asked: VecDeque<u16>,
     polled: bool,
-    /// Last frame sent.
+    /// Last frame that the device has sent.
     frame: Bytes<MAX_FRAME_BYTES>,
 }
 

@@ -17,15 +17,15 @@ use crate::emulator::PingEmulator;
 use crate::probe::PingProbe;
 use crate::settings::Settings;
 
-/// Name in vehicle files and logs.
+/// Name of this device kind in vehicle files and logs.
 const NAME: &str = "ping1d";
 
 /// Buffer for several of the longest frames.
 const RING_BYTES: usize = 1 << 16;
 
-/// Longest usual gap within a frame. An unfinished frame is dropped after this gap.
+/// Longest usual gap between the bytes of a frame. An unfinished frame is dropped after this gap.
 ///
-/// The gap is shorter than the usual interval, so a false frame start delays one reading at most.
+/// The gap is shorter than the usual ping interval, so a false frame start delays one reading at most.
 const SILENCE: DurNs = DurNs::from_millis(50);
 
 /// The Ping echosounder device kind.
@@ -47,7 +47,7 @@ impl DeviceKind for Ping1dKind {
     }
 }
 
-/// A configured echosounder.
+/// A Ping echosounder as configured in the vehicle file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ping1d {
     sensor: SensorConfig,
@@ -102,7 +102,7 @@ fn without_strengths(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     Some(())
 }
 
-/// Converts messages to readings, including distances that other clients requested.
+/// Converts the device's messages to readings, including distances that other clients requested.
 #[derive(Debug, Clone)]
 pub struct PingDecoder {
     codec: PingCodec,
@@ -147,7 +147,8 @@ impl Decoder for PingDecoder {
         self.codec.counts()
     }
 
-    /// Number of distances withheld: those of other device ids, and those with an undefined confidence.
+    /// Number of withheld distances: those of devices with another id, and those with an undefined
+    /// confidence.
     fn withheld(&self) -> u64 {
         self.withheld
     }

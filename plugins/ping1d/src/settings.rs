@@ -7,7 +7,7 @@ use headrace_sensor::geometry::time::DurNs;
 
 use crate::codec::ScanRange;
 
-/// Trigger of the pings.
+/// Trigger of the pings: host or device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Polling {
     /// The host requests each distance.
@@ -21,13 +21,13 @@ pub enum Polling {
 pub struct Settings {
     /// Minimum confidence, 0 to 1, of readings that navigation uses.
     pub min_confidence: f64,
-    /// Time between two pings.
+    /// Time between two successive pings.
     pub interval: DurNs,
     /// Speed of sound setting of the device, m/s.
     pub sound_speed_mps: f64,
     /// Device id on the line.
     pub device_id: u8,
-    /// Trigger of pings.
+    /// Trigger of the pings: host or device.
     pub polling: Polling,
     /// Listening range; `None` if the device chooses range and gain.
     pub scan: Option<ScanRange>,

@@ -20,10 +20,10 @@ use crate::uhid::{self, Identity, VirtualDevice};
 /// Baud rate that the host sets on an emulated serial port.
 const BAUD: u32 = 115_200;
 
-/// The device end of a line.
+/// The device end of an emulated line.
 pub struct EmulatedPort {
     end: End,
-    /// Address at which the host opens the other end.
+    /// Address at which the host opens its end of the line.
     connect: Connect,
 }
 
@@ -97,7 +97,7 @@ impl EmulatedPort {
         Ok(Self { end: End::Hid(device), connect })
     }
 
-    /// Opens a node on a CAN bus.
+    /// Opens a device end on a CAN bus.
     ///
     /// Errors: the interface doesn't exist.
     #[cfg(target_os = "linux")]
@@ -108,7 +108,7 @@ impl EmulatedPort {
         Ok(Self { end: End::Can { interface, socket }, connect })
     }
 
-    /// Returns the address at which the host opens the other end.
+    /// Returns the address at which the host opens its end of the line.
     pub fn connect(&self) -> &Connect {
         &self.connect
     }
@@ -160,7 +160,8 @@ impl EmulatedPort {
             }),
             #[cfg(target_os = "linux")]
             End::Can { .. } => return Ok(None),
-            // The kernel would return only events such as open and close here, and no messages.
+            // A HID device end receives no messages: the kernel would return only events such as open and
+            // close.
             End::Hid(_) => return Ok(None),
         };
         match read {
@@ -205,7 +206,7 @@ impl EmulatedPort {
     }
 }
 
-/// Waits until one of the ends has input, or until `wait_ns` nanoseconds have passed.
+/// Waits until one of the device ends has input, or until `wait_ns` nanoseconds have passed.
 pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a EmulatedPort>, wait_ns: u32) {
     // Pseudoterminals without a host are left out: they report a hang-up at once, so poll would never wait.
     let open = stands.into_iter().filter(|stand| !matches!(stand.end, End::Pty { .. }) || stand.is_called());
@@ -216,7 +217,7 @@ pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a EmulatedPort>, wait
     poll(&mut polled, Some(&wait)).unwrap_or_default();
 }
 
-/// Whether an error means that the host has closed the other end.
+/// Whether an error means that the host has closed the host end.
 fn is_gone(error: &io::Error) -> bool {
     /// A pseudoterminal's master returns this error while no host has the terminal open. Source: Linux, EIO.
     const EIO: i32 = 5;

@@ -1,5 +1,5 @@
-//! Lists attached serial ports, HID devices, CAN interfaces and I2C buses from the system's files, without opening
-//! any. Checks whether the target of a `connect` exists.
+//! Lists attached serial ports, HID devices, CAN interfaces and I2C buses from the system's files, without
+//! opening any. Also checks whether the port that a `connect` names exists.
 
 pub(crate) mod can;
 mod found;
@@ -28,18 +28,18 @@ pub fn discover(machine: &Machine) -> Vec<Found> {
     all
 }
 
-/// Result of a check of a `connect`'s target.
+/// Result of a check of the port or address that a `connect` names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Presence {
-    /// The target exists under this name and can be opened.
+    /// The port exists under this name and can be opened.
     There(String),
-    /// The target is a network address, which can only be checked by connecting.
+    /// The `connect` names a network address, which can only be checked by connecting.
     Elsewhere,
 }
 
-/// Checks whether the target of `connect` exists and can be opened, without opening it.
+/// Checks whether the port that `connect` names exists and can be opened, without opening it.
 ///
-/// Errors: the target is absent, ambiguous or not accessible; the error states the fix.
+/// Errors: the port is absent, ambiguous or not accessible; the error states the fix.
 pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, OpenError> {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => file(machine, path),
@@ -63,7 +63,7 @@ pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, OpenEr
     }
 }
 
-/// Returns the path of the only matching device.
+/// Returns the path of the only matching device file.
 fn one(what: &str, all: Vec<(String, UsbIdentity)>, wanted: &UsbIdentity) -> Result<String, OpenError> {
     let fitting = all.into_iter().filter(|(_, got)| serial::fits(got, wanted));
     let mut paths: Vec<String> = fitting.map(|(path, _)| path).collect();

@@ -1,4 +1,4 @@
-//! The lines' interface to the machine, which tests can replace.
+//! Interface of the lines to the machine's clock and ports, which tests can replace.
 
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::connect::Connect;
@@ -12,7 +12,7 @@ pub trait Host: Send + Sync {
     /// Returns the current time on the monotonic clock.
     fn now(&self) -> MonoNs;
 
-    /// Opens the target of a `connect`.
+    /// Opens the port or connection that a `connect` names.
     ///
     /// Errors: the cause, with its fix.
     fn open(&self, connect: &Connect) -> Result<Box<dyn Line>, OpenError>;

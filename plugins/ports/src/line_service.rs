@@ -1,4 +1,5 @@
-//! Service of one line: opens the line, serves its drivers, and reopens the line after a failure, indefinitely.
+//! Service of one line: opens the line, serves the drivers of its devices, and reopens the line after each
+//! failure.
 //!
 //! The service runs step by step. On real ports each service has its own thread.
 
@@ -28,14 +29,14 @@ const LONGEST_PAUSE: DurNs = DurNs::from_millis(4_000);
 const LONGEST_LOCAL_PAUSE: DurNs = DurNs::from_millis(1_000);
 /// Maximum wait between checks of the stop flag.
 const LOOK: Duration = Duration::from_millis(50);
-/// Period of device health checks.
+/// Interval between checks of the devices' health.
 const STANDING_PERIOD: DurNs = DurNs::from_millis(500);
-/// Uptime after which a disconnect resets the reconnect backoff.
+/// Time for which a line must have been open so that a disconnect resets the reconnect backoff.
 const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
 /// Keep-alive interval on an idle connection.
 const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 
-/// Receives line events that must be recorded without the loop. Line threads call it.
+/// Receives line events that are recorded without passing through the loop. Line threads call it.
 ///
 /// Sensors are numbered as in the vehicle file.
 pub trait LineRecord: Send + Sync {
@@ -52,9 +53,9 @@ pub trait LineRecord: Send + Sync {
 pub struct Attached {
     /// Sensor index, in the order of the vehicle file.
     pub source: usize,
-    /// Writing end of the sensor's ring.
+    /// Writing end of the sensor's ring buffer.
     pub port: Port,
-    /// Driver on the host's side.
+    /// Driver of the device, which runs on the host.
     pub driver: Box<dyn Driver>,
 }
 
@@ -63,9 +64,9 @@ pub struct Attached {
 pub struct Common {
     /// The host's clock and ports.
     pub host: Arc<dyn Host>,
-    /// Set to end all services.
+    /// Flag that ends the services of all lines.
     pub stopping: Arc<AtomicBool>,
-    /// Queue for changes of status.
+    /// Queue for changes of the devices' status.
     pub board: StatusQueue,
     /// Wakes the loop after packets have arrived.
     pub waker: Waker,
@@ -76,7 +77,7 @@ pub struct Common {
 /// A line and the devices on it.
 pub struct LineService {
     connect: Result<Connect, ConnectError>,
-    /// Addresses of earlier lines, in the order of the vehicle file.
+    /// Addresses of the lines that precede this one in the vehicle file.
     before: Vec<Connect>,
     devices: Vec<AttachedState>,
     senders: Senders,
@@ -106,12 +107,12 @@ struct OpenLine {
 struct AttachedState {
     attached: Attached,
     history: LineHistory,
-    /// Number of dropped packets already reported to the record, and time of that report.
+    /// Number of dropped packets already passed to [`LineRecord`], and time up to which they were counted.
     dropped_told: u64,
     dropped_until: MonoNs,
     status: Option<(Phase, String)>,
-    /// Number of good frames so far, and when the line was opened. Then the times of the last bytes and of the last
-    /// good frame.
+    /// Number of good frames so far, and the number when the line was opened. The two times are those of the
+    /// last bytes and of the last good frame.
     frames: u64,
     frames_before: u64,
     last_bytes: MonoNs,
@@ -125,7 +126,7 @@ enum Served {
     InSilence,
 }
 
-/// I/O requested by a driver during a callback.
+/// I/O that a driver has requested during a callback.
 enum IoRequest {
     Send(Vec<u8>),
     Exchange { write: Vec<u8>, settle: DurNs, read_bytes: usize },
@@ -158,7 +159,8 @@ impl Wire for Ends<'_> {
 impl LineService {
     /// Creates a closed line.
     ///
-    /// `before` are the addresses of earlier lines. The line isn't opened if one of them leads to the same device.
+    /// `before` are the addresses of the lines that precede it in the vehicle file. The line isn't opened if
+    /// one of these addresses leads to the same device.
     pub fn new(
         connect: Result<Connect, ConnectError>,
         before: Vec<Connect>,
@@ -182,7 +184,7 @@ impl LineService {
         Self { connect, before, devices, senders, common, state, pause: FIRST_PAUSE }
     }
 
-    /// Runs until all services are to end. Returns each sensor's line history.
+    /// Serves the line until the stop flag is set. Returns each sensor's line history.
     pub(crate) fn run(mut self) -> Vec<(usize, LineHistory)> {
         let sensors: Vec<usize> = self.devices.iter().map(|device| device.attached.source).collect();
         let address = self.connect.as_ref().map_or_else(|error| error.text.clone(), Connect::to_string);
@@ -248,7 +250,7 @@ impl LineService {
         self.devices.into_iter().map(history).collect()
     }
 
-    /// Opens the line, unless an earlier line uses the same device.
+    /// Opens the line, unless a preceding line of the vehicle file uses the same device.
     fn open_line(&self, connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
         match self.before.iter().find(|before| lines::same_device(before, connect)) {
             Some(other) => Err(OpenError::same_device(connect, other)),
@@ -309,7 +311,7 @@ impl LineService {
         }
         self.count_lost();
         match ended {
-            // No new status: the devices stay "silent" until they answer.
+            // The status isn't changed: the devices stay "silent" until they answer.
             Ok(()) => tracing::info!("no data, reopening the port"),
             Err(error) => self.lost(&error),
         }
@@ -387,7 +389,7 @@ impl LineService {
         Ok(Served::Open)
     }
 
-    /// Reports the packets dropped since the last report to the record.
+    /// Passes the number of packets dropped since the last report to [`LineRecord`].
     fn tell_dropped(&mut self) {
         let now = self.common.host.now();
         for AttachedState { attached, history, dropped_told, dropped_until, .. } in &mut self.devices {
@@ -401,7 +403,7 @@ impl LineService {
 
     /// Adds messages dropped by the carrier to the losses of the line's first device.
     ///
-    /// The device that sent them isn't known.
+    /// The device that sent the dropped messages isn't known.
     fn count_dropped(&mut self, line: &mut dyn Line) {
         let dropped = line.dropped();
         if let Some(first) = self.devices.first_mut().filter(|_| dropped > 0) {
@@ -429,8 +431,8 @@ impl LineService {
 
     /// Wakes drivers that are due, unless another driver on the line awaits an answer.
     ///
-    /// Several drivers may await answers, e.g. just after the line was opened. Then the first one times out first;
-    /// otherwise all would wait for each other indefinitely.
+    /// Several drivers may await answers, e.g. just after the line was opened. In that case the first one
+    /// times out first; otherwise all would wait for each other indefinitely.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();
@@ -483,7 +485,7 @@ impl LineService {
         }
     }
 
-    /// Updates the status of each device. A problem that the line itself reports overrides them.
+    /// Updates the status of each device. A problem that the line itself reports overrides these statuses.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
             let (phase, words) = device.judge(now);
@@ -498,7 +500,7 @@ impl LineService {
     }
 }
 
-/// Adds the accepted sender and the rejected senders to the text of a status, where there are any.
+/// Adds the accepted sender and the rejected senders, if any, to the text of a status.
 fn with_senders(words: String, phase: Phase, senders: &Senders, driver: &dyn Driver) -> String {
     let from = senders.believed.filter(|_| phase == Phase::Running).map(|sender| format!("from {sender}"));
     let parts = [(!words.is_empty()).then_some(words), from, senders.strangers.words()];
@@ -519,7 +521,7 @@ impl AttachedState {
         now.since(self.last_bytes) > self.attached.driver.silence_timeout()
     }
 
-    /// Returns the device's phase, with the reason.
+    /// Returns the phase of the device, with its reason.
     fn judge(&mut self, now: MonoNs) -> (Phase, String) {
         let silence_timeout = self.attached.driver.silence_timeout();
         let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
@@ -551,7 +553,7 @@ impl AttachedState {
         }
     }
 
-    /// Posts a status to the queue if it has changed.
+    /// Posts a device's status to the queue if it has changed.
     fn say(&mut self, board: &StatusQueue, since: MonoNs, phase: Phase, words: &str) {
         if self.status.as_ref().is_some_and(|(last, said)| *last == phase && said == words) {
             return;

@@ -15,7 +15,7 @@ pub enum OpenErrorKind {
     Denied,
     /// Another program uses the port.
     Busy,
-    /// Several devices match.
+    /// Several devices match the `connect`.
     Ambiguous,
     /// Any other reason.
     Other,

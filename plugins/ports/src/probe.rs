@@ -1,4 +1,4 @@
-//! Identifies the device on a line.
+//! Identifies the device on a line by queries.
 
 use std::io;
 use std::time::Duration;
@@ -69,5 +69,5 @@ fn ask(line: &mut dyn Line, probe: &mut dyn Probe, bytes: &mut u64) -> io::Resul
     Ok(None)
 }
 
-/// Shortest wait; a wait of zero would mean no timeout.
+/// Shortest wait for bytes, since a wait of zero would mean no timeout.
 const SHORTEST: Duration = Duration::from_millis(1);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
 
-/// Phase of a device and its line.
+/// Phase of a device's connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
     /// The line isn't open.
@@ -40,11 +40,11 @@ impl Phase {
 pub struct Status {
     /// Sensor index, in the order of the vehicle file.
     pub source: usize,
-    /// Start time of the status.
+    /// Time at which the status began.
     pub since: MonoNs,
     /// Phase of the device.
     pub phase: Phase,
-    /// Reason and fix; for a running device, its identity.
+    /// Text about the phase: reason and fix; for a running device, its identity.
     pub words: String,
 }
 
@@ -66,7 +66,7 @@ pub struct LineHistory {
     pub dropped: u64,
     /// Number of messages from rejected senders.
     pub strangers: u64,
-    /// Last status, as text.
+    /// Last status of the device, as text.
     pub last: String,
 }
 
@@ -82,7 +82,7 @@ struct Shared {
 }
 
 impl StatusQueue {
-    /// Creates a queue for `capacity` statuses.
+    /// Creates a queue that holds `capacity` statuses.
     pub fn new(capacity: usize) -> Self {
         let statuses = ArrayQueue::new(capacity.max(1));
         Self { shared: Arc::new(Shared { statuses, dropped: AtomicU64::new(0) }) }

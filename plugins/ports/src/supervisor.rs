@@ -21,9 +21,9 @@ use crate::line_service::{Attached, Common, LineRecord, LineService};
 use crate::status::{LineHistory, Status, StatusQueue};
 use crate::wake::{self, Waker};
 
-/// Capacity of the queue of statuses.
+/// Capacity of the queue of device statuses.
 const BOARD: usize = 256;
-/// Loop period while no input arrives.
+/// Longest time between two ticks of the loop while no input arrives.
 const PERIOD: Duration = Duration::from_millis(20);
 /// Pause while the loop waits for a slow output.
 const BEHIND: Duration = Duration::from_millis(1);
@@ -34,9 +34,9 @@ pub struct Connection {
     pub source: usize,
     /// Address of the sensor, or the reason why it doesn't parse.
     pub connect: Result<Connect, ConnectError>,
-    /// Writing end of the sensor's ring.
+    /// Writing end of the sensor's ring buffer.
     pub port: Port,
-    /// Driver on the host's side.
+    /// Driver of the device, which runs on the host.
     pub driver: Box<dyn Driver>,
 }
 
@@ -76,7 +76,7 @@ impl Supervisor {
         Ok(supervisor)
     }
 
-    /// Takes the oldest change of status.
+    /// Takes the oldest change of a device's status from the queue.
     pub fn next_status(&self) -> Option<Status> {
         self.board.next()
     }
@@ -88,7 +88,7 @@ impl Supervisor {
 
     /// Stops all threads and drains the rings. Returns each sensor's line history, in the order of the sensors.
     pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
-        // A thread that panicked has reported so itself. Its histories are replaced by this one.
+        // A thread that panicked has reported that itself. This history replaces those of its sensors.
         let ended_early =
             LineHistory { last: "its thread has ended early".to_owned(), ..LineHistory::default() };
         let mut all = vec![ended_early; self.sensors];
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn model_detects_a_stop_that_drains_too_early() {
+    fn loom_model_detects_a_stop_that_drains_too_early() {
         line_and_stop("the lines' stop, drained first", |tell, wait, drain| wind_up(tell, drain, wait));
     }
 }

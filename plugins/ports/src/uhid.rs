@@ -56,9 +56,9 @@ pub enum UhidError {
         what: &'static str,
         /// Length of the field, bytes.
         bytes: usize,
-        /// Minimum length, bytes.
+        /// Minimum length of the field, bytes.
         least: usize,
-        /// Maximum length, bytes.
+        /// Maximum length of the field, bytes.
         most: usize,
     },
     /// The kernel refused an event.
@@ -74,7 +74,7 @@ pub enum UhidError {
     Cut {
         /// Name of the event.
         event: &'static str,
-        /// Number of bytes accepted.
+        /// Number of bytes of the event that the kernel accepted.
         taken: usize,
         /// Length of the event, bytes.
         bytes: usize,
@@ -99,7 +99,8 @@ impl<W: Write> VirtualDevice<W> {
         Ok(Self { kernel })
     }
 
-    /// Sends an input report of 1 to 4096 bytes. It begins with its id if the descriptor has report ids.
+    /// Sends an input report of 1 to 4096 bytes. The report begins with its id if the descriptor has report
+    /// ids.
     pub fn report(&mut self, report: &[u8]) -> Result<(), UhidError> {
         send(&mut self.kernel, "input report", &input(report)?)
     }
@@ -120,7 +121,7 @@ fn create(identity: &Identity<'_>) -> Result<Vec<u8>, UhidError> {
     push_text(&mut event, "a serial number", identity.serial, SERIAL_BYTES)?;
     event.extend(size.to_ne_bytes());
     event.extend(BUS_USB.to_ne_bytes());
-    // Version and country are zero.
+    // The fields version and country are zero.
     for word in [u32::from(identity.vendor_id), u32::from(identity.product_id), 0, 0] {
         event.extend(word.to_ne_bytes());
     }
@@ -175,7 +176,8 @@ mod tests {
         descriptor: &DESCRIPTOR,
     };
 
-    /// A kernel that records each write, and accepts at most a given number of bytes of each.
+    /// A stand-in for the kernel that records each write, and accepts at most a given number of bytes of
+    /// each.
     #[derive(Debug)]
     struct Events {
         taken: Vec<Vec<u8>>,

@@ -10,20 +10,20 @@ use std::time::Duration;
 
 /// Functions that park threads: those of the system, or those of a model.
 pub trait Threads {
-    /// Handle of a thread.
+    /// Handle by which a thread can be woken.
     type Thread: Clone;
 
     /// Returns a handle of this thread.
     fn current() -> Self::Thread;
 
-    /// Sets a thread's token.
+    /// Sets a thread's token, which ends the thread's wait.
     fn unpark(thread: &Self::Thread);
 
     /// Waits for this thread's token, at most this long, and takes it.
     fn park(at_most: Duration);
 }
 
-/// Threads of the system.
+/// Threads of the operating system.
 pub struct System;
 
 impl Threads for System {
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     #[should_panic = "deadlock"]
-    fn model_detects_a_wake_before_the_send() {
+    fn loom_model_detects_a_wake_before_the_send() {
         explore("wake-up before the packet", Some(4), || line_and_loop(2, true));
     }
 }

@@ -11,7 +11,7 @@ use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
 use crate::tracker::{CountTracker, Counting, TrackerHealth};
 
-/// Longest usual gap within a line. An unfinished line is dropped after this gap.
+/// Longest usual gap between the bytes of a line. An unfinished line is dropped after this gap.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 const MILLISECOND: DurNs = DurNs::from_millis(1);
@@ -19,11 +19,11 @@ const MILLISECOND: DurNs = DurNs::from_millis(1);
 /// Decoding settings of a HID counter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counter {
-    /// Report layout.
+    /// Layout of the counter's reports.
     pub layout: ReportLayout,
     /// Whether the auxiliary value is the device time in milliseconds.
     pub auxiliary_is_ms: bool,
-    /// Whether counts are absolute or changes.
+    /// Whether the reported counts are absolute or changes.
     pub counting: Counting,
     /// Counts per metre of cable; negative if the count falls as cable is paid out.
     pub counts_per_metre: f64,
@@ -36,13 +36,13 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Smallest change of the displayed length, m.
+    /// Resolution of the length, m.
     pub fn resolution_m(&self) -> f64 {
         self.step_m.max(1.0 / self.counts_per_metre.abs())
     }
 }
 
-/// Decodes reports into readings.
+/// Decodes a HID counter's reports into readings.
 #[derive(Debug, Clone)]
 pub struct HidDecoder {
     codec: ReportCodec,
@@ -54,7 +54,7 @@ pub struct HidDecoder {
 
 stateful!(HidDecoder { state: codec, tracker, clock, status; fixed: counter; });
 
-/// Decodes lines into readings.
+/// Decodes a line monitor's text lines into readings.
 #[derive(Debug, Clone)]
 pub struct LineDecoder {
     codec: LineCodec,
@@ -66,7 +66,7 @@ pub struct LineDecoder {
 stateful!(LineDecoder { state: codec, clock; fixed: metres_per_unit, latency; });
 
 impl HidDecoder {
-    /// Creates a decoder.
+    /// Creates a decoder of HID reports.
     ///
     /// Errors: the layout is invalid.
     pub fn new(counter: Counter) -> Result<Self, LayoutError> {

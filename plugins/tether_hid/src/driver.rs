@@ -1,4 +1,4 @@
-//! Host side of a counter's line. The driver only listens.
+//! Driver of a cable counter, which only listens to the line.
 
 use headrace_sensor::driver::{Carrier, Listener, MessageListener};
 use headrace_sensor::geometry::time::DurNs;
@@ -6,13 +6,13 @@ use headrace_sensor::geometry::time::DurNs;
 use crate::line::{Lines, MAX_LINE_BYTES};
 use crate::report::ReportLayout;
 
-/// Supported carriers of HID reports.
+/// Carriers over which a HID counter can be connected.
 pub const REPORT_CARRIERS: [Carrier; 2] = [Carrier::Hid, Carrier::Udp];
-/// Supported carriers of text lines.
+/// Carriers over which a counter with text lines can be connected.
 pub const LINE_CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Tcp, Carrier::Udp];
 
 const PATIENCE: DurNs = DurNs::from_millis(5_000);
-/// Longest usual gap within a line.
+/// Longest usual gap between the bytes of a line.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// Driver of a HID counter.

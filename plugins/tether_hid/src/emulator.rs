@@ -1,4 +1,4 @@
-//! Counter side of the line. The emulator sends a report, or a text line, at a fixed rate.
+//! Emulates a cable counter, which sends a report or a text line at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;
@@ -13,7 +13,7 @@ use crate::tracker::Counting;
 /// Status byte of an emulated counter, which means valid.
 const STATUS_WELL: u8 = 1;
 
-/// Number of decimal places in an emulated line, for millimetres.
+/// Number of decimal places of lengths in an emulated line, so that they are in millimetres.
 const LINE_PLACES: u8 = 3;
 
 /// Settings of the emulated counter.
@@ -56,7 +56,7 @@ impl CounterSettings {
         DurNs::from_secs_f64(report as f64 / self.rate_hz)
     }
 
-    /// Appends the reports before `until`, starting at number `begun`.
+    /// Appends the reports that are due before `until`, beginning with report number `begun`.
     fn begin(&self, start: MonoNs, begun: &mut u64, until: MonoNs, due: &mut Vec<Payout>) {
         while start + self.elapsed(*begun) < until {
             due.push(Payout::due(start + self.elapsed(*begun)));
@@ -111,7 +111,7 @@ impl Emulator<Payout> for HidEmulator {
 }
 
 impl LineEmulator {
-    /// Creates a monitor that is switched on, and first sends a line, at `start`.
+    /// Creates a line monitor that is switched on, and first sends a line, at `start`.
     pub fn new(reeling: CounterSettings, metres_per_unit: f64, start: MonoNs) -> Self {
         Self { reeling, metres_per_unit, start, begun: 0, before: None }
     }

@@ -15,7 +15,7 @@ use headrace_sensor::geometry::math;
 /// for themselves.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
-/// Maximum line length.
+/// Maximum length of a line, bytes.
 pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
 /// Offset in a template after `RD,`. A match up to this offset is unlikely to be chance.
@@ -47,7 +47,7 @@ pub struct Stamp {
     pub millisecond: u16,
 }
 
-/// One line, in the units configured in the monitor.
+/// One line of a monitor, in the units configured in the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineReading {
     /// Winch and time, which only LCI-90i lines have.
@@ -61,7 +61,7 @@ pub struct LineReading {
 }
 
 impl Decimal {
-    /// Zero.
+    /// The number zero.
     pub const ZERO: Self = Self { mantissa: 0, places: 0 };
 
     /// The number `mantissa` / 10^`places`; `None` if it doesn't fit eight characters.
@@ -84,12 +84,12 @@ impl Decimal {
         (0..=most_places).rev().find_map(with).unwrap_or(Self::ZERO)
     }
 
-    /// Value as a float.
+    /// Value of the number as a float.
     pub fn value(self) -> f64 {
         f64::from(self.mantissa) * self.quantum()
     }
 
-    /// Value of one unit in the last decimal place.
+    /// Value of one unit in the number's last decimal place.
     pub fn quantum(self) -> f64 {
         1.0 / POWERS_OF_TEN.get(usize::from(self.places)).copied().map_or(1.0, f64::from)
     }

@@ -13,7 +13,7 @@ use crate::emulator::{CounterSettings, HidEmulator, LineEmulator};
 use crate::report::{Endian, MAX_REPORT_BYTES, ReportLayout, Width};
 use crate::tracker::Counting;
 
-/// Name in vehicle files.
+/// Name of this device kind in vehicle files.
 pub const NAME: &str = "tether_hid";
 
 /// Buffer for a minute of reports at the usual rate.
@@ -25,7 +25,7 @@ const METRES_PER_FOOT: f64 = 0.3048;
 #[derive(Debug, Clone, Copy)]
 pub struct TetherHidKind;
 
-/// A configured cable counter.
+/// A cable counter as configured in the vehicle file.
 #[derive(Debug, Clone)]
 pub struct CableCounter {
     sensor: SensorConfig,
@@ -40,11 +40,11 @@ enum Wire {
     Line { metres_per_unit: f64 },
 }
 
-/// Defaults for a common type of counter.
+/// Default keys for a common type of counter.
 #[derive(Clone, Copy)]
 struct Preset {
     counts_per_metre: f64,
-    /// Standard deviation without rounding, m. The cable slips a little on its wheel.
+    /// Standard deviation of the length, excluding rounding, m. The cable slips a little on its wheel.
     sd_m: f64,
 }
 
@@ -57,7 +57,7 @@ const PRESETS: [(&str, Preset); 2] = [
     ("magnet_wheel", Preset { counts_per_metre: 100.0, sd_m: 0.01 }),
 ];
 
-/// Allowed steps of wheels, m.
+/// Smallest and largest allowed step of a counter's wheel, m.
 const STEP_M: core::ops::RangeInclusive<f64> = 1e-5..=1.0;
 
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
-/// Maximum report length: an id and the payload of a full-speed interrupt transfer.
+/// Maximum length of a report, bytes: an id and the payload of a full-speed interrupt transfer.
 pub const MAX_REPORT_BYTES: usize = 65;
 
 /// Report descriptor of the reference layout: vendor page 0xFF00, usage 1, report id 1, 80 bits of input.
@@ -26,20 +26,20 @@ pub const REFERENCE_DESCRIPTOR: [u8; 59] = [
 /// Number of bits of a counter that wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Width {
-    /// One byte.
+    /// A count of one byte.
     Bits8,
-    /// Two bytes.
+    /// A count of two bytes.
     Bits16,
-    /// Four bytes.
+    /// A count of four bytes.
     Bits32,
 }
 
-/// Byte order of a counter.
+/// Byte order of a counter's reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Endian {
-    /// Least significant first.
+    /// Least significant byte first.
     Little,
-    /// Most significant first.
+    /// Most significant byte first.
     Big,
 }
 
@@ -66,7 +66,7 @@ pub struct ReportLayout {
     pub auxiliary_offset: Option<usize>,
 }
 
-/// One report.
+/// One report of a HID counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Report {
     /// Sequence number, if the layout has one.
@@ -79,7 +79,7 @@ pub struct Report {
     pub auxiliary: Option<i32>,
 }
 
-/// A reason why a layout is invalid.
+/// A reason why a report layout is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutError {
@@ -113,7 +113,7 @@ pub enum LayoutError {
 }
 
 impl Width {
-    /// Number of bits: 8, 16 or 32.
+    /// Number of bits of the count: 8, 16 or 32.
     pub fn bits(self) -> u32 {
         match self {
             Self::Bits8 => 8,

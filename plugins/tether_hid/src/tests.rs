@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, through the emulated counter.
+//! Tests the path from a vehicle file's table to a cable counter's readings, through the emulated counter.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;
@@ -176,7 +176,7 @@ fn line_has_the_time_of_its_first_byte() {
 }
 
 #[test]
-fn wrong_keys_are_named() {
+fn wrong_keys_of_the_vehicle_file_are_named() {
     let error = |own| configured(own).err().unwrap();
     assert_eq!(error("kind = \"hid\"\n"), "v.toml:1: counts_per_metre: is missing");
     assert!(error("counts_per_metre = 2000\nwidth_bits = 24\n").contains("must be 8, 16 or 32"));

@@ -17,17 +17,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Report, Width};
 
-/// Number of consecutive consistent reports that are needed to accept a jump.
+/// Number of consecutive reports, consistent with each other, that are needed to accept a jump of the count.
 pub const PERSIST: u32 = 5;
 
-/// Additional time allowed for a change, s. Reports queued in the kernel arrive together, with hardly any time between
-/// them.
+/// Additional time in which the winch may have caused a change of the count, s. Reports queued in the kernel
+/// arrive together, with hardly any time between them.
 const SLACK_S: f64 = 0.1;
 
 /// Maximum time for which a replugged device has counted before its first report, s.
 const FRESH_S: f64 = 1.0;
 
-/// Minimum silence of a device that is replugged. Source: USB 2.0, 7.1.7.3, debounce interval.
+/// Minimum silence of a device that is unplugged and plugged in again. Source: USB 2.0, 7.1.7.3, debounce
+/// interval.
 const AWAY: DurNs = DurNs::from_millis(100);
 
 /// Meaning of a report's count.
@@ -35,22 +36,22 @@ const AWAY: DurNs = DurNs::from_millis(100);
 pub enum Counting {
     /// Count since the device's zero. The count wraps.
     Absolute,
-    /// Change since the previous report.
+    /// Change of the count since the previous report.
     Delta,
 }
 
-/// Health of the tracker. Counters only grow, and the flag stays set.
+/// Health of a cable counter's tracking. The numbers only grow, and the flag stays set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TrackerHealth {
     /// Number of reports rejected because the change was faster than the winch.
     pub rejected: u64,
     /// Number of reports missing from the sequence.
     pub lost: u64,
-    /// Whether counts may have been lost, so that the length's zero is uncertain.
+    /// Whether counts may have been lost, so that the zero of the cable length is uncertain.
     pub re_zero_needed: bool,
 }
 
-/// Tracks the count of a counter.
+/// Tracks the count of a cable counter through wraps, jumps and restarts.
 #[derive(Debug, Clone)]
 pub struct CountTracker {
     counting: Counting,
@@ -77,7 +78,7 @@ struct Seen {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     from_zero: bool,
-    /// Time of the first of these reports.
+    /// Time of the first of these rejected reports.
     since: MonoNs,
     last: Seen,
     agreeing: u32,
@@ -104,7 +105,7 @@ impl CountTracker {
         self.restart
     }
 
-    /// Health of the tracker.
+    /// Health of the counter's tracking.
     pub fn health(&self) -> TrackerHealth {
         self.health
     }
@@ -289,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn persistent_jump_is_accepted() {
+    fn persistent_jump_of_the_count_is_accepted() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let totals = take_all(&mut tracker, &[120_000, 90_000, 90_001, 90_002, 90_003, 90_004]);
         assert_eq!(totals, [Some(120_000), None, None, None, None, Some(90_004)]);

@@ -5,7 +5,7 @@
 use crate::entry::{Clock, Entry, Step};
 use crate::format::Format;
 
-/// Length of a SocketCAN `can_frame`.
+/// Length of a SocketCAN `can_frame`, bytes.
 const FRAME_BYTES: usize = 16;
 const EXTENDED: u32 = 1 << 31;
 const REMOTE: u32 = 1 << 30;
@@ -13,7 +13,7 @@ const STANDARD_IDS: u32 = 0x7FF;
 const EXTENDED_IDS: u32 = 0x1FFF_FFFF;
 const LONGEST_LINE: usize = 512;
 
-/// The candump format. Its streams are the CAN interfaces.
+/// The candump format, whose streams are the CAN interfaces.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Candump;
 
@@ -41,7 +41,7 @@ impl Format for Candump {
                 out.extend(entry);
                 Step::Took(used)
             }
-            // A last line without a newline may be truncated anywhere.
+            // At the end of the file, a line without a newline may be truncated anywhere.
             Err(_) if newline.is_none() => Step::More,
             Err(why) => Step::Lost(used, why),
         }
@@ -50,7 +50,7 @@ impl Format for Candump {
 
 const NO_LINE: &str = "no line of candump";
 
-/// Parses a line. Returns `None` for a frame that the logging machine sent itself.
+/// Parses a line of the file. Returns `None` for a frame that the logging machine sent itself.
 fn entry(line: &[u8]) -> Result<Option<Entry>, &'static str> {
     let line = str::from_utf8(line).map_err(|_| NO_LINE)?;
     let mut fields = line.split_ascii_whitespace();
@@ -89,7 +89,7 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let id = match id_text.len() {
         3 if number <= STANDARD_IDS => number,
         8 if number <= EXTENDED_IDS => number | EXTENDED,
-        // Error frames of the CAN controller keep their flag.
+        // Error frames of the CAN controller keep the flag in their identifier.
         8 if number >> 29 == 1 => number,
         _ => return Err(NO_LINE),
     };

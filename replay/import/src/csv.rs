@@ -14,11 +14,12 @@ use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::entry::{Clock, Entry, Step};
 use crate::format::Format;
 
-/// Maximum number of values per sensor.
+/// Maximum number of values that a sensor's reading has.
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
 
-/// A quantity of a sensor: name, index among the sensor's values, and allowed units with their factors to SI units.
+/// A quantity that a sensor measures: name, index among the sensor's values, and allowed units with their factors to
+/// SI units.
 type Quantity = (&'static str, usize, &'static [(&'static str, f64)]);
 
 const ANGLE: &[(&str, f64)] = &[("rad", 1.0), ("deg", PI / 180.0)];
@@ -29,7 +30,7 @@ const SPEED: &[(&str, f64)] = &[("m/s", 1.0)];
 pub(super) const PRESSURE: &[(&str, f64)] =
     &[("Pa", 1.0), ("hPa", 100.0), ("mbar", 100.0), ("kPa", 1000.0), ("bar", 1e5)];
 
-/// Returns the quantities of a kind of sensor; all of them are required.
+/// Returns the quantities that a kind of sensor measures. A table must have all of them.
 fn quantities(sense: Sense) -> &'static [Quantity] {
     match sense {
         Sense::Head => &[("angle", 0, ANGLE), ("range", 1, LENGTH)],
@@ -54,7 +55,7 @@ fn quantities(sense: Sense) -> &'static [Quantity] {
 /// The CSV format of a table with a known header. Its streams are the sensors' ids.
 pub struct Csv {
     separator: char,
-    /// Number of cells in a row.
+    /// Number of cells in a row of the table.
     cells: usize,
     time: (usize, u128),
     clock: Clock,
@@ -62,10 +63,10 @@ pub struct Csv {
     header_passed: bool,
 }
 
-/// A sensor, and the columns with its values.
+/// A sensor, and the table's columns with its values.
 struct Target {
     sensor: EmulatedSensor,
-    /// For each value, its column and the factor of its unit.
+    /// For each of the sensor's values, its column in the table, and the factor of its unit.
     columns: [Option<(usize, f64)>; SLOTS],
 }
 
@@ -77,7 +78,7 @@ impl Csv {
     pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
-        // Spreadsheets begin a file with a byte order mark.
+        // Spreadsheets may begin a file with a byte order mark.
         let header = header.trim_start_matches('\u{feff}');
         let names: Vec<&str> = header.trim().split(separator).map(cell).collect();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];
@@ -149,7 +150,7 @@ impl Format for Csv {
             return Step::Took(used);
         }
         if !is_ended {
-            // The last number may be truncated. It would then parse as another number.
+            // The last number in the row may be truncated, and would then parse as another number.
             return Step::Lost(used, "a last row without a line end: it may be cut short, and is skipped");
         }
         let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that aren't UTF-8 text") };
@@ -186,7 +187,8 @@ impl Target {
         Ok(())
     }
 
-    /// Encodes the values of a row. A row whose cells for this sensor are all empty gives no bytes.
+    /// Encodes a row's values for one sensor as the bytes that the sensor would have sent. If all cells for the
+    /// sensor are empty, there are no bytes.
     ///
     /// Errors: the reason, as text, if a cell can't be parsed or encoded.
     fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
@@ -219,7 +221,7 @@ impl Target {
     }
 }
 
-/// Builds a value from its parts; `None` if a part is missing from the row.
+/// Builds a sensor's value from the numbers in a row; `None` if a number is missing.
 ///
 /// A head with an angle and no range had no echo.
 fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<Value> {
@@ -234,7 +236,8 @@ fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<V
     })
 }
 
-/// Parses a decimal number of time units as nanoseconds. The conversion is exact, and the result is rounded down.
+/// Parses a decimal number of time units as nanoseconds. The conversion is exact except that the result is rounded
+/// down.
 fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     if whole.is_empty() || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {
@@ -244,7 +247,7 @@ fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let scale = 10_u128.checked_pow(u32::try_from(fraction.len()).ok()?)?;
     let part = if fraction.is_empty() { 0 } else { fraction.parse::<u128>().ok()? };
     let ns = whole.parse::<u128>().ok()?.checked_mul(unit_ns)?.checked_add(part * unit_ns / scale)?;
-    // The limit leaves room for the delays that emulators add.
+    // The limit on timestamps leaves room for the delays that emulators add.
     u64::try_from(ns).ok().filter(|ns| *ns < 1 << 62)
 }
 

@@ -2,7 +2,7 @@
 
 /// First bytes of an ArduPilot dataflash log.
 pub const DATAFLASH: [u8; 2] = *b"\xA3\x95";
-/// Number of bytes that recognition needs.
+/// Number of a file's first bytes that recognition needs.
 pub const ENOUGH_BYTES: usize = 64;
 
 /// Returns the probable kind of a file, as text; `None` if unknown.

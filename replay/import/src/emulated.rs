@@ -10,33 +10,34 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, So
 use headrace_sensor::reading::Level;
 use headrace_vehicle::VehicleConfig;
 
-/// Sample period that inertial samples state. The foreign values don't state theirs.
+/// Sample period stated in emulated inertial samples, because foreign logs don't give one.
 const PERIOD: DurNs = DurNs(10_000_000);
 
-/// A value for an emulator.
+/// A measured value, for an emulator to encode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
     /// A beam of a head: its angle, and its range if there was an echo.
     Beam(f64, Option<f64>),
-    /// Range of an echosounder; `None` without an echo.
+    /// Range of an echosounder, m; `None` without an echo.
     Range(Option<f64>),
-    /// Absolute pressure, Pa.
+    /// Absolute pressure at a depth sensor, Pa.
     Pressure(f64),
-    /// Attitude, turn rate, rad/s, and specific force, m/s^2. Parts that were not measured are NaN.
+    /// Attitude, turn rate, rad/s, and specific force, m/s^2, of an inertial unit. Parts that were not measured are
+    /// NaN.
     Inertia(Rot<Level, Sensor>, [f64; 3], [f64; 3]),
-    /// Velocity over ground, m/s.
+    /// Velocity over ground from a velocity log, m/s.
     Velocity([f64; 3]),
-    /// Chainage by paid-out cable length, m.
+    /// Chainage from a cable counter, by paid-out cable length, m.
     Payout(f64),
 }
 
 impl Value {
-    /// Whether the value is possible, by limits far beyond those of tunnels.
+    /// Whether the measured value is possible, by limits far beyond the values in tunnels.
     ///
     /// Larger values must be refused, because wire formats would wrap or clamp them into plausible ones.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
-        // NaN means "not measured", which is allowed.
+        // A NaN means "not measured", which is allowed.
         let known =
             |values: &[f64; 3], most: f64| values.iter().all(|value| value.is_nan() || value.abs() <= most);
         match self {
@@ -50,14 +51,14 @@ impl Value {
     }
 }
 
-/// Remark about ranges outside a head's range setting.
+/// Remark in the import's report about ranges outside a head's range setting.
 pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
-/// A sensor of the vehicle file.
+/// A sensor of the vehicle file, with the emulator that encodes its values.
 pub(super) struct EmulatedSensor {
     pub(super) id: String,
     pub(super) sense: Sense,
-    /// For a head, the measurable ranges, m, at the site's speed of sound.
+    /// For a head, least and greatest measurable range, m, at the site's speed of sound.
     reach_m: Option<[f64; 2]>,
     emulated: Emulated,
 }

@@ -1,9 +1,9 @@
-//! Entries of a foreign log, and results of parsing it.
+//! Entries of a foreign log, and the results of splitting the log into entries.
 
-/// Bytes that a foreign log recorded on one line.
+/// Bytes that a foreign log recorded on one line, at one time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
-    /// Timestamp, nanoseconds on the file's clock.
+    /// Timestamp of the entry, nanoseconds on the file's clock.
     pub stamp_ns: u64,
     /// Name of the line in the file, such as a CAN interface.
     pub stream: String,
@@ -11,7 +11,7 @@ pub struct Entry {
     pub bytes: Vec<u8>,
 }
 
-/// Result of parsing the next bytes of a file.
+/// Result of parsing the next bytes of a file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
     /// This many bytes were parsed. They may hold no entry.
@@ -20,32 +20,32 @@ pub enum Step {
     Lost(usize, &'static str),
     /// More bytes are needed. At the end of the file, this means that the last entry is truncated.
     More,
-    /// The same bytes hold further entries, so none of the bytes are consumed yet.
+    /// The same bytes hold further entries, so none of these bytes are consumed yet.
     Held,
 }
 
-/// Losses and remarks of a format at the end of an import, as text.
+/// Losses and remarks that a format reports at the end of an import, as text.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ImportReport {
-    /// Losses.
+    /// Losses of data.
     pub losses: Vec<String>,
-    /// Remarks that aren't losses.
+    /// Remarks that don't concern losses of data.
     pub remarks: Vec<String>,
 }
 
 /// Epoch of a format's timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
-    /// 1970 in UTC.
+    /// The timestamps count from 1970 in UTC.
     Utc,
-    /// 1970 in the unknown time zone of the machine that wrote the file.
+    /// The timestamps count from 1970 in the unknown time zone of the machine that wrote the file.
     Local,
-    /// An epoch that only this kind of file uses.
+    /// The timestamps count from an epoch that only this kind of file uses.
     Own,
 }
 
 impl Clock {
-    /// Returns the clock's name in the log's metadata.
+    /// Returns the epoch's name in the log's metadata.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Utc => "utc",

@@ -3,15 +3,15 @@
 use crate::entry::{Clock, Entry, ImportReport, Step};
 use crate::order::WINDOW_NS;
 
-/// Default limit for the bytes of a file held in memory. Longer entries are lost.
+/// Default limit for the bytes of a file held in memory. Entries longer than that are lost.
 const MOST_HELD: usize = 1 << 20;
 
 /// Splits a file of one kind into entries, without I/O. The caller supplies the bytes.
 pub trait Format {
-    /// Returns the epoch of the timestamps, as far as known from the bytes read.
+    /// Returns the epoch of the file's timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
-    /// Returns the maximum length of an entry, bytes.
+    /// Returns the maximum length of an entry in files of this format, bytes.
     fn most_held(&self) -> usize {
         MOST_HELD
     }
@@ -22,7 +22,7 @@ pub trait Format {
         WINDOW_NS
     }
 
-    /// Returns losses and remarks, at the end of the file.
+    /// Returns the format's losses and remarks, at the end of the file.
     fn told(&self) -> ImportReport {
         ImportReport::default()
     }

@@ -9,7 +9,7 @@ use headrace_imagenex881::logfile::{LogFile, LogFileError};
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImagenexFormat;
 
-/// Name of the line that carries all returns.
+/// Name of the line that carries all returns in an Imagenex file.
 pub const STREAM: &str = "imagenex";
 
 const DAY_NS: u64 = 86_400_000_000_000;

@@ -18,38 +18,38 @@ use crate::routing::Taker;
 /// Log time of a file's first entry. A simulated dive begins at the same log time.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Longest plausible gap between timestamps. A longer gap means that the clock was set, or the file has several
-/// recordings.
+/// Longest plausible gap between timestamps of a file. A longer gap means that the clock was set, or the file has
+/// several recordings.
 const LONGEST_GAP: DurNs = DurNs(3_600_000_000_000);
 
-/// A file being imported.
+/// A foreign log that is being imported.
 pub struct Import<S> {
     pub(crate) input: S,
     pub(crate) order: Order,
-    /// Timestamp of the file that becomes [`BEGIN`] in the log.
+    /// Timestamp of the file that corresponds to the log time [`BEGIN`].
     first_ns: u64,
     clock: Clock,
 }
 
-/// Result of an import.
+/// Result of importing a foreign log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Imported {
-    /// Number of entries in the file.
+    /// Number of entries in the foreign log.
     pub entries: u64,
     /// Number of entries that belong to no sensor, because of their line or content.
     pub passed_over: u64,
     /// Number of messages written for each source of the log.
     pub messages: Vec<u64>,
-    /// Log time of the last message.
+    /// Log time of the last message written.
     pub last: MonoNs,
-    /// Losses, as text.
+    /// Losses of the import, as text.
     pub losses: Vec<String>,
-    /// Remarks that aren't losses.
+    /// Remarks on the import that aren't losses, as text.
     pub remarks: Vec<String>,
 }
 
 impl<R: Read> Import<Input<R>> {
-    /// Opens a file, and reads until its start time is known. `what` is the name of its entries.
+    /// Opens a file, and reads until its start time is known. `what` is the name of its entries in error texts.
     ///
     /// Errors: the file can't be read, or has no entry.
     pub fn open(
@@ -63,7 +63,8 @@ impl<R: Read> Import<Input<R>> {
 }
 
 impl<S: Source> Import<S> {
-    /// Opens a source of entries, and reads until its start time is known. `what` is the name of its entries.
+    /// Opens a source of entries, and reads until its start time is known. `what` is the name of its entries in error
+    /// texts.
     ///
     /// Errors: the source can't be read, or has no entry.
     pub fn of(mut input: S, what: &'static str) -> Result<Self, ImportError> {
@@ -82,7 +83,7 @@ impl<S: Source> Import<S> {
         Ok(Self { input, order, first_ns, clock })
     }
 
-    /// Returns metadata for the log: the clock's epoch and, if known, the time of day at the start.
+    /// Returns metadata for the log: the epoch of the file's clock and, if known, the time of day at the start.
     pub fn clock_metadata(&self) -> Vec<(String, String)> {
         let mut all = vec![("import_clock".to_owned(), self.clock.as_str().to_owned())];
         if self.clock == Clock::Utc {

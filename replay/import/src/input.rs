@@ -1,4 +1,4 @@
-//! Sources of entries: files, with the formats that split them.
+//! Input files of an import, each with the format that splits it into entries.
 
 use std::io::Read;
 
@@ -8,12 +8,12 @@ use crate::format::Format;
 use crate::losses::Losses;
 use crate::order::Order;
 
-/// Read size, bytes.
+/// Number of bytes read from the file at once.
 pub(crate) const READ_BYTES: usize = 1 << 16;
 
 /// A source of entries: a file split by a [`Format`], or a file with a reader of its own.
 pub trait Source {
-    /// Returns the file name.
+    /// Returns the name of the file.
     fn name(&self) -> &str;
 
     /// Adds the next entries to `order`. Returns `false` at the end of the file.
@@ -21,28 +21,28 @@ pub trait Source {
     /// Errors: reading the file fails.
     fn more(&mut self, order: &mut Order) -> Result<bool, ImportError>;
 
-    /// Returns the epoch of the timestamps, as far as known from the bytes read.
+    /// Returns the epoch of the file's timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
     /// Returns the longest time by which an entry may follow entries with later timestamps, ns.
     fn reach_ns(&self) -> u64;
 
-    /// Returns the number of bytes read.
+    /// Returns the number of bytes read from the file so far.
     fn bytes(&self) -> u64;
 
-    /// Returns losses and remarks so far.
+    /// Returns losses and remarks of the import so far.
     fn told(&self) -> ImportReport;
 }
 
-/// A file and the format that splits it.
+/// A file, and the format that splits it into entries.
 pub struct Input<R, F = Box<dyn Format>> {
     name: String,
     reader: R,
     pub(crate) format: F,
     pub(crate) held: Vec<u8>,
-    /// Number of bytes of the buffer already consumed.
+    /// Number of bytes at the start of the buffer that are already consumed.
     done: usize,
-    /// Offset in the file of the buffer's first byte.
+    /// Offset of the buffer's first byte in the file.
     offset: u64,
     end: bool,
     found: Vec<Entry>,
@@ -106,7 +106,7 @@ impl<R: Read, F: Format> Source for Input<R, F> {
 }
 
 impl<R: Read, F: Format> Input<R, F> {
-    /// Creates a source from a file that hasn't been read yet.
+    /// Creates an input from a file that hasn't been read yet.
     pub fn new(name: &str, reader: R, format: F) -> Self {
         Self {
             name: name.to_owned(),

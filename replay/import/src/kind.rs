@@ -14,13 +14,13 @@ use crate::tlog::{self, TlogFormat};
 /// A kind of foreign log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
-    /// Telemetry log of MAVLink.
+    /// Telemetry log of the MAVLink protocol.
     Tlog,
-    /// Text of `candump -l` or `-L`.
+    /// Text log of `candump -l` or `candump -L`.
     Candump,
     /// File of Imagenex's software for the heads 881 and 852.
     Imagenex,
-    /// Log of Ping Viewer.
+    /// Log of the program Ping Viewer.
     Ping,
     /// Table of values, with a mapping that describes its columns.
     Csv,
@@ -31,11 +31,11 @@ pub enum FileKind {
 }
 
 impl FileKind {
-    /// All kinds, in the order of their listing.
+    /// All kinds of foreign logs, in the order in which help lists them.
     pub const ALL: [Self; 7] =
         [Self::Tlog, Self::Candump, Self::Imagenex, Self::Ping, Self::Csv, Self::Rosbag, Self::Mcap];
 
-    /// Recognises a kind by the extension of a file name, in upper or lower case.
+    /// Recognises a kind of file by the extension of its name, in upper or lower case.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
         match extension.as_str() {
@@ -50,7 +50,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the name of the kind.
+    /// Returns the name of this kind of file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Tlog => "tlog",
@@ -63,7 +63,7 @@ impl FileKind {
         }
     }
 
-    /// Finds a kind by its name.
+    /// Finds a kind of file by its name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
@@ -133,7 +133,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the form of a line's name, for messages.
+    /// Returns the form of a line's name in files of this kind, for messages.
     pub(crate) fn line_form(self) -> &'static str {
         match self {
             Self::Tlog => tlog::STREAM,

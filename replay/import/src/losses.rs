@@ -12,7 +12,7 @@ pub(super) struct Losses {
     last: Option<(u64, &'static str)>,
     cut_off: Option<(u64, usize)>,
     late: u64,
-    /// Number of gaps, then length and time of the first gap.
+    /// Number of gaps between timestamps, then length and time of the first gap.
     gaps: Option<(u64, u64, MonoNs)>,
 }
 
@@ -32,12 +32,12 @@ impl Losses {
         self.last = Some((at + bytes as u64, why));
     }
 
-    /// Notes that the file ends within an entry.
+    /// Notes that the foreign log ends within an entry.
     pub(super) fn cut_off(&mut self, at: u64, bytes: usize) {
         self.cut_off = Some((at, bytes));
     }
 
-    /// Counts entries dropped because their timestamps came too late in the file to be put in order.
+    /// Counts entries dropped because they came too late in the file to be put in time order.
     pub(super) fn late(&mut self, count: u64) {
         self.late = count;
     }
@@ -48,7 +48,7 @@ impl Losses {
         self.gaps = Some((count + 1, first_ns, first_at));
     }
 
-    /// Returns all losses as text.
+    /// Returns all losses of the import as text.
     pub(super) fn words(&self) -> Vec<String> {
         let mut all: Vec<String> = self
             .kinds

@@ -1,4 +1,4 @@
-//! Puts entries in time order, with bounded memory.
+//! Puts entries of a foreign log in time order, with bounded memory.
 
 use std::collections::BTreeMap;
 
@@ -6,13 +6,13 @@ use crate::entry::Entry;
 
 /// Entries within this time of the latest timestamp are held back, because older entries may still follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
-/// Maximum number of entries held back, whatever their timestamps.
+/// Maximum number of entries held back for sorting, whatever their timestamps.
 const MOST_ENTRIES: usize = 1 << 15;
 const MOST_BYTES: usize = 1 << 24;
 /// Maximum number of entries held back for formats whose entries may come later than [`WINDOW_NS`].
 const MOST_REACHING: usize = 1 << 18;
 
-/// Returns entries in order of their timestamps. Entries with equal timestamps keep their order in the file.
+/// Sorts entries by their timestamps. Entries with equal timestamps keep their order in the file.
 #[derive(Debug)]
 pub struct Order {
     window_ns: u64,
@@ -31,13 +31,13 @@ impl Default for Order {
 }
 
 impl Order {
-    /// Creates an order for entries that may come up to `window_ns` late.
+    /// Creates an order for entries that may follow entries with timestamps up to `window_ns` later.
     pub(super) fn reaching(window_ns: u64) -> Self {
         let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
         Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }
     }
 
-    /// Adds an entry. Drops and counts it if a later one has already been returned.
+    /// Adds an entry. If an entry with a later timestamp has already been returned, drops and counts the new entry.
     pub(super) fn push(&mut self, entry: Entry) {
         if entry.stamp_ns < self.given_ns {
             self.late += 1;
@@ -48,7 +48,7 @@ impl Order {
         self.held.insert((entry.stamp_ns, self.count), entry);
     }
 
-    /// Whether an entry must be taken out before another one is added.
+    /// Whether an entry must be taken out before another entry is added.
     pub(super) fn is_full(&self) -> bool {
         let ends = self.held.first_key_value().zip(self.held.last_key_value());
         let spans = ends.is_some_and(|((first, _), (last, _))| last.0 - first.0 > self.window_ns);

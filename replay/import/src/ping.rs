@@ -10,12 +10,12 @@ use crate::format::Format;
 #[derive(Debug, Default)]
 pub struct PingFormat {
     begun: bool,
-    /// Number of midnights passed since the first message.
+    /// Number of midnights passed since the log's first message.
     days: u64,
     last_of_day_ns: u64,
 }
 
-/// Name of the line that carries all messages.
+/// Name of the line that carries all messages in a Ping Viewer log.
 pub const STREAM: &str = "ping";
 
 /// Number of texts in the preface after the title and the version. Two numbers follow them.
@@ -24,10 +24,10 @@ const TITLE: &str = "PingViewer sensor log file";
 const DAY_NS: u64 = 86_400_000_000_000;
 /// A step back in time by more than this means a new day. A smaller step means entries out of order.
 const MIDNIGHT_NS: u64 = DAY_NS / 2;
-/// Upper bound on the length of a text or message, bytes.
+/// Upper bound on the length of a text or message in the log, bytes.
 const MOST_BYTES: usize = 1 << 16;
 
-/// Reason why a field can't be read: more bytes are needed, or it is invalid.
+/// Reason why a field can't be read: more bytes are needed, or the field is invalid.
 enum Stop {
     More,
     Bad,
@@ -44,7 +44,7 @@ impl Format for PingFormat {
         match done {
             Ok(()) => Step::Took(front.len() - rest.len()),
             Err(Stop::More) => Step::More,
-            // Records have no sync mark, so none can be found after damage.
+            // Records of this file format have no sync mark, so no record can be found after damage.
             Err(Stop::Bad) if self.begun => {
                 Step::Lost(front.len(), "no time and message where they are expected")
             }

@@ -1,4 +1,5 @@
-//! Assigns lines of a foreign log to the sensors that receive them.
+//! Assigns the lines of a foreign log to sensors. A line is a connection whose data was recorded, such as a CAN
+//! interface.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_replay::log::SourceInfo;
@@ -7,11 +8,11 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::kind::FileKind;
 
-/// Receives the data of one sensor.
+/// A sensor that receives data of the file.
 pub struct Taker {
-    /// Source number of the sensor in the log.
+    /// Number of the sensor's source in the log.
     pub source: u16,
-    /// Name of the line that the sensor receives.
+    /// Name of the line in the foreign log whose data the sensor receives.
     pub stream: String,
     /// Driver that picks the sensor's data from a shared line. Without a driver, the sensor gets everything on the
     /// line.
@@ -32,12 +33,12 @@ impl Wire for Heard {
 }
 
 impl Taker {
-    /// Whether the sensor receives this line.
+    /// Whether the sensor receives the data of this line.
     pub(super) fn listens_to(&self, stream: &str) -> bool {
         self.stream == stream
     }
 
-    /// Returns the sensor's packets in an entry.
+    /// Returns the sensor's packets in an entry of the file.
     pub(super) fn take(&mut self, at: MonoNs, bytes: &[u8]) -> Vec<(MonoNs, Vec<u8>)> {
         let mut heard = Heard(Vec::new());
         match &mut self.driver {
@@ -57,7 +58,7 @@ pub enum RoutingError {
     /// An option names a sensor that the vehicle file doesn't have.
     #[error("--source {id}: the vehicle file has no such sensor; allowed are {allowed}")]
     NoSuchSensor {
-        /// Name in the option.
+        /// Name of the sensor in the option.
         id: String,
         /// Ids of the sensors in the vehicle file.
         allowed: String,
@@ -67,7 +68,7 @@ pub enum RoutingError {
     NoTaker {
         /// Description of sensors that could receive the data.
         which: String,
-        /// Form of a line's name.
+        /// Form of a line's name in such a file.
         line: &'static str,
     },
     /// The file comes from one device, but several sensors could be that device.
@@ -75,45 +76,45 @@ pub enum RoutingError {
         "the file comes from one device, but {several} have plugin {plugin}; choose one with --source ID={line}"
     )]
     SeveralTakers {
-        /// Ids of these sensors.
+        /// Ids of the sensors that the device could be.
         several: String,
-        /// Plugin of these sensors.
+        /// Plugin that these sensors have in common.
         plugin: &'static str,
-        /// Form of a line's name.
+        /// Form of a line's name in such a file.
         line: &'static str,
     },
     /// The file contains values, and there is no vehicle file with sensors that could encode them.
     #[error("{format} needs --vehicle VEHICLE.toml, whose sensors encode its values")]
     NoVehicle {
-        /// Kind of file.
+        /// Kind of the file that contains values.
         format: &'static str,
     },
     /// Neither a vehicle file nor an option names a sensor.
     #[error("the sensors of the messages are unknown; give --vehicle VEHICLE.toml or --source ID={line}")]
     NoSensor {
-        /// Form of a line's name.
+        /// Form of a line's name in such a file.
         line: &'static str,
     },
-    /// An option names lines, but the file contains values.
+    /// An option names lines, but the file contains values instead of lines.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
-        /// Kind of file.
+        /// Kind of the file that contains values.
         format: &'static str,
     },
     /// An option names a line that such a file doesn't have.
     #[error("--source {id}={line}: such a file has one line, {only}")]
     NoSuchLine {
-        /// Sensor named by the option.
+        /// Name of the sensor in the option.
         id: String,
-        /// Line named by the option.
+        /// Name of the line in the option.
         line: String,
         /// The only line that such a file has.
         only: &'static str,
     },
-    /// Two options name the same sensor.
+    /// Two options name the same sensor, which can listen to only one line.
     #[error("--source {id}: named twice; a sensor listens to one line")]
     Twice {
-        /// Name of the sensor.
+        /// Name of the sensor in both options.
         id: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Telemetry logs of MAVLink.
+//! Telemetry logs of the MAVLink protocol.
 
 use crate::entry::{Clock, Entry, Step};
 use crate::format::Format;
@@ -14,12 +14,12 @@ pub struct TlogFormat {
     last_us: u64,
 }
 
-/// Name of the line that carries all frames.
+/// Name of the line that carries all frames of a telemetry log.
 pub const STREAM: &str = "mavlink";
 
-/// Maximum difference between the times of two entries. A larger difference after damage means a false match.
+/// Maximum difference between the times of two entries, µs. A larger difference after damage means a false match.
 const DAY_US: u64 = 86_400_000_000;
-/// Latest valid time, in 2106, µs.
+/// Latest valid time of an entry, in 2106, µs.
 const LATEST_US: u64 = 4_294_967_296_000_000;
 
 impl Format for TlogFormat {

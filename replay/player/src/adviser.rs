@@ -11,16 +11,16 @@ use headrace_sensor::device::Direction;
 use headrace_simulator::{Adviser, Message, PilotAdvice, Scene, SceneError, Simulation};
 use headrace_vehicle::VehicleConfig;
 
-/// Length of a tick of the adviser's loop.
+/// Length of a tick of the loop that advises the pilot.
 const TICK: DurNs = DurNs(20_000_000);
 
 /// Reason why a scene can't be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulationError {
-    /// The scene is inconsistent.
+    /// The scene or its vehicle file contains an error.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The loop that advises the pilot can't be armed.
+    /// The monitor's loop that advises the pilot can't be set up (armed).
     #[error("arming the loop that advises the scene's pilot: {0}")]
     Adviser(#[from] PluginError),
 }
@@ -55,7 +55,7 @@ struct LoopAdviser {
     dive: Loop,
     /// Ports of the loop by source; `None` if a port is in use elsewhere.
     ports: Vec<Option<Port>>,
-    /// End of the current tick.
+    /// End of the current tick of the loop.
     until: MonoNs,
     told: Vec<PilotAdvice>,
 }

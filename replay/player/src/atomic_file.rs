@@ -20,12 +20,12 @@ pub struct AtomicFile {
     beside: Option<(PathBuf, Beside)>,
 }
 
-/// How an incomplete file is stored beside its destination.
+/// Name under which an incomplete file is stored beside its destination.
 #[derive(Debug)]
 enum Beside {
-    /// Under a temporary name.
+    /// The incomplete file has a temporary name.
     Named(PathBuf),
-    /// Without a name, so that nothing is left behind even if the program is killed.
+    /// The incomplete file has no name, so that nothing is left behind even if the program is killed.
     Nameless,
 }
 
@@ -213,7 +213,7 @@ fn path_of(file: &File) -> PathBuf {
     format!("/proc/self/fd/{}", file.as_raw_fd()).into()
 }
 
-/// Returns the folder of a file.
+/// Returns the folder that contains a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -23,7 +23,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Whether a timestamp may be from this clock.
+    /// Whether a timestamp may come from this clock.
     pub(crate) fn is_of(&self, at: MonoNs) -> bool {
         (self.from.0.saturating_sub(YEAR_NS)..=self.to.0.saturating_add(YEAR_NS)).contains(&at.0)
     }
@@ -95,7 +95,7 @@ mod tests {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);
-        // A timestamp beyond the limit of clocks doesn't extend the range of another clock.
+        // The timestamp of a clock beyond the limit doesn't extend the range of another clock.
         assert!(!count(&mut clocks, MonoNs(YEAR_NS * 580)) && count(&mut clocks, MonoNs(8)));
         assert!(clocks.iter().all(|clock| clock.to.0 - clock.from.0 <= YEAR_NS));
     }

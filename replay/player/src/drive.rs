@@ -10,14 +10,14 @@ use headrace_sensor::reading::SourceId;
 
 use crate::log::LogError;
 
-/// Description of a feed's next packet.
+/// Time, source and length of a feed's next packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coming {
-    /// Time of receipt.
+    /// Time at which the packet was received.
     pub at: MonoNs,
-    /// Source number in the loop.
+    /// Number of the packet's source in the loop.
     pub source: SourceId,
-    /// Length, bytes.
+    /// Length of the packet, bytes.
     pub len: usize,
 }
 
@@ -39,7 +39,7 @@ pub trait PacketSource {
     fn send(&mut self, port: &mut Port) -> Result<(), RingError>;
 }
 
-/// Tick length and playback speed.
+/// Tick length and playback speed with which a loop is fed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
     /// Length of a tick in packet time; must be positive.
@@ -49,13 +49,13 @@ pub struct Pace {
 }
 
 impl Default for Pace {
-    /// Ticks of 20 ms, as fast as possible.
+    /// Ticks of 20 ms, processed as fast as possible.
     fn default() -> Self {
         Self { tick: DurNs(20_000_000), speed: None }
     }
 }
 
-/// Reason why a drive stopped early.
+/// Reason why feeding a loop from a log or simulation stopped early.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriveError {
@@ -65,7 +65,7 @@ pub enum DriveError {
     /// A port of the loop is in use elsewhere.
     #[error("driving the loop: the port of source {source_id:?} has been taken already")]
     PortTaken {
-        /// Id of the source.
+        /// Id of the source whose port is in use.
         source_id: String,
     },
     /// The loops differ in more than their sections, so they can't share one navigation.
@@ -74,15 +74,15 @@ pub enum DriveError {
          loop 0, or systems of its own that place pings"
     )]
     Unlike {
-        /// Number of the loop that differs, counted from 0.
+        /// Index of the loop that differs from loop 0.
         number: usize,
     },
     /// A thread of the replay has panicked, which is a bug. The loop must not be used afterwards.
     #[error("driving the loop: the thread that {what} has panicked: {message}; please report it")]
     Panicked {
-        /// Task of the thread.
+        /// Task of the thread that panicked.
         what: &'static str,
-        /// Panic message.
+        /// Message of the thread's panic.
         message: String,
     },
 }
@@ -100,7 +100,7 @@ pub fn drive(
     feed::drive(dive, &mut PacedFeed { driver, source, pace, clock: None }, after_tick)
 }
 
-/// A packet source with a pace, as the feed of a loop.
+/// Feeds a loop from a packet source, at a given pace.
 struct PacedFeed<'a> {
     driver: Driver,
     source: &'a mut dyn PacketSource,
@@ -140,7 +140,7 @@ pub(crate) fn pause() {
 pub struct Driver {
     ports: Vec<Port>,
     tick: DurNs,
-    /// End of the previous tick; `None` before the first.
+    /// End of the previous tick, in packet time; `None` before the first.
     until: Option<MonoNs>,
 }
 
@@ -179,7 +179,7 @@ impl Driver {
         Ok(())
     }
 
-    /// Feeds packets received before `until`. `work_off` runs a tick.
+    /// Feeds packets received before `until`. Calls `work_off`, which runs a tick, whenever a ring is full.
     ///
     /// After an error, the packets fed so far have been processed.
     pub(crate) fn fill(
@@ -196,7 +196,7 @@ impl Driver {
         sent
     }
 
-    /// Continues at `until`, after both the feed and the loop have jumped there.
+    /// Sets the end of the last tick to `until`, after both the feed and the loop have jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }
@@ -235,7 +235,7 @@ fn send_until(
     Ok(())
 }
 
-/// Maps packet time to wall time.
+/// Maps packet time to wall time at the playback speed.
 pub(crate) struct Clock {
     origin: MonoNs,
     paced: Option<(Instant, f64)>,
@@ -244,7 +244,7 @@ pub(crate) struct Clock {
 impl Clock {
     /// Starts the clock: packet time is now `origin`, and advances by `speed` seconds per second of wall time.
     ///
-    /// With `None` for `speed` nothing waits.
+    /// If `speed` is `None`, the clock never waits.
     #[expect(clippy::disallowed_methods, reason = "pacing is for people who watch; no result depends on it")]
     pub(crate) fn start(origin: MonoNs, speed: Option<f64>) -> Self {
         Self { origin, paced: speed.map(|speed| (Instant::now(), speed)) }

@@ -6,6 +6,7 @@
 //!
 //! D is the diameter of a section's hole: the largest circle on its wall without samples.
 
+use headrace_coverage::Verdict;
 use std::collections::BTreeMap;
 
 use headrace_geometry::math;
@@ -19,8 +20,8 @@ use crate::adviser::{SimulationError, simulation};
 use crate::drive::{DriveError, Pace, drive};
 use crate::simulation_feed::SimulationFeed;
 
-/// Maximum change of D, m, that counts as negligible. The whole confidence interval of the change must be within this
-/// limit.
+/// Maximum change of the hole diameter D, m, that counts as negligible. The whole confidence interval of the change
+/// must be within this limit.
 pub const HOLE_LIMIT_M: f64 = 0.01;
 /// Maximum change of the passed length that counts as negligible, as a share of the coverage extent.
 pub const PASSED_LIMIT: f64 = 0.01;
@@ -31,10 +32,10 @@ pub enum EffectInfluenceError {
     /// A scene can't be simulated, possibly because an effect was left out.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// A loop can't be armed for the scene's vehicle.
+    /// The monitor's loop can't be set up (armed) for the scene's vehicle.
     #[error("arming the loop that judges the scene: {0}")]
     Loop(#[from] headrace_monitor::PluginError),
-    /// The loop can't process a simulated dive.
+    /// The monitor's loop can't process a simulated dive.
     #[error(transparent)]
     Drive(#[from] DriveError),
     /// There are too few seeds for a confidence interval.
@@ -45,11 +46,11 @@ pub enum EffectInfluenceError {
 /// Cost of some effects of a scene, and change of the results if these effects are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
-    /// Names of the effects left out.
+    /// Names of the effects that are left out of the simulation.
     pub effects: Vec<&'static str>,
     /// Cost of these effects, ns of processor time per sonar return.
     pub price_ns: Mean,
-    /// Mean change of D over the sections if the effects are left out, m.
+    /// Mean change of the hole diameter D over the sections if the effects are left out, m.
     pub hole_m: Mean,
     /// Change of the passed length if the effects are left out, as a share of the coverage extent.
     pub passed: Mean,
@@ -58,13 +59,13 @@ pub struct LeftOut {
 /// Cost and influence of a scene's effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectInfluence {
-    /// Number of seeds.
+    /// Number of seeds with which the dives were simulated.
     pub seeds: usize,
-    /// Length of tunnel that was judged, m.
+    /// Length of the tunnel sections that the vehicle has passed, m.
     pub way_m: f64,
     /// Passed length with all effects, as a share of the coverage extent.
     pub passed: Mean,
-    /// Mean of D over the sections with all effects, m.
+    /// Mean of the hole diameter D over the sections with all effects, m.
     pub hole_m: Mean,
     /// Cost of simulating with all effects, ns of processor time per sonar return.
     pub all_ns: Mean,
@@ -82,7 +83,7 @@ impl LeftOut {
         self.excess() <= 1.0
     }
 
-    /// Returns the largest change within the confidence intervals, in units of the limits.
+    /// Returns the largest change within the confidence intervals, as a multiple of its limit.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
@@ -132,7 +133,7 @@ fn first(scenes: &mut [Scene]) -> Result<&mut Scene, EffectInfluenceError> {
 /// Simulates the same dives with and without effects.
 struct Paired<'a> {
     scenes: &'a mut [Scene],
-    /// Results with all effects, seed by seed.
+    /// Results of the dives with all effects, one dive per seed.
     with: Vec<Figures>,
     dived: usize,
     most: usize,
@@ -184,7 +185,7 @@ impl Paired<'_> {
     }
 }
 
-/// Results of one dive.
+/// Coverage results of one dive.
 #[derive(Debug, Clone)]
 struct Figures {
     /// Diameter D of the hole, m, of each section whose hole is bounded. The key is the start of the section, mm.
@@ -213,7 +214,7 @@ impl Figures {
         for section in Report::of(&dive).sections {
             let length_m = section.end_m - section.start_m;
             figures.way_m += length_m;
-            figures.passed_m += if section.verdict == "pass" { length_m } else { 0.0 };
+            figures.passed_m += if section.verdict == Verdict::Pass { length_m } else { 0.0 };
             if let Some(hole_m) = section.hole_m.filter(|_| section.hole_bounded) {
                 figures.holes_m.insert(math::round_to_i64(section.start_m * 1000.0), hole_m);
             }
@@ -221,12 +222,13 @@ impl Figures {
         Ok(figures)
     }
 
-    /// Returns the mean of D over all sections, m.
+    /// Returns the mean of the hole diameter D over all sections, m.
     fn hole_m(&self) -> f64 {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }
 
-    /// Returns the mean difference of D over the sections that both dives have, m; zero if there are none.
+    /// Returns the mean difference of the hole diameter D over the sections that both dives have, m; zero if there
+    /// are none.
     fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();
@@ -282,9 +284,9 @@ fn thread_ns() -> f64 {
 /// A mean and the half-width of its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
-    /// The mean.
+    /// The mean of the values.
     pub mean: f64,
-    /// Half-width of the interval; infinite for a single value.
+    /// Half-width of the confidence interval; infinite for a single value.
     pub half: f64,
 }
 
@@ -297,7 +299,7 @@ const T: [f64; 30] = [
 const T_OF_MANY: f64 = 1.96;
 
 impl Mean {
-    /// Computes the mean of independent values, and its interval.
+    /// Computes the mean of independent values, and its 95 % confidence interval.
     pub fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;

@@ -22,9 +22,9 @@ pub struct LoggedNotes {
     pub notes: Vec<NoteJson>,
     /// Recordings of voice notes by id: seconds, container, and length in bytes.
     pub voices: BTreeMap<u32, (u32, Container, usize)>,
-    /// Error of each voice message that can't be decoded.
+    /// Decoding error of each invalid voice message.
     pub wrong: Vec<String>,
-    /// Losses of the log, as text.
+    /// Losses of the log that was read, as text.
     pub losses: Vec<String>,
 }
 
@@ -122,7 +122,7 @@ fn place(message: &[u8], places: &mut BTreeMap<u32, f64>) {
         if let (Some(RecordKind::Note | RecordKind::Voice), [_, number, chainage, ..]) =
             (record.kind, record.words)
         {
-            // Chainage 0 means that the chainage was unknown.
+            // In the results, chainage 0 means that the chainage was unknown.
             let chainage_m = Some(f64::from_bits(*chainage)).filter(|chainage_m| *chainage_m != 0.0);
             if let (Ok(number), Some(chainage_m)) = (u32::try_from(*number), chainage_m) {
                 places.insert(number, chainage_m);

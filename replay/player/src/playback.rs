@@ -21,7 +21,7 @@ const PLACE_PART: &str = "place in the log";
 pub enum PlaybackCommand {
     /// Pauses between two ticks.
     Pause,
-    /// Resumes playing.
+    /// Resumes playing after a pause.
     Go,
     /// Runs this many ticks, then pauses.
     Step(u32),
@@ -33,7 +33,7 @@ pub enum PlaybackCommand {
     Seek(MonoNs),
     /// Jumps by a duration, which is negative for a jump back.
     Skip(DurNs),
-    /// Ends playback at the current tick.
+    /// Ends playback at the current tick, before the end of the log.
     End,
 }
 
@@ -41,18 +41,18 @@ pub enum PlaybackCommand {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaybackError {
-    /// The loop can't be driven.
+    /// Feeding the monitor's loop from the log fails.
     #[error(transparent)]
     Drive(#[from] DriveError),
     /// The log can't be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A snapshot can't be taken or restored.
+    /// A snapshot of the loop can't be taken or restored.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
 }
 
-/// Receives what happens during playback, for display.
+/// Receives the events of playback, for display.
 pub trait PlaybackObserver {
     /// Called after each tick that is played.
     fn after_tick(&mut self, dive: &Loop);
@@ -70,7 +70,7 @@ pub trait PlaybackObserver {
     fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}
 }
 
-/// Playback of a log.
+/// Playback of a log through the loop.
 pub struct Playback<'a> {
     dive: &'a mut Loop,
     player: &'a mut Player,
@@ -78,9 +78,9 @@ pub struct Playback<'a> {
     driver: Driver,
     clock: Clock,
     speed: Option<f64>,
-    /// End of the last tick.
+    /// End of the last tick that was played.
     now: MonoNs,
-    /// First time of the log.
+    /// First time that occurs in the log.
     begun: MonoNs,
     mode: Mode,
     /// Wall time spent on ticks since the last snapshot.
@@ -91,9 +91,9 @@ pub struct Playback<'a> {
 enum Mode {
     Playing,
     Paused,
-    /// Number of ticks to run before playback pauses.
+    /// Number of ticks left to run before playback pauses.
     Stepping(u32),
-    /// Plays until a section is judged.
+    /// Plays until the next section is judged, then pauses.
     SteppingSection,
 }
 
@@ -129,7 +129,7 @@ impl<'a> Playback<'a> {
         Ok(playback)
     }
 
-    /// Returns the first time of the log.
+    /// Returns the first time that occurs in the log.
     pub fn begun(&self) -> MonoNs {
         self.begun
     }
@@ -244,7 +244,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Restores the snapshot of time `at`, which the store has returned as the time of a snapshot.
+    /// Restores the snapshot of time `at`. The store must have returned `at` as the time of a snapshot.
     fn restore(&mut self, at: MonoNs) -> Result<(), PlaybackError> {
         let Some(snapshot) = self.store.load(at) else { return Ok(()) };
         let mut restorer = Restorer::new(&snapshot);

@@ -1,4 +1,4 @@
-//! A recorded dive as a source of packets.
+//! Provides a recorded dive as a source of packets for the loop.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -88,7 +88,7 @@ impl Player {
         self.sources = self.ids.iter().map(find).collect();
     }
 
-    /// Returns the current position, between two ticks.
+    /// Returns the player's current position, between two ticks.
     pub fn place(&self) -> PlayerPlace {
         PlayerPlace {
             log: self.reader.place(),
@@ -127,7 +127,7 @@ impl Player {
         self.reader.files()
     }
 
-    /// Returns the number of messages sent so far.
+    /// Returns the number of messages sent to the loop so far.
     pub fn played(&self) -> u64 {
         self.played
     }
@@ -172,7 +172,7 @@ impl Player {
         self.reader.doubles().into_iter().map(note).collect()
     }
 
-    /// Reads the next message whose source the loop has.
+    /// Reads the next message of the log that comes from one of the loop's sources.
     fn read(&mut self) -> Result<Option<Coming>, LogError> {
         while let Some(message) = self.reader.next()? {
             let MessageKind::Raw { source } = message.kind else { continue };

@@ -1,4 +1,4 @@
-//! The recorder as an outlet of the loop.
+//! Records a dive: connects a recorder to the loop, as an outlet.
 
 use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
 use headrace_monitor::outlet::Outlet;
@@ -28,7 +28,7 @@ const MIN_TICK_BYTES: usize = 8 * 1024;
 /// Size of the buffer for one stream's results of a tick, bytes. Results beyond it are not recorded.
 const MAX_RESULT_BYTES: usize = 1 << 19;
 
-/// Size of a recorder's queue, bytes.
+/// Size of the queue from the loop to a recorder, bytes.
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
 /// Size of a recorder's queue in a dive that reads ports, bytes.
@@ -102,9 +102,9 @@ struct Recording {
     ports: Vec<RecorderPort>,
     is_of_ports: bool,
     order: Vec<u16>,
-    /// Buffer for the message of a stream.
+    /// Buffer for the message with a stream's results.
     message: Vec<u8>,
-    /// Number of records of each stream before this tick.
+    /// Number of records that each stream had before this tick.
     records: [u64; STREAMS.len()],
 }
 
@@ -159,7 +159,7 @@ fn allowance_bytes<'a>(open: impl Iterator<Item = &'a RecorderPort>, is_of_ports
     match room {
         Some(room) if room < LARGEST_TICK_BYTES && is_of_ports => (room / SMALLER_TICK).max(MIN_TICK_BYTES),
         Some(room) if room < LARGEST_TICK_BYTES => 0,
-        // No recorder is open, or all recorders skip ticks.
+        // If no recorder is open, or all recorders skip ticks, recording doesn't limit the tick.
         Some(_) | None => MAX_TICK_BYTES,
     }
 }

@@ -1,4 +1,4 @@
-//! A simulated dive as a source of packets.
+//! Provides a simulated dive as a source of packets for the loop.
 
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::ring::{Port, RingError};
@@ -11,7 +11,7 @@ use crate::log::LogError;
 
 /// A simulated dive as a source of packets. Bytes sent to devices are left out.
 pub struct SimulationFeed {
-    /// The simulation, at its current position.
+    /// The simulation that supplies the packets, at its current position.
     pub simulation: Simulation,
 }
 

@@ -26,11 +26,11 @@ use headrace_vehicle::VehicleConfig;
 ///
 /// A tick spans a minute at most, with ten epochs per second and up to three steps per epoch.
 const QUEUED: usize = 4096;
-/// Length of a record, bytes.
+/// Length of a stored filter step, bytes.
 const RECORD: usize = 8 * WORDS;
-/// Number of records per read.
+/// Number of stored filter steps read at once.
 const BLOCK: u64 = 256;
-/// Maximum number of file names tried.
+/// Maximum number of names tried for the temporary file.
 const NAMES: u32 = 1000;
 
 /// Reason why a dive could not be smoothed.
@@ -40,9 +40,9 @@ pub enum SmoothError {
     /// The file for the steps can't be created, written or read.
     #[error("keeping the filter's steps in a file of {}, {bytes} bytes so far: {source}", folder.display())]
     File {
-        /// Folder of the file.
+        /// Folder of the temporary file.
         folder: PathBuf,
-        /// Length of the file, bytes.
+        /// Length of the temporary file, bytes.
         bytes: u64,
         /// Error of the system.
         source: std::io::Error,
@@ -50,15 +50,15 @@ pub enum SmoothError {
     /// Steps were lost, because the filter produced them faster than they were stored.
     #[error("keeping the filter's steps: {lost} steps of a tick were lost; a tick may have up to {queued}")]
     Lost {
-        /// Number of lost steps.
+        /// Number of lost filter steps.
         lost: u64,
-        /// Capacity of the queue, steps.
+        /// Capacity of the queue, filter steps.
         queued: usize,
     },
-    /// A record that was read back differs from the one written.
+    /// A filter step read back from the file is invalid, so it differs from the one written.
     #[error("reading the filter's steps back: record {record} is damaged")]
     Damaged {
-        /// Record number, from zero.
+        /// Index of the damaged filter step in the file, from 0.
         record: u64,
     },
 }
@@ -123,7 +123,7 @@ impl Changes {
     }
 }
 
-/// Filter steps of a replay, stored in a file.
+/// Filter steps of a replay, stored in a temporary file.
 struct Steps {
     journal: JournalReader,
     folder: PathBuf,

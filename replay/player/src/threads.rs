@@ -17,12 +17,12 @@ use headrace_monitor::run::Loop;
 
 use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 
-/// Maximum number of threads for one loop: placing, advising, and the rest.
+/// Maximum number of threads for one loop: one for placing pings, one for advising, and one for all remaining work.
 pub const MOST_THREADS: usize = 3;
 
 /// Number of ticks in a batch. One queue operation then passes some milliseconds of work.
 const BATCH_TICKS: usize = 32;
-/// Maximum number of batches that wait between two threads.
+/// Maximum number of batches of ticks that wait between two threads.
 const MOST_WAITING: usize = 4;
 /// Capacity of the queue of used batches. It fits the batches of two queues, and the batches being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
@@ -30,13 +30,13 @@ const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 /// A tick, with its placed pings and its advice.
 #[derive(Default)]
 struct Tick {
-    /// End of the tick's time.
+    /// Time at the end of the tick.
     now: MonoNs,
     placed: Arc<Placed>,
     advised: Advised,
 }
 
-/// A batch of ticks.
+/// A batch of ticks, which is passed between threads as a whole.
 #[derive(Default)]
 struct Batch {
     ticks: Vec<Tick>,
@@ -45,14 +45,14 @@ struct Batch {
 }
 
 impl Batch {
-    /// Runs the placer for the next tick.
+    /// Runs the placer of pings for the next tick.
     fn place(&mut self, placer: &mut Placer, now: MonoNs) {
         if self.len == self.ticks.len() {
             self.ticks.push(Tick::default());
         }
         let tick = &mut self.ticks[self.len];
         tick.now = now;
-        // A loop still reads its last tick. The others are free.
+        // A loop may still hold the placed pings of its last tick. Those of all other ticks can be overwritten.
         if Arc::get_mut(&mut tick.placed).is_none() {
             tick.placed = Arc::default();
         }
@@ -138,7 +138,7 @@ fn drive_parts(
     })
 }
 
-/// Runs the rest of a tick. Waits while an outlet is too slow.
+/// Runs the steps of a tick that follow placing and advising. Waits while an outlet is too slow.
 fn run_tick(dive: &mut Loop, tick: &mut Tick, after_tick: &mut dyn FnMut(&Loop)) {
     while !dive.tick_placed(tick.now, &tick.placed, &mut tick.advised) {
         after_tick(dive);
@@ -268,7 +268,7 @@ fn drive_all(
     })
 }
 
-/// Runs the rest of a batch in each loop, with the advice for its target.
+/// Runs the remaining steps of a batch's ticks in each loop, with advice for that loop's own target.
 fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
     let mut own = Tick::default();
     for (dive, adviser) in dives {

@@ -14,7 +14,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 /// In an intact log the live results are only one tick ahead.
 const MOST_WAITING: usize = 16 << 20;
 
-/// Streams that logs of earlier versions don't have.
+/// Streams of results that logs of earlier versions don't have.
 const LATER: [&str; 2] = ["states", "alerts"];
 
 /// The first difference between a live dive and its replay.
@@ -33,19 +33,19 @@ pub struct Difference {
 /// Difference between two records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum What {
-    /// A field has different values.
+    /// A field of the record has different values.
     Field {
-        /// Kind of the record.
+        /// Kind of the record with the field.
         kind: RecordKind,
         /// Source number, if the record is a ping.
         source: Option<u64>,
-        /// Name of the field.
+        /// Name of the field that differs.
         field: &'static str,
-        /// Type of the field.
+        /// Type of the field that differs.
         word: WordKind,
-        /// Bits of the field in the live dive.
+        /// Bits of the field in the live dive's record.
         live: u64,
-        /// Bits of the field in the replay.
+        /// Bits of the field in the replay's record.
         replayed: u64,
     },
     /// The records are of different kinds, or have different numbers of fields.
@@ -75,7 +75,7 @@ pub struct Verifier {
 #[derive(Default)]
 struct Stream {
     waiting: VecDeque<Batch>,
-    /// Memory of the waiting batches, bytes.
+    /// Memory of the live results that wait for the replay, bytes.
     waiting_bytes: usize,
     /// Number of the replay's next record in this stream.
     next: u64,
@@ -87,7 +87,7 @@ struct Stream {
 /// Records of one tick, as read from the log.
 struct Batch {
     tick: u64,
-    /// Number of the record at position `at`.
+    /// Number of the record at position `at`, counted in its stream.
     next: u64,
     words: Vec<u64>,
     at: usize,
@@ -104,13 +104,13 @@ impl Batch {
 }
 
 impl Stream {
-    /// Returns the live record with the replay's next number, if it is at the front of the queue.
+    /// Returns the live record with the number of the replay's next record, if it is at the front of the queue.
     fn front(&self) -> Option<(u64, Record<'_>)> {
         let batch = self.waiting.front().filter(|batch| batch.next == self.next)?;
         first_record(batch.rest()).map(|(record, _)| (batch.tick, record))
     }
 
-    /// Advances to the next record.
+    /// Advances to the next live record.
     fn step(&mut self) {
         self.next += 1;
         if let Some(batch) = self.waiting.front_mut()
@@ -132,7 +132,7 @@ impl Stream {
     /// Adds the live results of a tick. If too many results wait, the replay doesn't have them, which is reported as a
     /// difference.
     fn wait(&mut self, batch: Batch, name: &'static str) {
-        // After the first difference nothing more is compared.
+        // After a stream's first difference nothing more of it is compared.
         if self.difference.is_some() {
             return;
         }
@@ -152,16 +152,16 @@ impl Stream {
     }
 }
 
-/// Result of a comparison.
+/// Result of comparing a replay with its live dive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verified {
-    /// Number of identical records.
+    /// Number of records that are identical in live dive and replay.
     pub same: u64,
     /// Number of replay records that the live dive's log doesn't have.
     pub unrecorded: u64,
     /// The first difference of each stream that has one, ordered by tick.
     pub differences: Vec<Difference>,
-    /// Whether the log has results to compare.
+    /// Whether the log has live results to compare.
     pub has_results: bool,
 }
 
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn records_missing_from_a_log_are_skipped() {
+    fn live_records_missing_from_the_log_are_skipped_in_the_comparison() {
         let mut stream = Stream::default();
         let head = RecordKind::Run as u64 | (1 << 8);
         stream.wait(Batch { tick: 4, next: 0, words: vec![head, 7], at: 0 }, "poses");

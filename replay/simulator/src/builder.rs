@@ -14,24 +14,24 @@ use crate::random::Stream;
 use crate::sensing::{Mounted, Scenery};
 use crate::stages::Stage;
 
-/// Additions of one effect to a simulation, for display.
+/// Systems, components and random streams that one effect adds to a simulation, for display.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
-    /// Name of the effect in scenes.
+    /// Name of the effect, as used in scenes.
     pub effect: &'static str,
-    /// Systems of the effect, each with its stage.
+    /// Systems that the effect adds, each with its stage.
     pub systems: Vec<(Stage, String)>,
-    /// Base systems that the effect replaces.
+    /// Names of the base systems that the effect replaces.
     pub replaces: Vec<&'static str>,
     /// Components of the effect, each with the ids of the sensors that have the component.
     pub components: Vec<(String, Vec<String>)>,
-    /// Sources for which the effect draws random numbers.
+    /// Sources for which the effect draws random numbers during the dive.
     pub streams: Vec<String>,
     /// The effect's change to the vehicle's trajectory before the dive begins, as text.
     pub trajectory: Option<String>,
 }
 
-/// Position in the chain of systems.
+/// Position of a system in the chain that the schedule runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 struct Slot(usize);
 
@@ -42,12 +42,12 @@ pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Sources for which random numbers were drawn. Each one has the name of the effect that drew them.
+    /// Effects that drew random numbers before the dive, each with the source for which it drew them.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
 impl Programs<'_> {
-    /// Random stream of the effect for a sensor.
+    /// Random stream of the current effect for a sensor.
     pub fn stream(&mut self, source: usize) -> Stream {
         let id = self.facts.sensors.get(source).map_or_else(String::new, |sensor| sensor.id.clone());
         let stream = Stream::new(self.seed, self.effect, &id);
@@ -55,7 +55,7 @@ impl Programs<'_> {
         stream
     }
 
-    /// Changes a head's program.
+    /// Changes the program of a head.
     pub fn change(&mut self, source: usize, how: impl FnOnce(HeadProgram) -> HeadProgram) {
         if let Some(sensor) = self.facts.sensors.get_mut(source) {
             sensor.program = sensor.program.map(how);
@@ -63,7 +63,7 @@ impl Programs<'_> {
     }
 }
 
-/// A simulation that is being assembled.
+/// A simulation that is being assembled from base systems and effects.
 pub struct Builder<'a> {
     world: &'a mut World,
     facts: &'a Facts,
@@ -90,7 +90,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Facts of the scene.
+    /// Facts about the scene's vehicle and tunnel.
     pub fn facts(&self) -> &'a Facts {
         self.facts
     }
@@ -118,12 +118,12 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A sensor's mount as changed by the effects so far.
+    /// Mount of a sensor on the vehicle, as changed by the effects so far.
     pub fn mount(&self, source: usize) -> Option<Mount> {
         self.world.get::<Mounted>(*self.entities.get(source)?).map(|mounted| mounted.0)
     }
 
-    /// Adds a component to a sensor.
+    /// Adds a component of the current effect to a sensor.
     pub fn insert<C: Component>(&mut self, source: usize, component: C) {
         let Some(entity) = self.entities.get(source) else { return };
         self.world.entity_mut(*entity).insert(component);
@@ -171,12 +171,12 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Whether any effect replaces a base system.
+    /// Whether any effect of the scene replaces the base system named `base`.
     pub(crate) fn replaced(&self, base: &str) -> bool {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }
 
-    /// Makes `effect` the current effect.
+    /// Makes `effect` the effect to which further systems and components belong.
     pub(crate) fn effect(&mut self, effect: &'static str) {
         self.current = Some(self.added.len());
         self.added.push(Added { effect, ..Added::default() });

@@ -4,16 +4,16 @@ use bevy_ecs::prelude::Component;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Start time of simulated dives.
+/// Time at which every simulated dive starts.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// Resolution of a drift: parts per second. Drifts are whole numbers of parts, so that no sum depends on rounding.
+/// Number of parts in a second. A drift is a whole number of parts per second, so that no sum depends on rounding.
 const PARTS: i128 = 1_000_000_000_000;
 
 /// A clock that is correct at the start and drifts at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Clock {
-    /// Excess of the true time over the shown time, in parts of a second per second of the shown time.
+    /// Number of [`PARTS`] by which a second shown by the clock is longer than a true second.
     longer: i128,
 }
 
@@ -24,7 +24,7 @@ impl Clock {
         Self { longer: i128::from(math::round_to_i64(ppm.clamp(-1e5, 1e5) * per_ppm)) }
     }
 
-    /// True time at which the clock shows `shown`.
+    /// True time at which the device's clock shows `shown`.
     pub(crate) fn truly(&self, shown: MonoNs) -> MonoNs {
         let span = i128::from(shown.since(START).0);
         let true_span = span + (span * self.longer).div_euclid(PARTS);

@@ -7,33 +7,33 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::trajectory::Ground;
 
-/// Facts that effects are checked against.
+/// Facts about vehicle and tunnel that effects are checked against.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
     /// The sensors, in the order of the vehicle file.
     pub sensors: Vec<SensorFacts>,
     /// Parts of the vehicle that may hide a head's view.
     pub hull: Vec<Obstacle>,
-    /// Whether a current would carry the vehicle.
+    /// Whether the trajectory's speeds are relative to the water, so that a current carries the vehicle.
     pub ground: Ground,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Speed of sound in the vehicle file, m/s.
     pub sound_speed_mps: f64,
-    /// Duration of the trajectory before effects change it, s.
+    /// Duration of the vehicle's trajectory before effects change it, s.
     pub duration_s: f64,
 }
 
-/// A sensor of the vehicle.
+/// Facts about a sensor of the vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorFacts {
     /// Id of the sensor.
     pub id: String,
     /// Quantity that the sensor measures.
     pub sense: Sense,
-    /// Specification, if the sensor is a head.
+    /// Specification of the head, if the sensor is a head.
     pub head: Option<HeadSpec>,
-    /// Program, if the sensor is a head.
+    /// Program of the head, if the sensor is a head.
     pub program: Option<HeadProgram>,
 }
 

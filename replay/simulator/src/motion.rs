@@ -1,4 +1,4 @@
-//! Ideal inertial measurements from the true pose.
+//! Ideal inertial measurements, computed from the true pose.
 
 use headrace_geometry::frames::{Mount, Point3, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -8,7 +8,7 @@ use headrace_sensor::reading::Level;
 
 use crate::sensing::Scenery;
 
-/// The sample at `at` of an inertial unit that samples every `period`.
+/// The sample at time `at` of an inertial unit that samples every `period`.
 ///
 /// Rate and acceleration are means over the period, as in a unit that integrates between samples. The sums of the
 /// samples give the whole change of attitude and velocity, even over a jerk between samples. At constant attitude and
@@ -28,10 +28,10 @@ pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) 
     Inertia { at, period, attitude: now, rate_radps, force_mps2 }
 }
 
-/// Half the averaging time of a velocity log.
+/// Half the time over which a velocity log averages.
 const HALF_PING: DurNs = DurNs::from_millis(5);
 
-/// Velocity of the sensor's mounting point at `at`, m/s.
+/// Velocity of the sensor's mounting point at time `at`, m/s.
 pub(crate) fn velocity(truth: &Scenery, mount: &Mount, at: MonoNs) -> Vec3<Sensor> {
     let (early, late) = (at - HALF_PING, at + HALF_PING);
     let place = |at| truth.pose(at).place(mount.position);

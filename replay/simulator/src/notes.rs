@@ -7,15 +7,15 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout,
 
 use crate::sensing::{Line, Samples, Source};
 
-/// Maximum number of figures in a measurement.
+/// Maximum number of numerical values (figures) in a measurement.
 const FIGURES: usize = 10;
 
-/// The figures of a measurement, with their names.
+/// Numerical values (figures) of a measurement, with their names.
 pub(crate) trait Figures: Measurement {
-    /// Names of the figures, with units.
+    /// Names of the measurement's values, with units.
     const NAMES: &'static [&'static str];
 
-    /// Values of the figures; NaN for a missing value.
+    /// The measurement's values; NaN for a missing value.
     fn figures(&self) -> [f64; FIGURES];
 }
 
@@ -82,32 +82,32 @@ impl Figures for Inertia {
     }
 }
 
-/// One change made by an effect.
+/// One change of a measurement by an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Note {
-    /// Number of the sensor.
+    /// Number of the sensor whose measurement was changed.
     pub source: u16,
-    /// Number of the measurement within the slice.
+    /// Number of the measurement within the current time slice.
     pub sample: usize,
-    /// Index of the effect in the scene.
+    /// Index of the effect in the scene's list of effects.
     pub effect: u16,
-    /// Name of the changed figure.
+    /// Name of the changed value.
     pub what: &'static str,
-    /// Value before the change; NaN if there was none.
+    /// The value before the change; NaN if there was none.
     pub from: f64,
-    /// Value after the change.
+    /// The value after the change.
     pub to: f64,
 }
 
-/// The changes in the slice.
+/// All changes by effects in the current time slice.
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Notes(pub(crate) Vec<Note>);
 
-/// Copy of the measurements after the previous system.
+/// Copy of the measurements as the previous system left them.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Before<M: Measurement>(Vec<M>);
 
-/// Copy of the line after the previous system.
+/// Copy of the line's messages as the previous system left them.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct LineBefore(Line);
 
@@ -117,7 +117,7 @@ impl<M: Measurement> Default for Before<M> {
     }
 }
 
-/// The effect with the system that has just run; `None` for a base system, since its output is the original
+/// The effect to which the system that has just run belongs; `None` for a base system, whose output is the original
 /// measurement.
 #[derive(Debug, Clone, Copy)]
 struct After(Option<u16>);
@@ -126,7 +126,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// Returns a system that records the changes since the previous such system as changes by `effect`.
+/// Returns a system that records all changes since the last such system ran, and attributes them to `effect`.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

@@ -5,16 +5,16 @@ use headrace_sensor::device::Direction;
 
 use crate::sensing::Line;
 
-/// Bytes on the line of one source.
+/// Bytes of one message on the line of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
     /// Time at which the bytes crossed the line.
     pub at: MonoNs,
-    /// Number of the source in the vehicle file.
+    /// Number of the message's source in the vehicle file.
     pub source: u16,
-    /// Direction.
+    /// Direction of the bytes: to or from the device.
     pub direction: Direction,
-    /// The bytes.
+    /// The bytes that crossed the line.
     pub bytes: &'a [u8],
 }
 
@@ -25,39 +25,39 @@ const NEVER: MonoNs = MonoNs(u64::MAX);
 /// Messages are merged on demand. Their bytes stay in the devices' buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    /// One lane for each source, in order.
+    /// Waiting messages of each source, in the order of the sources.
     lanes: Vec<Lane>,
-    /// Time at which the next message of each lane is due; `NEVER` if the lane is empty.
+    /// Time at which the next message of each source is due; `NEVER` if none waits.
     due: Vec<MonoNs>,
-    /// Time before which messages are released.
+    /// Messages with timestamps before this time are released.
     until: MonoNs,
-    /// The lane with the next released message.
+    /// The source with the next released message, as an index of `lanes`.
     front: Option<usize>,
 }
 
-/// Messages waiting on one line.
+/// Messages that wait on one line.
 #[derive(Debug, Default)]
 struct Lane {
-    /// Messages in order of time.
+    /// Messages of the line in order of time.
     line: Line,
     next: usize,
 }
 
 impl Lane {
-    /// Time at which the next message is due.
+    /// Time at which the next message on the line is due.
     fn due(&self) -> MonoNs {
         self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
     }
 
-    /// Takes over the messages of a slice. The few messages that still wait stay in front of them.
+    /// Takes over the messages of a time slice. The few messages that still wait stay in front of them.
     fn take(&mut self, line: &mut Line) {
         std::mem::swap(&mut self.line, line);
         self.line.put_first(line, self.next);
         self.next = 0;
         line.clear();
-        // Drops messages without bytes.
+        // Drops messages that have lost all their bytes.
         self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
-        // A reply may cross the line after the next request.
+        // A reply may cross the line after the next request does, so the messages need sorting.
         if !self.line.messages.is_sorted_by_key(|message| message.at) {
             self.line.messages.sort_by_key(|message| message.at);
         }
@@ -65,7 +65,7 @@ impl Lane {
 }
 
 impl Outbox {
-    /// Creates an outbox for this many sources.
+    /// Creates an outbox for the messages of this many sources.
     pub(crate) fn new(sources: usize) -> Self {
         let lanes = (0..sources).map(|_| Lane::default()).collect();
         Self { lanes, due: vec![NEVER; sources], ..Self::default() }
@@ -100,7 +100,7 @@ impl Outbox {
         Some(Message { at: message.at, source, direction: message.direction, bytes: line.bytes_of(message) })
     }
 
-    /// Takes the messages of a slice from the line of `source`, and leaves the line empty.
+    /// Takes the messages of a time slice from the line of `source`, and leaves the line empty.
     pub(crate) fn take(&mut self, source: usize, line: &mut Line) {
         if let Some(lane) = self.lanes.get_mut(source) {
             lane.take(line);
@@ -129,7 +129,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Updates the due time of each lane and finds the lane with the next released message.
+    /// Updates the times at which messages are due, and finds the source with the next released message.
     fn look(&mut self) {
         for (due, lane) in self.due.iter_mut().zip(&self.lanes) {
             *due = lane.due();
@@ -157,7 +157,7 @@ mod tests {
         line
     }
 
-    /// Time, source and byte of each released message.
+    /// Time, source and only byte of each released message.
     fn going(outbox: &mut Outbox) -> Vec<(u64, u16, u8)> {
         let mut gone = Vec::new();
         while outbox.has_next() {

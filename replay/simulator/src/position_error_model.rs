@@ -52,7 +52,7 @@ pub fn expected_errors(
     let scene = Scene::parse(Document::new("a calm dive", &text), kinds, load, None)?;
     let navigation = navigated(&scene, &Settings { learns: false, ..settings })?;
     Ok(Some(ExpectedErrors {
-        confidence_sd: vehicle.coverage.confidence_sd,
+        confidence_sd: vehicle.target.confidence_sd,
         by_time: by_time(&navigation, vehicle),
     }))
 }
@@ -80,8 +80,8 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
     Ok(navigation)
 }
 
-/// Largest standard deviation of the size of a hole between two passes, around the wall, for each time between the
-/// passes.
+/// Pairs of the time between two passes, s, and the standard deviation of the size of a hole between these passes, m.
+/// The standard deviation is the largest around the wall.
 fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;

@@ -1,6 +1,6 @@
 //! Counter-based random numbers: each effect has its own counter for each source and step.
 //!
-//! A new effect or sensor therefore leaves the draws of all other effects unchanged.
+//! A new effect or sensor therefore leaves the random numbers of all other effects unchanged.
 //!
 //! Source: Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011 (Philox4x32-10); Wichura, "Algorithm
 //! AS 241", Applied Statistics 37, 1988 (normal quantiles).
@@ -12,13 +12,13 @@ const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: usize = 10;
 
-/// Random numbers of one effect for one source.
+/// Stream of random numbers of one effect for one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream {
     key: [u32; 2],
 }
 
-/// A block of two random numbers for one step.
+/// A block of two random numbers for one step of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Draw {
     words: [u32; 4],
@@ -41,12 +41,12 @@ impl Stream {
         Self { key: [word(0), word(4)] }
     }
 
-    /// First block of `step`.
+    /// First block of random numbers for `step`.
     pub fn at(self, step: u64) -> Draw {
         self.block(step, 0)
     }
 
-    /// A further block of `step`, for an effect that needs more than two numbers.
+    /// A further block of random numbers for `step`, for an effect that needs more than two.
     pub fn block(self, step: u64, block: u64) -> Draw {
         let half = |value: u64| [(value & 0xFFFF_FFFF) as u32, (value >> 32) as u32];
         let ([a, b], [c, d]) = (half(step), half(block));
@@ -55,7 +55,7 @@ impl Stream {
 }
 
 impl Draw {
-    /// Two uniform numbers between 0 and 1, both ends excluded, in steps of 2^-53.
+    /// Two random numbers, uniform between 0 and 1, both ends excluded, in steps of 2^-53.
     pub fn uniform(&self) -> [f64; 2] {
         let [a, b, c, d] = self.words;
         let number = |high: u32, low: u32| {
@@ -65,7 +65,7 @@ impl Draw {
         [number(a, b), number(c, d)]
     }
 
-    /// Two numbers from the standard normal distribution.
+    /// Two random numbers from the standard normal distribution.
     pub fn normal(&self) -> [f64; 2] {
         self.uniform().map(normal_quantile)
     }
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_differ_by_seed_effect_source_step_and_block() {
+    fn random_numbers_differ_by_seed_effect_source_step_and_block() {
         let here = Stream::new(1, "a", "b").at(5);
         let others = [
             Stream::new(2, "a", "b").at(5),

@@ -14,27 +14,27 @@ use crate::file_loader::FileLoader;
 use crate::implied_effects::{self, Called, Choice, Described, Tables, Take};
 use crate::trajectory::{self, Ground, Trajectory};
 
-/// Maximum duration of a dive, s.
+/// Maximum duration of a simulated dive, s.
 const LONGEST_S: f64 = 1e9;
 
 /// A parsed and checked scene.
 pub struct Scene {
-    /// Name for display.
+    /// Name of the scene for display.
     pub name: String,
     /// Text of the vehicle file, which is written to the log.
     pub vehicle_text: String,
-    /// The vehicle.
+    /// The vehicle, as parsed from its file.
     pub vehicle: VehicleConfig,
     /// Programs of the heads, in the order of the vehicle file.
     pub programs: Vec<HeadProgram>,
-    /// Seed of the random numbers.
+    /// Seed of the scene's random numbers.
     pub seed: u64,
     pub(crate) environment: Environment,
     pub(crate) trajectory: Trajectory,
     pub(crate) facts: Facts,
     pub(crate) effects: Named,
     called: Vec<Called>,
-    /// Effects that are currently left out.
+    /// Names of effects that are currently left out of the simulation.
     without: Vec<String>,
 }
 
@@ -172,7 +172,7 @@ impl Scene {
             .map(|(kind, effect)| (*kind, effect.as_ref()))
     }
 
-    /// Facts for checking effects.
+    /// Facts about vehicle and tunnel, for checking effects.
     pub fn facts(&self) -> &Facts {
         &self.facts
     }

@@ -16,22 +16,22 @@ use crate::environment::{Environment, Hit, What};
 use crate::error::SceneError;
 use crate::trajectory::Trajectory;
 
-/// Interval at which the trajectory is checked, s.
+/// Interval at which the trajectory is checked for obstacles, s.
 const CHECK_S: f64 = 0.5;
 
-/// Time span to simulate.
+/// Time slice: the span of the dive that is simulated at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
 pub(crate) struct Slice {
-    /// Start of the slice.
+    /// Start of the time slice.
     pub from: MonoNs,
-    /// End of the slice, excluded.
+    /// End of the time slice, excluded.
     pub until: MonoNs,
 }
 
 /// The tunnel, the vehicle's trajectory, and the water.
 #[derive(Debug, Clone, Resource)]
 pub struct Scenery {
-    /// Tunnel around the vehicle.
+    /// The tunnel around the vehicle, with its contents.
     pub environment: Environment,
     /// Trajectory of the vehicle.
     pub trajectory: Trajectory,
@@ -45,28 +45,29 @@ pub struct Scenery {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Source(pub u16);
 
-/// Mount on the vehicle.
+/// Mount of a sensor on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Mounted(pub Mount);
 
-/// The simulated device at its end of the line.
+/// The simulated device at the far end of its line.
 #[derive(Component)]
 pub(crate) struct Device<M: Measurement>(pub Box<dyn Emulator<M>>);
 
-/// A profiling head.
+/// Marks a sensor as a profiling head, with its specification.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Head(pub HeadSpec);
 
-/// A fixed echosounder.
+/// Marks a sensor as a fixed echosounder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Echosounder;
 
-/// Measurements in the slice, in order of time.
+/// Measurements of a sensor in the current time slice, in order of time.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Samples<M: Measurement> {
-    /// Number of the first sample, counted from the start of the dive. It is the step for the random draws of effects.
+    /// Number of the first sample, counted from the start of the dive. It is the step for the random numbers of
+    /// effects.
     pub first: u64,
-    /// The measurements.
+    /// The measurements, in order of time.
     pub list: Vec<M>,
 }
 
@@ -74,40 +75,40 @@ pub(crate) struct Samples<M: Measurement> {
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Rays(pub Vec<Ray>);
 
-/// Axis of a beam.
+/// Ray along the axis of a sonar's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ray {
-    /// Position of the sonar.
+    /// Position of the sonar, where the beam starts.
     pub origin: Point3<Tunnel>,
-    /// Direction, a unit vector.
+    /// Direction of the beam, a unit vector.
     pub direction: Vec3<Tunnel>,
     /// Hit of the ray; `None` if nothing is within reach.
     pub hit: Option<Hit>,
 }
 
-/// Range of the sonar at its setting plus a margin, m.
+/// Distance up to which the walls ahead of a sonar are computed: its range setting and a margin, m.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 
-/// Messages on a line in the slice.
+/// Messages on a device's line in the current time slice.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Line {
     /// The messages in the order in which the device sent them.
     pub messages: Vec<LineMessage>,
-    /// Bytes of all messages.
+    /// Bytes of all messages, one after the other.
     pub bytes: Vec<u8>,
 }
 
-/// A message on a line.
+/// A message on a device's line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LineMessage {
     /// Time at which the first byte crosses the line.
     pub at: MonoNs,
-    /// Direction.
+    /// Direction of the message: to or from the device.
     pub direction: Direction,
     /// Start and end of the message in [`Line::bytes`].
     pub bytes: (usize, usize),
-    /// Number of the reported sample within the slice.
+    /// Number within the time slice of the measurement that the message reports.
     pub sample: usize,
 }
 
@@ -118,14 +119,14 @@ impl<M: Measurement> Default for Samples<M> {
 }
 
 impl<M: Measurement> Samples<M> {
-    /// The measurements, each with its step number.
+    /// The measurements of the time slice, each with its step number.
     pub(crate) fn steps(&mut self) -> impl Iterator<Item = (u64, &mut M)> {
         (self.first..).zip(&mut self.list)
     }
 }
 
 impl Scenery {
-    /// The vehicle's true pose.
+    /// The vehicle's true pose at time `at`.
     pub fn pose(&self, at: MonoNs) -> Pose {
         let place = self.trajectory.place(self.under_way_s(at));
         let axis = self.environment.axis();
@@ -139,12 +140,12 @@ impl Scenery {
         Pose { position: axis.place(place.chainage_m, place.across_m), attitude }
     }
 
-    /// True chainage of the vehicle, m.
+    /// True chainage of the vehicle at time `at`, m.
     pub fn chainage_m(&self, at: MonoNs) -> f64 {
         self.trajectory.place(self.under_way_s(at)).chainage_m
     }
 
-    /// Time since the vehicle started moving, s.
+    /// Time for which the vehicle has been moving at time `at`, s.
     fn under_way_s(&self, at: MonoNs) -> f64 {
         self.sets_out
             .map_or_else(|| at.since(START).as_secs_f64(), |out| at.since(out).as_secs_f64().max(0.0))
@@ -175,7 +176,7 @@ impl Scenery {
 }
 
 impl Line {
-    /// Adds a message.
+    /// Adds a message to the line.
     pub(crate) fn send(&mut self, at: MonoNs, direction: Direction, bytes: &[u8], sample: usize) {
         let from = self.bytes.len();
         self.bytes.extend_from_slice(bytes);
@@ -199,7 +200,7 @@ impl Line {
         drop(self.messages.splice(0..0, moved));
     }
 
-    /// Clears the messages of the slice.
+    /// Clears the messages of the time slice.
     pub(crate) fn clear(&mut self) {
         self.messages.clear();
         self.bytes.clear();

@@ -26,11 +26,12 @@ use crate::stages::{self, AIM_HELD, Held, Stage};
 use crate::trajectory::PilotAdvice;
 use crate::truth::{self, TruthRow};
 
-/// Length of a slice. At this length, the overhead of the schedule is negligible.
+/// Length of a time slice. At this length, the overhead of the schedule is negligible.
 const SLICE: DurNs = DurNs(1_000_000_000);
-/// Ratio of the distance up to which walls are computed to a sonar's range. It allows for effects that shorten ranges.
+/// Distance up to which walls are computed, as a multiple of a sonar's range. The margin allows for effects that
+/// shorten ranges.
 const REACH_SHARE: f64 = 1.25;
-/// Range of an echosounder, m.
+/// Largest range of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
 
 /// A time that is never reached.
@@ -41,18 +42,18 @@ pub trait Adviser: Send {
     /// Processes a message that has crossed its line. Messages must be passed in order of time.
     fn hear(&mut self, message: &Message<'_>);
 
-    /// The advice since the last call, in order of time.
+    /// Returns the advice given since the last call, in order of time.
     fn told(&mut self) -> Vec<PilotAdvice>;
 }
 
-/// Source of the requests to the devices.
+/// Source of the requests that the devices receive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Asker {
-    /// Emulated hosts.
+    /// Emulated hosts send the requests.
     Itself,
-    /// Emulated hosts. The simulation also keeps the ground truth.
+    /// Emulated hosts send the requests. The simulation also keeps the ground truth.
     Noted,
-    /// Real hosts.
+    /// Real hosts send the requests.
     Hosts,
 }
 
@@ -153,7 +154,7 @@ impl Simulation {
         self.scenery().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
 
-    /// True pose of the vehicle.
+    /// True pose of the vehicle at time `at`.
     pub fn pose(&self, at: MonoNs) -> Option<Pose> {
         self.world.get_resource::<Scenery>().map(|scenery| scenery.pose(at))
     }
@@ -168,7 +169,7 @@ impl Simulation {
         &self.added
     }
 
-    /// The base systems, without those that effects replace.
+    /// The base systems of the simulation, without those that effects replace.
     pub fn base_systems(&self) -> &[(Stage, String)] {
         &self.base
     }
@@ -185,7 +186,7 @@ impl Simulation {
         Some(message)
     }
 
-    /// The next message, which stays in the simulation.
+    /// Returns the next message on any line, without removing it.
     pub fn peek_message(&mut self) -> Option<Message<'_>> {
         self.come().then(|| self.outbox.peek()).flatten()
     }

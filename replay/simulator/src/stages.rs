@@ -13,7 +13,7 @@ use crate::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach,
 
 /// Name of the system [`aim_held`]. Effects use the name to replace the system.
 pub(crate) const AIM_HELD: &str = "aim_held";
-/// Tolerance for a whole turn, radians.
+/// Tolerance within which a rotation counts as a whole turn, radians.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
 /// Order of processing in a slice. Within a stage, base systems run first, then effects in the order of
@@ -22,7 +22,7 @@ const SAME_ANGLE_RAD: f64 = 1e-9;
 pub enum Stage {
     /// Devices give the times and kinds of their measurements.
     Begin,
-    /// Heads turn. Effects on angles act here.
+    /// Heads turn. Effects on beam angles act here.
     Turn,
     /// Sonars get a position and a direction.
     Aim,
@@ -34,12 +34,12 @@ pub enum Stage {
     Feel,
     /// Devices encode their measurements.
     Tell,
-    /// Effects on the lines act here.
+    /// Effects on the devices' lines act here.
     Line,
 }
 
 impl Stage {
-    /// Name for display.
+    /// Name of the stage for display.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Begin => "begin",
@@ -67,7 +67,7 @@ pub(crate) struct Held {
 impl Held {
     /// Whether a new turn or sweep begins with a ping at this angle.
     fn begins(&mut self, angle_rad: f64) -> bool {
-        // The first ping has no previous angle.
+        // The head's first ping has no previous angle.
         let came_rad = if self.pose.is_some() { angle_rad - self.last_rad } else { 0.0 };
         let step_rad = math::wrap_signed(came_rad, TAU);
         self.turned_rad += step_rad.abs();
@@ -97,7 +97,7 @@ pub(crate) fn begin<M: Measurement>(slice: Res<'_, Slice>, mut devices: Query<'_
     }
 }
 
-/// The ray of a head at an angle.
+/// The ray along a head's beam at an angle.
 pub(crate) fn head_ray(pose: &Pose, mount: &Mount, angle_rad: f64) -> Ray {
     let direction = pose.attitude * (mount.rotation * head_direction(angle_rad));
     Ray { origin: pose.place(mount.position), direction, hit: None }
@@ -154,7 +154,7 @@ pub(crate) fn aim_echosounders(
 
 type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach);
 
-/// Marks beams with rays that are cast by an effect instead of the base system.
+/// Marks sonars whose rays are cast by an effect instead of the base system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct OwnBeam;
 
@@ -194,7 +194,7 @@ pub(crate) fn feel_motion(
     }
 }
 
-/// Velocity logs measure the velocity at their mount.
+/// Velocity logs measure the velocity at their mounting point.
 pub(crate) fn feel_velocity(
     scenery: Res<'_, Scenery>,
     mut logs: Query<'_, '_, (&mut Samples<GroundVelocity>, &Mounted)>,
@@ -206,7 +206,7 @@ pub(crate) fn feel_velocity(
     }
 }
 
-/// The cable's length is the vehicle's chainage.
+/// Cable counters measure the vehicle's chainage as the cable's length.
 pub(crate) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, &mut Samples<Payout>>) {
     for mut samples in &mut counters {
         for payout in &mut samples.list {

@@ -1,18 +1,18 @@
-//! Stretches of the tunnel.
+//! Stretches of the tunnel, given by chainage.
 
 use headrace_config::{ConfigError, Section};
 
 /// A stretch of the tunnel: chainages from `from_m` up to, but not including, `to_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stretch {
-    /// Start, m; minus infinity if the stretch has no start.
+    /// Chainage of the start, m; minus infinity if the stretch has no start.
     pub from_m: f64,
-    /// End, m; infinity if the stretch has no end.
+    /// Chainage of the end, m; infinity if the stretch has no end.
     pub to_m: f64,
 }
 
 impl Stretch {
-    /// The whole tunnel.
+    /// The stretch that covers the whole tunnel.
     pub(crate) const ALL: Self = Self { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY };
 
     /// Reads `from_m` and `to_m`. Without one of the keys, the stretch has no limit on that side.
@@ -34,7 +34,7 @@ impl Stretch {
         (self.from_m..self.to_m).contains(&chainage_m)
     }
 
-    /// Whether the stretch shares a chainage with another.
+    /// Whether the stretch overlaps another.
     pub(crate) fn meets(&self, other: &Self) -> bool {
         self.from_m < other.to_m && other.from_m < self.to_m
     }

@@ -12,22 +12,22 @@ use crate::{Scene, SceneError, Simulation, TruthRow};
 /// A vehicle that moves forward in a tunnel for `seconds` at a constant speed, with the effects of a scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Dive {
-    /// Keys of `[tunnel]`.
+    /// Keys of the scene's table `[tunnel]`.
     pub(crate) tunnel: &'static str,
     /// Id, plugin and further keys of each sensor.
     pub(crate) sensors: Vec<(&'static str, &'static str, String)>,
-    /// More tables of the vehicle file.
+    /// Further tables of the vehicle file, as text.
     pub(crate) vehicle: &'static str,
-    /// Keys of `[trajectory]`.
+    /// Keys of the scene's table `[trajectory]`.
     pub(crate) trajectory: &'static str,
     pub(crate) seconds: f64,
     pub(crate) speed_mps: f64,
     pub(crate) seed: u64,
-    /// Length of a slice; `None` for the default.
+    /// Length of the simulation's time slices; `None` for the default.
     pub(crate) slice: Option<DurNs>,
 }
 
-/// A message with its bytes.
+/// A message on a line, with its own copy of the bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Said {
     pub(crate) at: MonoNs,
@@ -36,10 +36,10 @@ pub(crate) struct Said {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// Result of a dive.
+/// Result of a simulated dive.
 #[derive(Debug, Clone)]
 pub(crate) struct Dived {
-    /// Messages in order of time, then source.
+    /// Ground truth of the measurements, in order of time, then source.
     pub(crate) rows: Vec<TruthRow>,
     pub(crate) messages: Vec<Said>,
 }
@@ -93,7 +93,7 @@ impl Dive {
         Scene::parse(Document::new("scene.toml", &scene), &KINDS, &|_| Ok(vehicle.clone().into_bytes()), None)
     }
 
-    /// Creates the simulation with these effects.
+    /// Creates the simulation of the dive with these effects.
     pub(crate) fn simulation(&self, effects: &str) -> Result<Simulation, SceneError> {
         let scene = self.scene(effects)?;
         let simulation = Simulation::with_truth(&scene)?;
@@ -103,7 +103,7 @@ impl Dive {
         })
     }
 
-    /// Runs the dive with these effects.
+    /// Simulates the whole dive with these effects.
     pub(crate) fn dive(&self, effects: &str) -> Dived {
         let mut simulation = self.simulation(effects).unwrap_or_else(|why| panic!("{why}"));
         let mut messages = Vec::new();
@@ -116,7 +116,7 @@ impl Dive {
         Dived { rows, messages }
     }
 
-    /// Text of the error for a refused scene.
+    /// Text of the error if the scene with these effects is refused.
     pub(crate) fn refusal(&self, effects: &str) -> String {
         match self.simulation(effects) {
             Ok(_) => panic!("{effects} was taken"),
@@ -124,7 +124,7 @@ impl Dive {
         }
     }
 
-    /// Asserts that a scene gives the same result for any length of slice.
+    /// Asserts that a scene gives the same result for any length of the simulation's time slices.
     pub(crate) fn assert_slices_dont_matter(&self, effects: &str) {
         let usual = self.dive(effects);
         assert!(!usual.rows.is_empty());
@@ -141,14 +141,14 @@ impl Dive {
 }
 
 impl Dived {
-    /// Angle and range of each sounding of a source.
+    /// Angle and range of each ping of a sonar.
     pub(crate) fn soundings(&self, source: u16) -> Vec<(f64, Option<f64>)> {
         let rows = self.rows.iter().filter(|row| row.source == source);
         let measured = rows.filter_map(|row| row.sounding).map(|sounding| sounding.measured);
         measured.map(|sounding| (sounding.angle_rad, sounding.range_m)).collect()
     }
 
-    /// The ranges of a source, in order.
+    /// Ranges that a source has measured, in order.
     pub(crate) fn ranges_m(&self, source: u16) -> Vec<Option<f64>> {
         self.soundings(source).into_iter().map(|(_, range_m)| range_m).collect()
     }

@@ -62,54 +62,54 @@ counts_per_metre = 2000
 /// A trajectory that leads forwards and then a little backwards; it lasts 35 s.
 pub(crate) const LEGS: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = 0.2\n\
                                [[trajectory.legs]]\ndistance_m = 1\nspeed_mps = -0.2\n";
-/// A single leg that lasts 640 s.
+/// A trajectory of a single leg that lasts 640 s.
 pub(crate) const LONG: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 64\nspeed_mps = 0.1\n";
-/// A pilot who goes to chainage 40 m.
+/// A trajectory of a pilot who goes to chainage 40 m.
 pub(crate) const PILOT: &str = "kind = \"pilot\"\nto_m = 40\nspeed_mps = 0.4\nstops_per_hour = 60\n\
                                 backs_per_hour = 60\nback_m = [0.5, 2]\nstop_s = [5, 10]\n";
-/// A trajectory given over ground.
+/// A trajectory through waypoints, given over ground.
 pub(crate) const WAYPOINTS: &str = "kind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = 2\n\
                                     [[trajectory.waypoints]]\nchainage_m = 6\nspeed_mps = 0.2\n";
 
 /// A message on a line: time, direction, and bytes.
 pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 
-/// A scene for any effects.
+/// A test bench: the scene of this file with arbitrary effects.
 pub(crate) struct Bench {
     layout: &'static str,
     scene: String,
-    /// Name of the inertial unit.
+    /// Name of the vehicle's inertial unit.
     unit: &'static str,
 }
 
 impl Bench {
-    /// Heads that turn continuously, for 35 s.
+    /// A test bench with heads that turn continuously, on a trajectory of 35 s.
     pub(crate) fn turning(effects: &str) -> Self {
         Self::on(LEGS, effects)
     }
 
-    /// Heads in sectors, for 35 s.
+    /// A test bench with heads that sweep to and fro in sectors, on a trajectory of 35 s.
     pub(crate) fn sectors(effects: &str) -> Self {
         Self { layout: "sector_offset", ..Self::on(LEGS, effects) }
     }
 
-    /// Heads that turn continuously, for 640 s.
+    /// A test bench with heads that turn continuously, on a trajectory of 640 s.
     pub(crate) fn long(effects: &str) -> Self {
         Self::on(LONG, effects)
     }
 
-    /// Heads that turn continuously, on this trajectory.
+    /// A test bench with heads that turn continuously, on the given trajectory.
     pub(crate) fn on(trajectory: &str, effects: &str) -> Self {
         let scene = format!("vehicle = \"vehicle.toml\"\nseed = 11\n[trajectory]\n{trajectory}\n{effects}\n");
         Self { layout: "phase_shift", scene, unit: "imu" }
     }
 
-    /// The bench with another seed.
+    /// This test bench with another seed.
     pub(crate) fn seeded(self, seed: u64) -> Self {
         Self { scene: self.scene.replace("seed = 11", &format!("seed = {seed}")), ..self }
     }
 
-    /// The bench with another name for the inertial unit. The name changes the unit's random numbers.
+    /// This test bench with another name for the inertial unit. The name changes the unit's random numbers.
     pub(crate) fn with_unit(self, unit: &'static str) -> Self {
         Self { unit, ..self }
     }
@@ -131,7 +131,7 @@ impl Bench {
         simulated.err().map(|why| why.to_string()).unwrap_or_default()
     }
 
-    /// The number of a sensor.
+    /// Number of the sensor with this id.
     pub(crate) fn source(&self, sensor: &str) -> usize {
         self.parse().unwrap().facts.sensors.iter().position(|s| s.id == sensor).unwrap()
     }
@@ -146,7 +146,7 @@ impl Bench {
         Simulation::new(&scene).unwrap().measurements_of(self.source(sensor))
     }
 
-    /// All messages on the lines.
+    /// All messages on the lines of a dive.
     pub(crate) fn messages(&self) -> Vec<(MonoNs, u16, Direction, Vec<u8>)> {
         self.messages_in(DurNs(1_000_000_000))
     }
@@ -160,19 +160,19 @@ impl Bench {
         all
     }
 
-    /// Messages on one line.
+    /// Messages on the line of one sensor.
     pub(crate) fn line(&self, source: u16) -> Vec<OnLine> {
         let all = self.messages().into_iter().filter(|message| message.1 == source);
         all.map(|(at, _, direction, bytes)| (at, direction, bytes)).collect()
     }
 }
 
-/// Text of the error if the short dive with these effects is refused.
+/// Text of the error if the dive of 35 s with these effects is refused.
 pub(crate) fn refusal(effects: &str) -> String {
     Bench::turning(effects).refusal()
 }
 
-/// Asserts that the lines' bytes are identical for any length of slices.
+/// Asserts that the lines' bytes are identical for any length of the simulation's time slices.
 pub(crate) fn same_in_any_slices(bench: &Bench) {
     let usual = bench.messages();
     assert!(usual.len() > 1000 && usual.windows(2).all(|w| w[0].0 <= w[1].0));

@@ -20,28 +20,28 @@ pub struct TruthRow {
     pub source: u16,
     /// Quantity that the sensor measures.
     pub sense: Sense,
-    /// Number of the measurement among those of the sensor.
+    /// Number of the measurement among those of its sensor.
     pub number: u64,
-    /// Pose of the vehicle.
+    /// True pose of the vehicle.
     pub pose: Pose,
-    /// Chainage of the vehicle, m.
+    /// True chainage of the vehicle, m.
     pub chainage_m: f64,
-    /// The ping, if the sensor is a sonar.
+    /// Ground truth of the ping, if the sensor is a sonar.
     pub sounding: Option<SoundingTruth>,
-    /// Changes by effects, in order.
+    /// Changes of the measurement by effects, in order.
     pub causes: Vec<Cause>,
 }
 
-/// A true ping and its measurement.
+/// Ground truth of a ping, with its measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SoundingTruth {
-    /// The measurement.
+    /// Measurement of the ping: true and reported beam angle, and range.
     pub measured: Sounding,
-    /// Position of the sonar.
+    /// True position of the sonar.
     pub origin: Point3<Tunnel>,
     /// Direction of the beam's axis, a unit vector.
     pub direction: Vec3<Tunnel>,
-    /// Hit of the beam's axis, and the arc length at the hit, m.
+    /// True hit of the beam's axis, and the arc length at the hit, m.
     pub wall: Option<(Hit, f64)>,
 }
 
@@ -59,16 +59,16 @@ impl SoundingTruth {
     }
 }
 
-/// A change made by an effect.
+/// A change of a measurement by an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cause {
-    /// Index of the effect in the scene.
+    /// Index of the effect in the scene's list of effects.
     pub effect: u16,
-    /// Name of the changed figure, with its unit.
+    /// Name of the changed value, with its unit.
     pub what: &'static str,
-    /// Value before the change; NaN if there was none.
+    /// The value before the change; NaN if there was none.
     pub from: f64,
-    /// Value after the change.
+    /// The value after the change.
     pub to: f64,
 }
 

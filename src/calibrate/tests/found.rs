@@ -14,7 +14,8 @@ fn found(stand: &Stand) -> Heads {
     stand.ask(|material| heads(material).unwrap())
 }
 
-/// Mount errors of two heads. One head is turned and moved against the file, and for some seeds mirrored.
+/// Mount errors of two heads. One head is turned and moved relative to the vehicle file, and for some seeds it
+/// is mirrored.
 fn wrong(seed: u64) -> [Wrong; 2] {
     let swing = math::sin(seed as f64);
     [
@@ -28,8 +29,8 @@ fn wrong(seed: u64) -> [Wrong; 2] {
     ]
 }
 
-/// Angles, relative positions and senses of rotation are correct within three of the stated standard
-/// deviations.
+/// Estimated angles, relative positions and senses of rotation of heads are correct within three of the
+/// stated standard deviations.
 ///
 /// The standard deviations are as small as a survey needs.
 #[test]
@@ -69,7 +70,7 @@ fn injected_mount_errors_are_estimated() {
     println!("worst error {:.2} sigma, widest sigma {:.2} of what a survey needs", worst.0, worst.1);
 }
 
-/// The beams of the estimated mount point in the directions of the true beams.
+/// The estimated mount's beams have the directions of the true beams.
 #[test]
 fn estimated_mount_has_the_beam_directions_of_the_true_head() {
     let (_, profile) = profiles().into_iter().next().unwrap();
@@ -113,8 +114,8 @@ fn echosounders_reveal_upside_down_heads() {
     }
 }
 
-/// The zeros of cable counter, surface and water level are exact, apart from quantisation and the height from
-/// the heads.
+/// The zeros of cable counter, surface and water level are exact, apart from quantisation and the error of the
+/// height that the heads give.
 #[test]
 fn zeros_of_cable_counter_surface_and_water_level_are_exact() {
     let mut stand = Stand { noise_m: 0.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default(); 2], 1) };
@@ -148,7 +149,7 @@ fn zeros_of_cable_counter_surface_and_water_level_are_exact() {
 /// Further turns see the same roughness of the wall. Their returns share the weight, so each piece of wall
 /// counts once.
 #[test]
-fn each_piece_of_wall_counts_once() {
+fn further_turns_add_no_weight_to_a_piece_of_wall() {
     let stand = Stand { seconds: 100, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     stand.ask(|material| {
         let still = longest(material).unwrap();

@@ -10,10 +10,10 @@ const N: usize = COMMON + 2 * OWN;
 const STEP: f64 = 1e-6;
 
 /// With a narrow beam, derivatives are exact except at a wall's edges, where the two rays of a difference may
-/// hit different walls. Derivatives by rotations are exact only at zero rotation, because rotations are
-/// assumed to be small.
+/// hit different walls. Derivatives with respect to rotations are exact only at zero rotation, because
+/// rotations are assumed to be small.
 #[test]
-fn every_derivative_matches_central_differences() {
+fn every_range_derivative_matches_central_differences() {
     for (name, profile) in profiles() {
         let wrong = [Wrong::default(), Wrong { is_mirrored: true, ..Wrong::default() }];
         let stand = Stand::new(profile, &wrong, 1);
@@ -50,8 +50,8 @@ fn every_derivative_matches_central_differences() {
                         edges += 1;
                         continue;
                     }
-                    // The derivative by the scale uses the expected range in place of the measured one. At
-                    // convergence the two are equal.
+                    // The derivative with respect to the scale uses the expected range in place of the measured
+                    // one. At convergence the two are equal.
                     let expected = if i == 5 { (h[5] + off) / (1.0 + x[5]) } else { h[i] };
                     assert!(
                         (difference - expected).abs() < 1e-4,

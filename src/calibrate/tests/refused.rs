@@ -1,4 +1,4 @@
-//! Checks which quantities are refused, and the reasons.
+//! Checks which quantities the calibration refuses to estimate, and the reasons that it gives.
 
 use super::super::estimate::NotEstimated;
 use super::super::heads::heads;
@@ -10,7 +10,7 @@ fn why(stand: &Stand) -> NotEstimated {
 }
 
 #[test]
-fn circle_does_not_determine_roll() {
+fn mount_angle_is_not_estimated_in_a_circular_tunnel() {
     let wrong = [Wrong { angle_deg: 5.0, ..Wrong::default() }; 2];
     let stand = Stand { at: [0.05, 3.0], ..Stand::new(shapes::circle(3.0).unwrap(), &wrong, 1) };
     let found = stand.ask(|material| heads(material).unwrap());
@@ -21,7 +21,7 @@ fn circle_does_not_determine_roll() {
 }
 
 #[test]
-fn moving_vehicle_is_refused() {
+fn calibration_refuses_a_moving_vehicle() {
     for (_, profile) in profiles() {
         let stand = Stand { speed_mps: 0.1, ..Stand::new(profile, &[Wrong::default(); 2], 1) };
         let why = why(&stand);
@@ -31,7 +31,7 @@ fn moving_vehicle_is_refused() {
 }
 
 #[test]
-fn head_that_sees_too_little_wall_is_refused() {
+fn calibration_refuses_a_head_that_sees_too_little_wall() {
     let stand = Stand { sector_deg: 90.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     let why = why(&stand).to_string();
     assert!(why.starts_with("no full turn: the head covered only 9"), "{why}");
@@ -40,7 +40,7 @@ fn head_that_sees_too_little_wall_is_refused() {
 /// Section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
 /// vehicle is in the centre.
 #[test]
-fn sense_of_rotation_in_a_symmetric_section_needs_echosounders_off_the_centre() {
+fn symmetric_section_hides_the_sense_of_rotation_without_echosounders_or_at_the_centre() {
     let wrong = [Wrong::default(); 2];
     for (at, has_echoes, told) in
         [([0.6, 2.3], true, true), ([0.6, 2.3], false, false), ([0.0, 2.3], true, false)]
@@ -69,7 +69,7 @@ fn wall_of_another_shape_contradicts_the_profile() {
 }
 
 #[test]
-fn refusal_names_the_missing_readings() {
+fn calibration_refusal_names_the_missing_readings() {
     let stand = Stand::new(shapes::ceran().unwrap(), &[], 1);
     assert_eq!(why(&stand), NotEstimated::Missing { what: "any profiling head" });
     let nothing = Stand { seconds: 0, ..stand };

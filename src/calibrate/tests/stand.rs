@@ -20,8 +20,8 @@ const ECHOES: usize = 3;
 pub(super) const HEADS: usize = 7;
 const DEVICE_MPS: f64 = 1500.0;
 
-/// True mount of a head relative to its file: degrees about its axis, m to the left and up, and whether it is
-/// mirrored.
+/// True mount of a head relative to the vehicle file: degrees about its axis, m to the left and up, and whether
+/// it is mirrored.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Wrong {
     pub(super) angle_deg: f64,
@@ -36,7 +36,7 @@ pub(super) struct Stand {
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) wrong: Vec<Wrong>,
-    /// Position y and z, m. Below: roll, pitch and yaw, degrees.
+    /// Position y and z, m; then roll, pitch and yaw, degrees.
     pub(super) at: [f64; 2],
     pub(super) turned_deg: [f64; 3],
     pub(super) speed_mps: f64,
@@ -103,7 +103,7 @@ impl Stand {
         (0..HEADS + self.wrong.len()).map(Self::filed).collect()
     }
 
-    /// Passes the stand's readings to `estimate`.
+    /// Simulates the stand's readings, and passes them to `estimate`.
     pub(super) fn ask<T>(&self, estimate: impl FnOnce(&Material<'_>) -> T) -> T {
         let (sensors, events) = (self.sensors(), self.events());
         let Self { profile, site, settings, .. } = self;

@@ -53,8 +53,8 @@ impl Tree {
         symlink(to, at).unwrap();
     }
 
-    /// A machine with an adapter with an echosounder, a counter that only root may open, an adapter that is
-    /// down, and a bus without files.
+    /// A machine with four devices: an adapter that has an echosounder, a counter that only root may open, an
+    /// adapter that is down, and a bus without files.
     fn vehicle() -> Self {
         let tree = Self::new("vehicle");
         let usb = "/sys/devices/usb1/1-1";

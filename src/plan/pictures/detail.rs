@@ -1,4 +1,4 @@
-//! Detail of the sampling pattern around its largest gap, to scale.
+//! Draws a detail of the sampling pattern around its largest gap, to scale.
 
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -7,28 +7,28 @@ use headrace_pictures::polyline::{Frame, Px};
 
 use super::laid::Laid;
 
-/// Fill colour of the circle of diameter T.
+/// Fill colour of the circle whose diameter is the spacing T.
 pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
-/// Position of the caption, pixels.
+/// Position of the detail's caption, pixels.
 const WORDS: Px = [634.0, 348.0];
-/// Distance below which samples share one marker, pixels.
+/// Minimum distance between the markers of two samples, pixels. Closer samples share one marker.
 const APART_PX: f64 = 4.0;
 /// Number of samples above which single samples can't be distinguished.
 const MOST: usize = 450;
-/// Half the width of the detail, as a multiple of T.
+/// Half the width of the detail, as a multiple of the spacing T.
 const HALF: f64 = 1.5;
 
 struct Detail<'c> {
     chart: Chart<'c>,
     laid: &'c Laid,
     centre: [f64; 2],
-    /// Chainage at the left edge, m.
+    /// Chainage at the left edge of the detail, m.
     from_m: f64,
     half_m: f64,
 }
 
-/// Draws the detail.
+/// Draws the detail of the pattern around its largest gap.
 pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) {
     let half_m = HALF * t_m;
     let [x_m, arc_m] = [centre[0] - from_m, centre[1]];
@@ -71,7 +71,7 @@ impl Detail<'_> {
         }
     }
 
-    /// Samples that aren't hidden, each with its head and its place on the sheet.
+    /// Samples that the vehicle doesn't occlude, each with its head and its position on the sheet.
     fn samples(&self) -> Vec<(usize, Px)> {
         let mut places: Vec<(usize, Px)> = Vec::new();
         for (sample, at) in self.laid.near(self.centre, [self.half_m; 2]) {

@@ -1,4 +1,4 @@
-//! Chart of hours against T.
+//! Chart of the duration of a dive, in hours, against the sample spacing T.
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -13,19 +13,19 @@ use super::shown::Shown;
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
 /// Ratio of successive speeds along a curve.
 const FASTER: f64 = 1.02;
-/// Number of points at which the fastest mode is determined.
+/// Number of values of T at which the fastest mode is determined.
 const LEAST: u32 = 300;
 /// Style of the band under the mode that takes the least time.
 const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
 
-/// The T that the chart marks, and the hours that every mode takes for it.
+/// The spacing T that the chart marks, and the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
-    /// Hours, by mode.
+    /// Hours for the whole length, by mode.
     hours: Vec<Option<f64>>,
 }
 
-/// Draws the hours for the whole length, one way, against T, for every mode.
+/// Draws the hours for the whole length, one way, against the spacing T, for every mode.
 pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let sought = sought(shown, &modes)?;
@@ -44,7 +44,7 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     Ok(canvas.into_svg())
 }
 
-/// Draws all curves and marks, if any mode gives a T.
+/// Draws all curves and marks, if any mode gives a finite spacing T.
 fn curves(
     chart: &Chart<'_>,
     shown: &Shown<'_>,
@@ -65,20 +65,20 @@ fn curves(
     Ok(())
 }
 
-/// T that the chart marks: the target, or else the T at the requested speed.
+/// The spacing T that the chart marks: the target, or else T at the requested speed.
 fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let t_m = match shown.question.target_m {
         Some(target_m) => target_m,
         None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
     };
-    // Without a T, the chart has text in place of curves, and any axis will do.
+    // Without a finite T, the chart has text in place of curves, so the end of its axis has no effect.
     let t_m = if t_m.is_finite() { t_m } else { 1.0 };
     let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
 }
 
-/// Upper ends of the x and y axes.
+/// Upper ends of the chart's axes: the spacing T, m, and the hours.
 fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let all = || sought.hours.iter().flatten().copied();
@@ -96,7 +96,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     Ok([(1.3 * reached_m).max(2.2 * sought.t_m), (3.0 * shown_h).max(1.3 * asked_h)])
 }
 
-/// Draws the legend of the band.
+/// Draws the legend of the band that marks the fastest mode.
 fn legend(chart: &Chart<'_>) {
     let [x, y] = [FRAME.right - 10.0, FRAME.top + 12.0];
     chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND);
@@ -120,7 +120,7 @@ fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<V
     Ok(points)
 }
 
-/// Fewest hours of any mode for each T.
+/// Fewest hours of any mode for each spacing T.
 fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     let length_m = shown.planner.inspection().length_m;
     let point = |k: u32| {

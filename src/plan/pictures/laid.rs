@@ -10,25 +10,25 @@ use super::shown::Shown;
 /// Maximum number of samples computed for a chart.
 const MOST_SAMPLES: f64 = 400_000.0;
 
-/// A sampling pattern.
+/// A sampling pattern on the wall, computed for a chart.
 pub(super) struct Laid {
     pub(super) samples: Vec<PatternSample>,
     pub(super) heads: usize,
     pub(super) perimeter_m: f64,
     /// Distance that the vehicle moves in a turn of a head, m.
     pub(super) pitch_m: f64,
-    /// T at this speed, m; `None` if there is a strip that no head sees.
+    /// Sample spacing T at the speed of the chart, m; `None` if there is a strip that no head sees.
     pub(super) t_m: Option<f64>,
-    /// Beginning of the chainages that all heads have passed, m.
+    /// Start and end of the stretch that all heads have passed, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
 }
 
-/// A piece of a head's track on the wall. It is drawn as one line.
+/// A piece of a head's track on the wall, which is drawn as one line.
 pub(super) struct Pass {
     pub(super) head: usize,
     pub(super) hidden: bool,
-    /// Chainage and arc length, m.
+    /// Chainage and arc length of each point of the track, m.
     pub(super) points: Vec<[f64; 2]>,
 }
 
@@ -41,7 +41,7 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let t_m = Some(planner.t_max_m(shown.mode, shown.speed_mps)?).filter(|t_m| t_m.is_finite());
     let places = || specs.iter().map(|spec| spec.mount.position.x());
     let apart_m = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
-    // The search for the largest gap needs the length of a whole turn, and the detail needs some length
+    // The search for the largest gap needs the travel of a whole turn, and the detail chart needs some length
     // around the gap.
     let wanted_m = (turns_shown(specs.len()) * pitch_m).max(pitch_m + 3.2 * t_m.unwrap_or(0.0));
     let steps = turn.map_or(1.0, |turn| f64::from(turn.steps())) * specs.len().max(1) as f64;
@@ -52,7 +52,7 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     Ok(Laid { samples, heads: specs.len(), perimeter_m, pitch_m, t_m, from_m, to_m })
 }
 
-/// Number of turns in the chart. More heads have fewer turns.
+/// Number of turns shown in the chart. With more heads, fewer turns are shown.
 pub(super) fn turns_shown(heads: usize) -> f64 {
     match heads {
         0 | 1 => 3.0,
@@ -62,7 +62,7 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
     }
 }
 
-/// Chainages from where the last head begins to where the first head ends.
+/// Chainages between which all heads have samples: where the last head begins, and where the first head ends.
 ///
 /// If they span less than a turn, returns the ends of the whole pattern.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
@@ -119,16 +119,17 @@ impl Laid {
         placed.filter(|(_, at)| near(at)).collect()
     }
 
-    /// Centre and diameter, m, of the largest gap around an arc length.
+    /// Centre and diameter, m, of the largest gap in the pattern near an arc length.
     ///
-    /// The gap is the largest circle without samples within the travel of a turn.
+    /// The gap is the largest circle without samples, with its centre within one turn's travel of the
+    /// vehicle.
     ///
-    /// `None` without T.
+    /// `None` without a spacing T.
     pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {
         /// Number of grid points along the tunnel and around the perimeter.
         const TRIED: [u32; 2] = [120, 40];
         let t_m = self.t_m?;
-        // The search keeps away from the ends, where later samples are missing.
+        // The search keeps away from the ends of the pattern, beyond which no samples were computed.
         let room_m = (self.to_m - self.from_m - self.pitch_m).max(0.0) / 2.0;
         let begin_m = self.from_m + room_m;
         let middle = [begin_m + self.pitch_m / 2.0, arc_m];

@@ -1,6 +1,7 @@
 //! The four charts of a plan, as SVG text.
 //!
-//! They show the spacing around the wall, the pattern on the wall, T against speed, and hours against T.
+//! They show the spacing around the wall, the pattern on the wall, the sample spacing T against speed, and the
+//! hours of a dive against T.
 
 mod detail;
 mod hours;

@@ -14,11 +14,11 @@ pub(super) struct Mode {
     pub(super) look: Look,
     /// Largest speed that meets the target, m/s.
     pub(super) v_max_mps: Option<f64>,
-    /// Whether the mode has no T at any speed, because there is a strip that no head sees.
+    /// Whether the mode has no spacing T at any speed, because there is a strip that no head sees.
     pub(super) blind: bool,
 }
 
-/// All modes.
+/// All modes of the plan, for the charts.
 pub(super) fn all(shown: &Shown<'_>) -> Result<Vec<Mode>, SamplingError> {
     let count = shown.planner.modes().len();
     let mode = |number: usize| -> Result<Mode, SamplingError> {
@@ -52,7 +52,7 @@ pub(super) fn speed(speed_mps: f64) -> String {
     if down > 0.0 { format!("{down:.3}") } else { format!("{speed_mps:.5}") }
 }
 
-/// Hours as printed.
+/// Hours as printed in the charts.
 pub(super) fn hours(hours: f64) -> String {
     match hours {
         few if few < 1.0 => format!("{few:.2}"),
@@ -61,13 +61,13 @@ pub(super) fn hours(hours: f64) -> String {
     }
 }
 
-/// Fastest of the modes that meet the target.
+/// The mode with the largest speed among those that meet the target.
 pub(super) fn fastest(modes: &[Mode]) -> Option<&Mode> {
     let met = modes.iter().filter(|mode| mode.v_max_mps.is_some());
     met.max_by(|a, b| a.v_max_mps.unwrap_or(0.0).total_cmp(&b.v_max_mps.unwrap_or(0.0)))
 }
 
-/// Text on the modes in which a strip is seen by no head.
+/// Text about the modes in which some strip is seen by no head.
 pub(super) fn blind_words(modes: &[Mode]) -> Vec<String> {
     let blind: Vec<&str> = modes.iter().filter(|mode| mode.blind).map(|mode| mode.name.as_str()).collect();
     match blind.len() {

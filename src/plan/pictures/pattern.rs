@@ -15,10 +15,11 @@ use super::{modes, wall};
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 548.0, bottom: 482.0 };
 /// Position of the legend, pixels.
 const LEGEND: Px = [634.0, 412.0];
-/// Points around the wall at which spacing is compared.
+/// Number of points around the wall at which the spacing is compared to find the largest.
 const PLACES: usize = 360;
 
-/// Draws the samples of several turns on the unrolled wall, with a circle of diameter T at the largest gap.
+/// Draws the samples of several turns on the unrolled wall, with a circle at the largest gap. The diameter of
+/// the circle is the spacing T.
 pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let laid = laid::lay(shown)?;
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
@@ -60,7 +61,7 @@ fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     chart.canvas.text([14.0, 546.0], note, Side::Right, SMALL);
 }
 
-/// Pieces of the heads' tracks on the sheet.
+/// Pieces of the heads' tracks, each with its head and its points on the sheet.
 type Ways = Vec<(usize, Vec<Px>)>;
 
 /// Draws the heads' tracks. Returns those that are visible.
@@ -75,7 +76,8 @@ fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     ways
 }
 
-/// Draws each head's number where its track reaches the top, or else on the longest piece of the track.
+/// Writes each head's number where its track reaches the top of the chart, or else on the longest piece of
+/// the track.
 fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) {
     /// Distance below which two numbers would overlap, pixels.
     const APART_PX: f64 = 9.0;
@@ -107,7 +109,7 @@ fn number(chart: &Chart<'_>, head: usize, place: Px) {
     chart.canvas.text_on_white(place, &head.to_string(), Side::Middle, letters);
 }
 
-/// Draws the heads with their lines and markers, two per row.
+/// Draws the legend: each head's number with its line and marker, two heads per row.
 fn legend(canvas: &Canvas, laid: &Laid) {
     const ROW_PX: f64 = 19.0;
     for head in 0..laid.heads {

@@ -14,7 +14,7 @@ use super::shown::Shown;
 use super::wall::{self, Thin};
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
-/// Points around the wall at which spacing is computed.
+/// Number of points around the wall at which the spacing is computed.
 const PLACES: usize = 720;
 const FEWER: Colour = Colour(236, 241, 246);
 const UNSEEN: Colour = Colour(214, 214, 214);
@@ -23,15 +23,16 @@ const BAND: Colour = Colour(205, 226, 240);
 /// Spacing around the wall, and the places that the chart marks.
 struct Around {
     places: Vec<WallPlace>,
-    /// Point with the largest T.
+    /// Point with the largest sample spacing T.
     worst: Option<WallPlace>,
-    /// T of the plan, m.
+    /// Sample spacing T of the plan, m.
     counted_m: Option<f64>,
     /// Centre of the widest strip that no head sees, m.
     unseen_m: Option<f64>,
 }
 
-/// Draws the spacing along the perimeter: T_y, T_x, T, the target, and the strips that only some heads see.
+/// Draws the spacings along the perimeter: T_y around the wall, T_x along the tunnel, T of both, the target,
+/// and the strips that only some heads see.
 pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let around = Around {
@@ -69,7 +70,7 @@ impl Around {
         self.places.iter().filter_map(|place| place.t_m).fold(0.0, f64::max)
     }
 
-    /// Place of the widest strip that no head sees, and the T across it.
+    /// Place of the widest strip that no head sees, and the spacing T across it.
     ///
     /// `None` if that T would dwarf all other values.
     fn across_m(&self) -> Option<[f64; 2]> {
@@ -78,7 +79,7 @@ impl Around {
     }
 }
 
-/// Draws the T across the widest strip that no head sees.
+/// Draws the spacing T across the widest strip that no head sees.
 fn across(chart: &Chart<'_>, around: &Around) {
     let Some(point) = around.across_m() else { return };
     let place = chart.px(point);
@@ -89,7 +90,7 @@ fn across(chart: &Chart<'_>, around: &Around) {
     chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
-/// Text on the T of the plan; empty unless it differs from the largest T in the chart.
+/// Text about the plan's spacing T; empty if that is also the largest T in the chart.
 fn note(shown: &Shown<'_>, around: &Around) -> String {
     let (Some(counted_m), Some(here_m)) = (around.counted_m, around.worst.and_then(|place| place.t_m)) else {
         return String::new();
@@ -108,7 +109,7 @@ fn note(shown: &Shown<'_>, around: &Around) -> String {
     format!("The plan uses T = {} m: {why}{allowed}.", short(counted_m))
 }
 
-/// Text on the tolerances that the plan allows for.
+/// Text about the drift, yaw and yaw rate that the plan allows for.
 fn allowed(shown: &Shown<'_>) -> String {
     let inspection = shown.planner.inspection();
     let drift = (inspection.drift_m > 0.0).then(|| format!("{} m of drift", inspection.drift_m));
@@ -148,11 +149,12 @@ fn shade(chart: &Chart<'_>, stretch: &Thin) {
     }
 }
 
-/// Draws a second row of labels: positions as clock hours.
+/// Draws a second row of axis labels: positions on the wall as clock hours.
 fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     let y = chart.frame.bottom + 34.0;
     let mut taken: Vec<[f64; 2]> = Vec::new();
-    // The floor, the walls and the crown are labelled first, then the hours between them if there is room.
+    // The floor, the walls and the crown are labelled first. The hours between them are labelled if there is
+    // room.
     let (named, between): (Vec<&Hour>, Vec<&Hour>) = hours.iter().partition(|hour| !hour.place.is_empty());
     for hour in named.into_iter().chain(between) {
         let x = chart.px([hour.arc_m, 0.0])[0];
@@ -166,8 +168,8 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     }
 }
 
-/// Draws captions above the thin stretches, which fewer heads see. A caption states the number of these
-/// heads.
+/// Writes captions above the stretches of wall that fewer heads see. A caption states how many heads see the
+/// stretch.
 fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {
@@ -251,7 +253,7 @@ fn line(chart: &Chart<'_>, places: &[WallPlace], of: impl Fn(&WallPlace) -> Opti
     }
 }
 
-/// Runs of neighbouring points that have a value.
+/// Splits a curve into runs of neighbouring points that have a value.
 fn runs<V>(places: &[WallPlace], of: impl Fn(&WallPlace) -> Option<V>) -> Vec<Vec<(f64, V)>> {
     let mut runs = vec![Vec::new()];
     for place in places {

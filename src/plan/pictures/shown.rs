@@ -5,9 +5,9 @@ use headrace_sampling::plan::{Planner, Question};
 /// Content of the charts.
 pub(crate) struct Shown<'a> {
     pub(crate) planner: &'a Planner,
-    /// Mode in the charts of the perimeter and the pattern.
+    /// Index of the mode that the charts of the perimeter and the pattern show.
     pub(crate) mode: usize,
-    /// Speed in these two charts, m/s.
+    /// Speed for which the perimeter and the pattern are drawn, m/s.
     pub(crate) speed_mps: f64,
     pub(crate) question: Question,
     /// Tunnel, heads and layout as text.
@@ -15,13 +15,13 @@ pub(crate) struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// Requested speed, m/s. It may have been requested as a time.
+    /// Requested speed, m/s. If a time was requested, the speed follows from the length.
     pub(super) fn asked_mps(&self) -> Option<f64> {
         let needed = |time_s: f64| self.planner.inspection().length_m / time_s;
         self.question.speed_mps.or(self.question.time_s.map(needed))
     }
 
-    /// Tunnel, heads, layout, and the request.
+    /// Subtitle of a chart: tunnel, heads, layout, and the requested target, speed and hours.
     pub(super) fn subtitle(&self) -> String {
         let Question { target_m, speed_mps, time_s } = self.question;
         let words = [

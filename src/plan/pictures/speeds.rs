@@ -1,4 +1,4 @@
-//! Chart of T against speed.
+//! Chart of the sample spacing T against speed.
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side};
 use headrace_pictures::chart::{Axis, Chart};
@@ -11,10 +11,10 @@ use super::modes::{self, Mode};
 use super::shown::Shown;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
-/// Number of speeds at which T is computed.
+/// Number of speeds at which the spacing T is computed.
 const SPEEDS: u32 = 400;
 
-/// Draws T against speed for every mode, with the target and the requested speed.
+/// Draws the spacing T against speed for every mode, with the target and the requested speed.
 pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let most_mps = most_mps(shown, &modes);
@@ -43,7 +43,7 @@ pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     Ok(canvas.into_svg())
 }
 
-/// Right end of the speed axis, m/s.
+/// Right end of the chart's speed axis, m/s.
 fn most_mps(shown: &Shown<'_>, modes: &[Mode]) -> f64 {
     let fastest = modes.iter().filter_map(|mode| mode.v_max_mps).map(|v_mps| 1.5 * v_mps);
     let asked = shown
@@ -53,7 +53,7 @@ fn most_mps(shown: &Shown<'_>, modes: &[Mode]) -> f64 {
     if most > 0.0 { most } else { 2.0 * shown.speed_mps }
 }
 
-/// Upper end of the T axis, m.
+/// Upper end of the chart's axis for the spacing T, m.
 fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     let at_rest = curves.iter().filter_map(|(_, points)| points.first()).map(|[_, t_m]| *t_m);
     let at_rest_m = at_rest.fold(f64::INFINITY, f64::min);
@@ -61,7 +61,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     let asked_m = here.zip(shown.asked_mps()).and_then(|((_, points), asked_mps)| {
         points.iter().find(|[v_mps, _]| *v_mps >= asked_mps).map(|[_, t_m]| 1.25 * t_m)
     });
-    // Without a target, the axis is longer, so that the other modes can be compared.
+    // Without a target, the axis extends to larger T, so that all modes can be compared.
     let wide = if shown.question.target_m.is_none() { 4.0 } else { 1.0 };
     let target_m = shown.question.target_m.map(|target_m| 2.6 * target_m);
     let least_m = if at_rest_m.is_finite() { 1.5 * at_rest_m } else { 0.0 };
@@ -70,7 +70,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     if most_m > 0.0 { most_m } else { 1.0 }
 }
 
-/// Largest T of any mode within the speed axis.
+/// Largest spacing T of any mode at the speeds of the axis, m.
 fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     curves.iter().flat_map(|(_, points)| points).map(|[_, t_m]| *t_m).fold(0.0, f64::max)
 }
@@ -97,7 +97,7 @@ fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
     Some((chart.px([asked_mps, 0.0])[0], format!("{why}{} m/s", modes::speed(asked_mps))))
 }
 
-/// Labels at the points where curves leave the frame.
+/// Labels at the points where the modes' curves leave the chart's frame.
 #[derive(Default)]
 struct Ends {
     right: Vec<Label>,

@@ -1,5 +1,5 @@
-//! Checks every chart of every kind of plan. It must be well-formed and reproducible, and have the right
-//! content.
+//! Checks every chart of every kind of plan. Each chart must be well-formed and reproducible, and have the
+//! right content.
 
 use clap::Parser;
 use headrace_geometry::frames::Vec3;
@@ -15,9 +15,10 @@ use crate::plan::case::Case;
 const FAST: usize = 2;
 const TARGET: Question = Question { target_m: Some(0.5), speed_mps: None, time_s: None };
 const SPEED: Question = Question { target_m: None, speed_mps: Some(0.1), time_s: None };
-/// VITA 2 with four heads in phase shift: two side by side in front, and two aft.
+/// VITA 2 with four heads in phase-shift mode: two side by side in front, and two aft.
 const VITA_2: &str = "--vehicle deploy/vehicles/vita2-4.toml";
-/// The same heads with sectors. Their distances along the hull leave a strip that no head sees.
+/// VITA 2 with four heads in sector mode. The heads' distances along the hull leave a strip that no head
+/// sees.
 const SECTORS: &str = "--vehicle deploy/vehicles/vita2-4.toml --layout sector_offset";
 const ONE: &str = "--tunnel ceran --length 7000";
 
@@ -33,7 +34,7 @@ fn inspection(arguments: &str) -> Inspection {
     Case::of(&plan).unwrap().inspection
 }
 
-/// A vehicle that occludes its own head, either to the left or all around.
+/// A vehicle whose hull occludes its head's beams, either to the left or all around.
 fn walled_in(all_around: bool) -> Inspection {
     let plate = |[x, y, z]: [f64; 3], most: [f64; 3]| Obstacle::Box {
         least: Vec3::new(x, y, z),
@@ -122,7 +123,7 @@ fn pattern_chart_shows_heads_circle_and_hidden_tracks() {
 
 /// In the pattern, no empty circle has a diameter larger than T, and no gap is larger than the drawn one.
 #[test]
-fn no_empty_circle_exceeds_diameter_t() {
+fn no_empty_circle_is_wider_than_the_spacing_t() {
     let plans = [
         (ONE, 0.058),
         ("--tunnel ceran --heads 4", 0.2),
@@ -149,7 +150,7 @@ fn no_empty_circle_exceeds_diameter_t() {
     }
 }
 
-/// Names of the modes that meet a target. `words` makes the text on each mode's speed.
+/// Names of the modes that meet a target. `words` makes the text about each mode's speed.
 fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> Vec<String> {
     let planner = Planner::new(inspection).unwrap();
     let speed = |mode| Some((modes::name(&planner, mode), planner.v_max_mps(mode, target_m).ok()?));
@@ -173,7 +174,7 @@ fn speed_chart_names_every_mode_and_its_speed() {
 }
 
 #[test]
-fn hour_chart_marks_the_best_mode_and_the_available_time() {
+fn duration_chart_marks_the_best_mode_and_the_available_time() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "hours");
     let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} h", modes::hours(7000.0 / v_mps / 3600.0)));
     for mode in &modes {
@@ -191,7 +192,7 @@ fn hour_chart_marks_the_best_mode_and_the_available_time() {
 }
 
 #[test]
-fn hour_chart_without_a_target_uses_t_at_the_requested_speed() {
+fn duration_chart_without_a_target_uses_the_spacing_at_the_requested_speed() {
     let planner = Planner::new(inspection(VITA_2)).unwrap();
     let finest = planner.answers(&SPEED, None).unwrap().iter().position(|answer| answer.best).unwrap();
     let svg = draw(inspection(VITA_2), finest, 0.1, SPEED, "hours");
@@ -201,7 +202,7 @@ fn hour_chart_without_a_target_uses_t_at_the_requested_speed() {
 
 #[test]
 fn charts_show_and_name_modes_that_miss_the_target() {
-    // In the corners, the angular step of FASTEST alone gives a larger T than this target.
+    // In the corners, the angular step of the mode FASTEST alone gives a larger T than this target.
     let coarse = Question { target_m: Some(0.4), ..TARGET };
     for name in ["speeds", "hours"] {
         let svg = draw(inspection(VITA_2), FAST, 0.08, coarse, name);

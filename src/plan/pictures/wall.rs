@@ -4,7 +4,8 @@ use headrace_geometry::math;
 use headrace_sampling::plan::{Planner, WallPlace};
 use headrace_sampling::strips::Strips;
 
-/// Point with the largest T. Of nearly equal ones, the point nearest to the left wall.
+/// Point on the wall with the largest sample spacing T. Among points with nearly equal T, the one nearest to
+/// the left wall is returned.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {
     /// Ratio above which two values of T count as equal. Steps across a strip's edge make T slightly larger
     /// there than within the strip.
@@ -18,7 +19,7 @@ pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace
     worst.min_by(|a, b| off_m(a).total_cmp(&off_m(b))).copied()
 }
 
-/// A thin stretch of the perimeter: fewer heads see it than see the best-covered part of the perimeter.
+/// A stretch of the perimeter that fewer heads see than the best-covered part of the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Thin {
     pub(super) from_m: f64,
@@ -29,7 +30,7 @@ pub(super) struct Thin {
 }
 
 impl Thin {
-    /// Caption of two short lines.
+    /// Caption of the stretch, as two short lines.
     pub(super) fn words(&self) -> [String; 2] {
         match self.heads {
             0 => ["no head".to_owned(), "sees it".to_owned()],
@@ -38,7 +39,8 @@ impl Thin {
     }
 }
 
-/// Thin stretches for the nominal position of the vehicle. A stretch that crosses the seam is split.
+/// Stretches that fewer heads see, for the nominal position of the vehicle. A stretch that crosses the seam
+/// is split.
 pub(super) fn thin(planner: &Planner) -> Vec<Thin> {
     let perimeter_m = planner.inspection().profile.perimeter_m();
     let strips = planner.nominal_strips().map(Strips::as_slice).unwrap_or_default();

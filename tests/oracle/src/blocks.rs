@@ -13,16 +13,16 @@ const BEYOND_M: f64 = 32.0;
 /// Longest dive that is handled as a single block, m.
 const WHOLE_M: f64 = 256.0;
 
-/// The wall of a dive.
+/// The unrolled wall of a dive with its true samples.
 pub(crate) struct Blocks {
-    /// Wall of a short dive.
+    /// Whole wall, for a short dive.
     whole: Option<Wall>,
     /// Blocks of a long dive by block number, built on demand.
     blocks: RefCell<BTreeMap<i64, Wall>>,
 }
 
 impl Blocks {
-    /// Wraps a dive's true samples. Blocks of a long dive are built on demand.
+    /// Takes the true samples of a dive. Blocks of a long dive are built on demand.
     ///
     /// Errors: as for [`Wall::new`].
     pub(crate) fn of(truth: &Truth) -> Result<Self, TruthError> {

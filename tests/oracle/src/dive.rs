@@ -14,9 +14,10 @@ use headrace_fusion::Navigation;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::messages::Outcome;
 use headrace_monitor::placer::PlacedTick;
-use headrace_monitor::report::{Report, SectionReport};
+use headrace_monitor::report::Report;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
+use headrace_monitor::section_row::SectionRow;
 use headrace_monitor::stage::SurveyStage;
 use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::drive::{Coming, Pace, PacketSource, drive};
@@ -31,7 +32,7 @@ use crate::cpu::timed;
 use crate::error::TruthError;
 use crate::truth::{Truth, TruthTaker};
 
-/// Samples count for a section's chainage offset up to this distance from the section, m.
+/// Samples within this distance of a section are used for the section's chainage offset, m.
 const NEAR_M: f64 = 1.0;
 
 /// Packets sent by the devices, in order of time.
@@ -69,7 +70,7 @@ impl Packets {
 pub struct PacketFeed<'a> {
     packets: &'a Packets,
     next: usize,
-    /// Offset of the next packet's bytes.
+    /// Offset of the next packet's bytes among the bytes of all packets.
     from: usize,
 }
 
@@ -96,7 +97,7 @@ impl PacketSource for PacketFeed<'_> {
 pub struct Recorded {
     /// Packets sent by the devices.
     pub packets: Packets,
-    /// True places where beams met the wall.
+    /// Simulated truth: the places where beams met the wall.
     pub truth: Arc<Truth>,
     /// True trajectory of the vehicle.
     pub scenery: Scenery,
@@ -108,21 +109,21 @@ pub struct Recorded {
 /// A reported section with its true hole.
 #[derive(Debug, Clone)]
 pub struct JudgedSection {
-    /// Report of the section.
-    pub report: SectionReport,
-    /// D_true, m; infinite without samples.
+    /// The section as reported by the loop.
+    pub report: SectionRow,
+    /// True hole diameter D_true, m; infinite without samples.
     pub true_hole_m: f64,
-    /// True minus estimated chainage, m.
+    /// Chainage offset of the section: true minus estimated chainage, m.
     pub shift_m: f64,
 }
 
-/// Report of a dive, with its truth.
+/// Report of a dive, and the truth of the dive's sections.
 pub struct JudgedDive {
-    /// Report from the loop.
+    /// Report of the dive from the loop.
     pub report: Report,
-    /// The truth.
+    /// True places where beams met the wall.
     pub truth: Arc<Truth>,
-    /// All sections, in order.
+    /// All sections of the report, in order.
     pub sections: Vec<JudgedSection>,
 }
 
@@ -167,7 +168,7 @@ impl Recorded {
         })
     }
 
-    /// Time from the first to the last packet, s.
+    /// Duration of the dive, from the first to the last packet, s.
     pub fn duration_s(&self) -> f64 {
         let ends = self.packets.list.first().zip(self.packets.list.last());
         ends.map_or(0.0, |((first, ..), (last, ..))| last.since(*first).as_secs_f64())
@@ -221,7 +222,7 @@ impl Recorded {
             .surveyor()
             .resource::<Seen>()
             .map_or_else(Shifts::default, |seen| seen.shifts(&self.scenery));
-        let judge = |section: &SectionReport| {
+        let judge = |section: &SectionRow| {
             let shift_m = shifts.about(section.start_m, section.end_m);
             let true_hole_m = self.true_hole_m(section.start_m + shift_m, section.end_m + shift_m);
             JudgedSection { report: section.clone(), true_hole_m, shift_m }
@@ -230,7 +231,7 @@ impl Recorded {
         JudgedDive { report, truth: Arc::clone(&self.truth), sections }
     }
 
-    /// CPU time of a replay with the settings of a vehicle file, without arming and report, s.
+    /// CPU time of a replay with the settings of a vehicle file, s. Arming and the report are excluded.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn cpu_s(&self, vehicle: &VehicleConfig) -> Result<f64, TruthError> {
@@ -302,7 +303,7 @@ fn scenery_of(simulation: &Simulation) -> Result<Scenery, TruthError> {
 #[derive(Resource, Default)]
 struct Seen(Vec<(MonoNs, f64, f64)>);
 
-/// Observer that records the places of samples and changes nothing.
+/// Observer of the loop that records the places of samples and changes nothing.
 struct Watch;
 
 impl Plugin for Watch {
@@ -337,8 +338,8 @@ impl Seen {
 struct Shifts(Vec<(f64, f64)>);
 
 impl Shifts {
-    /// Median shift of the samples near a section. Without any, the shift of the nearest sample; without samples at
-    /// all, 0.
+    /// Median chainage offset (true minus estimated) of the samples near a section. If there are none near it, the
+    /// shift of the nearest sample; in a dive without samples, 0.
     fn about(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
         let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();

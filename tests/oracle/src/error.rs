@@ -25,7 +25,7 @@ pub enum TruthError {
         /// Reason.
         why: String,
     },
-    /// A figure can't be computed.
+    /// A figure of the comparison can't be computed.
     #[error("measuring {what}: {why}")]
     Figure {
         /// Name of the figure.

@@ -9,18 +9,18 @@ use headrace_geometry::tunnel::{Profile, Yz};
 /// tunnel.
 const POINTS: u32 = 200_000;
 
-/// A profile's outline, sorted by angle about the reference point.
+/// Points on the outline of a tunnel's profile, sorted by angle about the reference point.
 pub struct Outline {
     reference: Yz,
     perimeter_m: f64,
-    /// Angle of the first point, rad.
+    /// Angle of the first outline point, rad.
     from_rad: f64,
-    /// Points in order of angle: angle relative to the first point, place, and arc length.
+    /// Outline points in order of angle. Each has its angle relative to the first point, its place, and its arc length.
     points: Vec<(f64, Yz, f64)>,
 }
 
 impl Outline {
-    /// The outline of a profile.
+    /// Computes the outline of a tunnel's profile.
     pub fn of(profile: &Profile) -> Self {
         let (reference, perimeter_m) = (profile.reference(), profile.perimeter_m());
         let angle = |at: Yz| math::atan2(at[1] - reference[1], at[0] - reference[0]);
@@ -36,7 +36,7 @@ impl Outline {
         Self { reference, perimeter_m, from_rad, points }
     }
 
-    /// Length of the curve, m.
+    /// Length of the profile's curve, m.
     pub fn perimeter_m(&self) -> f64 {
         self.perimeter_m
     }

@@ -26,7 +26,7 @@ pub const REPLACING: [&str; 10] = [
     "device_faults",
     "stuck_range",
 ];
-/// Properties by which those effects mark a changed return.
+/// Properties by which the effects in [`REPLACING`] mark a changed return.
 const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];
 
 /// A place where a beam truly met the wall.
@@ -34,16 +34,16 @@ const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];
 pub struct TrueSample {
     /// Time of the ping.
     pub at: MonoNs,
-    /// Number of the source.
+    /// Number of the source (the profiling head).
     pub source: u16,
-    /// Chainage and arc length, m.
+    /// Place on the unrolled wall: chainage and arc length, m.
     pub place: Place,
 }
 
-/// Ground truth of a dive.
+/// Simulated ground truth of a dive: true samples and the vehicle's range of chainage.
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// Places where beams met the wall, grouped by source within each second.
+    /// Places where beams truly met the wall, grouped by source within each second.
     pub samples: Vec<TrueSample>,
     /// Smallest and largest chainage of the vehicle, m.
     pub way_m: [f64; 2],
@@ -56,7 +56,7 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// The wall with all true samples.
+    /// The unrolled wall with all true samples.
     ///
     /// Errors: as for [`Wall::new`].
     pub fn wall(&self) -> Result<Wall, TruthError> {
@@ -94,7 +94,7 @@ impl TruthTaker {
         }
     }
 
-    /// Collects the truth that is new since the previous call.
+    /// Collects the truth that the simulation has added since the previous call.
     pub fn note(&mut self, simulation: &mut Simulation) {
         for row in simulation.take_truth() {
             let [least_m, most_m] = self.truth.way_m;

@@ -13,7 +13,7 @@ const TINY_M: f64 = 1e-100;
 /// Largest rounding error of a circumradius or a circumcentre, m.
 const ROUNDING_M: f64 = 1e-6;
 
-/// A place: chainage and arc length, m.
+/// A place on the unrolled wall: chainage and arc length, m.
 pub type Place = [f64; 2];
 
 #[derive(Clone, Copy)]
@@ -27,12 +27,12 @@ impl HasPosition for Vertex {
     }
 }
 
-/// A circle without samples.
+/// A circle on the unrolled wall that contains no samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
-    /// Centre: chainage and arc length, m.
+    /// Centre of the circle: chainage and arc length, m.
     pub centre: Place,
-    /// Radius, m.
+    /// Radius of the circle, m.
     pub radius_m: f64,
 }
 
@@ -41,7 +41,7 @@ pub struct Circle {
 pub struct Wall {
     perimeter_m: f64,
     samples: Vec<Place>,
-    /// The samples and their images in the neighbouring turns, sorted by arc length.
+    /// The samples and their images one perimeter before and after, sorted by arc length.
     images: Vec<Place>,
     /// Empty circles through three samples, the largest first.
     circles: Vec<Circle>,
@@ -140,7 +140,8 @@ fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError
     let mut circles: Vec<Circle> = triangles
         .inner_faces()
         .filter_map(|face| circle(face.positions().map(|at| [at.x, at.y])))
-        // Rounding may move a centre on the seam to either side of it. The tolerance keeps the circle or its image.
+        // Rounding may move a centre to either side of the seam. With the tolerance, at least one of the circle
+        // and its image across the seam is kept.
         .filter(|circle| (-ROUNDING_M..perimeter_m + ROUNDING_M).contains(&circle.centre[1]))
         .map(|Circle { centre: [x, sigma], radius_m }| Circle {
             centre: [x, math::wrap(sigma, perimeter_m)],

@@ -1,4 +1,4 @@
-//! The fault of one device, drawn from a seed.
+//! A random fault of one device of a vehicle, drawn from a seed.
 
 use headrace_geometry::math;
 use headrace_sensor::device::Sense;
@@ -6,32 +6,32 @@ use headrace_simulator::Scene;
 
 use crate::random_dives::Draw;
 
-/// Kinds of faults.
+/// Kinds of device faults.
 pub const FAULTS: [&str; 5] = ["stick", "jump", "die", "return", "babble"];
-/// Senses of the devices that may fail.
+/// Senses (quantities measured) of the devices that may fail.
 pub const SENSES: [Sense; 5] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Tether];
 
-/// A device and its fault.
+/// A device and the fault that it has during a dive.
 #[derive(Debug, Clone)]
 pub struct DeviceFault {
-    /// Sense of the device.
+    /// Sense of the device: the quantity that it measures.
     pub sense: Sense,
     /// Name of the device.
     pub sensor: String,
     /// One of [`FAULTS`]. A device with the fault `die` never recovers; one with `return` does.
     pub fault: &'static str,
-    /// Start of the fault, seconds of the dive.
+    /// Start of the fault, seconds after the start of the dive.
     pub from_s: f64,
-    /// Duration, seconds; `None` means to the end of the dive.
+    /// Duration of the fault, seconds; `None` means to the end of the dive.
     pub for_s: Option<f64>,
-    /// Size of a jump: degrees for a head or an inertial unit, m for other devices.
+    /// Size of the fault `jump`: degrees for a head or an inertial unit, m for other devices.
     pub size: f64,
 }
 
 impl DeviceFault {
-    /// The fault of a seed in a dive of this duration. Senses and faults rotate with the seed; all other values are
-    /// drawn.
+    /// The fault that belongs to a seed, in a dive of this duration. Senses and faults rotate with the seed; all other
+    /// values are drawn.
     pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
         let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);
         let turn = usize::try_from(seed).unwrap();
@@ -44,7 +44,7 @@ impl DeviceFault {
         let from_s = duration_s * draw.between(0.2, 0.7);
         let length_s = math::exp(draw.between(0.0, math::ln(60.0)));
         let lasts = fault == "die" || draw.below(4) == 0;
-        // The range extends from sizes that nothing can detect to sizes that must be detected.
+        // The jumps range from sizes that no check can detect to sizes that must be detected.
         let [least, most] = match sense {
             Sense::Head | Sense::Inertial => [1.0, 40.0],
             _ => [0.05, 5.0],
@@ -60,7 +60,7 @@ impl DeviceFault {
         }
     }
 
-    /// Effect of the simulator that causes the fault.
+    /// TOML text of the simulator effect that causes the fault.
     pub fn effect(&self) -> String {
         let kind = if self.fault == "return" { "die" } else { self.fault };
         let size = if kind == "jump" { format!("size = {:.3}\n", self.size) } else { String::new() };

@@ -13,40 +13,40 @@ use crate::planned::planned_mps;
 use crate::random_dives::Draw;
 use crate::scenes;
 
-/// A vehicle of the table.
+/// A vehicle of the field table.
 #[derive(Debug, Clone, Copy)]
 pub struct Vehicle {
-    /// Name in the table.
+    /// Name of the vehicle in the field table.
     pub name: &'static str,
     /// File name in `deploy/vehicles`.
     pub file: &'static str,
-    /// Mode of the heads.
+    /// Mode of the heads, such as "fast".
     pub mode: &'static str,
     /// Target T, m.
     pub target_m: f64,
-    /// Layout of the heads.
+    /// Layout of the heads: phase shift or sectors.
     pub layout: &'static str,
     /// Default length of a dive, m. It is larger for vehicles whose passes are far apart.
     pub length_m: f64,
-    /// Factor for the chainage of [`PLACES`] beyond the portal, for tunnels shorter than 7 km.
+    /// Factor by which the chainages of [`PLACES`] are reduced, except near the portal, for tunnels shorter than 7 km.
     pub far_share: f64,
     /// Noise of the inertial unit, unless a condition changes it.
     unit: Unit,
-    /// Largest speed that keeps the target by Eq. 16 with the vehicle's own occlusion and no other margin, m/s. The
-    /// value is constant, so that speeds derived from it don't change with the planner.
+    /// Largest speed that meets the target by the paper's Eq. 16, with the vehicle's own occlusion and no other margin,
+    /// m/s. The value is constant, so that speeds derived from it don't change with the planner.
     pub edge_mps: f64,
 }
 
 /// Inertial units, named by the source of their simulated noise: a vehicle file or a data sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Unit {
-    /// Noise of the preset `xsens_mti600`: `plugins/imu_can/src/noise.rs`.
+    /// An inertial unit with the noise of the preset `xsens_mti600`, from `plugins/imu_can/src/noise.rs`.
     Xsens,
-    /// An autopilot's unit. Its noise is that of the defaults of `[navigation]`.
+    /// An autopilot's inertial unit. Its noise equals the defaults of `[navigation]`.
     Autopilot,
 }
 
-/// The vehicles.
+/// All vehicles of the field table.
 pub const VEHICLES: [Vehicle; 8] = [
     vehicle("vita1", "vita1.toml", "slow", 5.0, 45.0, 0.231),
     vehicle("vita2-2", "vita2-2.toml", "fast", 0.5, 15.0, 0.115),
@@ -84,12 +84,13 @@ pub enum Condition {
     Clean,
     /// Every sensor has the noise of its data sheet.
     DataSheet,
-    /// As `DataSheet`, but the vehicle file states the true noises. It allows for no rough walls, tilt or slack.
+    /// As `DataSheet`, but the vehicle file states the true sensor noises. The file allows for no rough walls, tilt or
+    /// cable slack.
     Told,
-    /// A MEMS unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error, and steel
+    /// A MEMS inertial unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error; steel
     /// nearby.
     Poor,
-    /// Series of lost returns, returns from objects before the wall, and second echoes.
+    /// Runs of lost returns, returns from objects in front of the wall, and second echoes.
     Murk,
     /// The wall is as rough as vehicle files allow for.
     Rough,
@@ -105,9 +106,9 @@ pub enum Condition {
     WrongWall,
     /// The data of a sensor arrive 0.3 s late.
     WrongLatency,
-    /// The cable's counter reads 2 % too much.
+    /// The cable counter reads 2 % too much.
     WrongCable,
-    /// The inertial unit is a MEMS one, but the vehicle file names a better one.
+    /// The inertial unit is a MEMS unit, but the vehicle file names a better unit.
     WrongUnit,
     /// The cable hangs, but the vehicle file states that it is taut.
     WrongSlack,
@@ -135,24 +136,25 @@ pub const CONDITIONS: [(&str, Condition); 16] = [
     ("broken", Condition::Broken),
 ];
 
-/// Start of a dive: name and chainage, m.
+/// Place at which a dive starts: name, and chainage in m.
 pub type Place = (&'static str, f64);
 
-/// Places at which dives start. Shorter tunnels use a fraction of the chainage ([`Vehicle::far_share`]).
+/// Places at which dives start. Tunnels shorter than 7 km use a fraction of the chainage ([`Vehicle::far_share`]).
 pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900.0)];
 
-/// Driving of a dive.
+/// Speed and manner in which the pilot drives during a dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driven {
-    /// At the speed from `plan --write` for this mode and target.
+    /// At the speed that `plan --write` gives for the cell's mode and target.
     Planned,
-    /// As `Planned`, after a stationary phase at the start.
+    /// At the planned speed, after a stationary phase at the start.
     Stood,
-    /// At this multiple of the largest speed by Eq. 16, with planned phases.
+    /// At this multiple of the largest speed by the paper's Eq. 16, with the heads in phase for the planned speed.
     Times(f64),
     /// By a pilot who never goes back and follows the live advice within 5 %, with a delay of 3 s.
     Advised,
-    /// By a pilot who drives at 1.2 times the speed by Eq. 16, and afterwards goes back for every missed section.
+    /// By a pilot who drives at 1.2 times the largest speed by the paper's Eq. 16, and afterwards goes back for every
+    /// missed section.
     Back,
 }
 
@@ -165,18 +167,18 @@ pub const DRIVEN: [(&str, Driven); 5] = [
     ("back", Driven::Back),
 ];
 
-/// A cell of the table.
+/// A cell of the field table.
 #[derive(Debug, Clone, Copy)]
 pub struct Cell {
-    /// Vehicle.
+    /// Vehicle of the cell.
     pub vehicle: Vehicle,
-    /// Condition.
+    /// Condition of the cell: sensor errors, wall and driving.
     pub condition: Condition,
-    /// Chainage of the start, m.
+    /// Chainage at which the dive starts, m.
     pub start_m: f64,
-    /// Chainage of the launch, m, if the vehicle drives from there to `start_m`.
+    /// Chainage at which the vehicle is launched, m, if it drives from there to `start_m`.
     pub let_in_m: Option<f64>,
-    /// Driving.
+    /// Speed and manner of driving.
     pub driven: Driven,
 }
 
@@ -184,28 +186,28 @@ pub struct Cell {
 pub struct CellDive {
     /// The simulated scene.
     pub scene: Scene,
-    /// A scene with the vehicle file that headrace reads.
+    /// The same scene, but with the vehicle file that headrace reads.
     pub believed: Scene,
 }
 
 /// Noise and resolution of the depth sensor; heads and echosounders have separate tables. Source:
 /// `replay/simulator/src/implied_effects/data_sheets.rs`.
 const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
-/// Noise and biases of the units. Source: `plugins/imu_can/src/noise.rs`, and the defaults of `[navigation]` in
-/// docs/reference/vehicle-file.md.
+/// Noise and biases of the inertial units. Source: `plugins/imu_can/src/noise.rs`, and the defaults of `[navigation]`
+/// in docs/reference/vehicle-file.md.
 const XSENS: &str = "imu_noise = { gyro_degps_rthz = 0.0077, accel_mps2_rthz = 0.0006, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.0022, accel_mps2 = 0.002, tau_s = 300, gyro_constant_degps = 0.05, accel_constant_mps2 = 0.02 }\n";
 const AUTOPILOT: &str = "imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.003, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.03, tau_s = 1000 }\n";
-/// Source: field.md, "poor".
+/// Noise and biases of the MEMS inertial unit. Source: field.md, "poor".
 const MEMS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.02, tau_s = 300 }\n";
-/// Settings of the vehicle file for this unit.
+/// Settings of the vehicle file for the MEMS inertial unit.
 const MEMS_TOLD: &str = "gyro_noise_degps_rthz = 0.007\naccel_noise_mps2_rthz = 0.001\ngyro_bias_degps = 0.2\n\
      gyro_bias_time_s = 300\naccel_bias_mps2 = 0.02\naccel_bias_time_s = 300\n";
 const STEEL: &str = "magnetic_disturbance = { per_100m = 4, up_to_deg = 10, length_m = 6 }\n";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
-/// Slack settings of the vehicle file, for a taut and for a hanging cable.
+/// Cable slack settings of the vehicle file, for a taut and for a hanging cable.
 const TAUT: &str = "slack_sd_m = 0.003\nslack_time_s = 10\n";
 const HANGS: &str = "slack_sd_m = 0.06\nslack_time_s = 10\n";
 
@@ -226,11 +228,11 @@ const OFF_DESIGN_M: f64 = 0.06;
 /// Duration of the stationary phase at the start of a dive, s.
 const STANDS_S: f64 = 30.0;
 
-/// Speed from the launch to the start, m/s.
+/// Speed of the vehicle from the launch to the start of the inspection, m/s.
 const WAY_MPS: f64 = 0.3;
 
 impl Cell {
-    /// The dive of a seed with this length.
+    /// The dive that belongs to a seed, with this length.
     pub fn dive(&self, seed: u64, length_m: f64) -> CellDive {
         let plain = self.plain(seed, length_m);
         let [planned_mps, speed_mps] = self.speeds_mps(&plain.vehicle);
@@ -241,19 +243,19 @@ impl Cell {
         CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &told, seed) }
     }
 
-    /// Ratio of the planned speed to the speed of Eq. 16.
+    /// Ratio of the planned speed to the largest speed by the paper's Eq. 16.
     pub fn plan_share(&self) -> f64 {
         self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
 
-    /// The broken device in the dive of a seed with this length.
+    /// The broken device, and its fault, in the dive that belongs to a seed, with this length.
     pub fn broken(&self, seed: u64, length_m: f64) -> DeviceFault {
         let plain = self.plain(seed, length_m);
         let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
         DeviceFault::of(seed, &plain, length_m / speed_mps)
     }
 
-    /// The scene without effects, at any speed.
+    /// The scene of a dive without effects; its speed is arbitrary.
     fn plain(&self, seed: u64, length_m: f64) -> Scene {
         parse(&self.text(seed, length_m, 0.1, ""), &self.told(), seed)
     }
@@ -291,7 +293,8 @@ impl Cell {
             told.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
         };
         match self.condition {
-            // The counter reads less than its nominal scale, so that no chainage lies beyond the tunnel's end.
+            // The cable counter reads too little, not too much, so that no estimated chainage lies beyond the tunnel's
+            // end.
             Condition::Poor => counts(0.995),
             Condition::WrongCable => counts(0.98),
             Condition::WrongMount => {
@@ -302,18 +305,18 @@ impl Cell {
         }
     }
 
-    /// Planned speed and driven speed, m/s.
+    /// Planned speed, and speed at which the pilot drives, m/s.
     fn speeds_mps(&self, vehicle: &VehicleConfig) -> [f64; 2] {
         let planned_mps = HELD_SHARE * self.plan_mps(vehicle);
         match self.driven {
             Driven::Planned | Driven::Stood => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
-            // The pilot may drive at up to this speed.
+            // For these kinds of driving, the second value is the largest speed that the pilot may drive.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
         }
     }
 
-    /// Planned speed, m/s.
+    /// Planned speed from `plan`, m/s.
     fn plan_mps(&self, vehicle: &VehicleConfig) -> f64 {
         planned_mps(vehicle, &self.told().replace("PLANNED", "0.1"), self.vehicle.mode)
     }
@@ -433,8 +436,8 @@ impl Cell {
 
     /// Murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
     ///
-    /// In these stretches, 10 to 30 % of the heads' returns are missing, in series. Clusters before the wall cause 5
-    /// % of the returns, and second echoes cause some. Source: field.md, "murk".
+    /// In these stretches, 10 to 30 % of the heads' returns are missing, in runs. Clusters in front of the wall
+    /// cause 5 % of the returns, and second echoes cause some. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();
@@ -459,7 +462,7 @@ impl Cell {
         murk
     }
 
-    /// Effect of the condition's single wrong setting or broken device.
+    /// Text of the simulator effect for the condition's single wrong setting or broken device.
     fn wrong(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
         let mut draw = Draw::new(seed);
         match self.condition {
@@ -475,7 +478,7 @@ impl Cell {
     }
 }
 
-/// Names of the sensors of a sense.
+/// Ids of the sensors that measure this quantity (sense).
 fn of_sense(scene: &Scene, sense: Sense) -> Vec<String> {
     scene
         .facts()

@@ -1,5 +1,6 @@
-//! Figures of a cell: verdicts and standard deviations compared with the truth.
+//! Figures of a cell of the field table: verdicts and standard deviations compared with the truth.
 
+use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_monitor::report::AdviceReport;
 use headrace_sensor::device::Sense;
@@ -8,7 +9,7 @@ use headrace_simulator::Scene;
 use crate::field::rms;
 use crate::truth::{JudgedDive, JudgedSection};
 
-/// Kinds of sources with innovations, by name.
+/// Kinds of sensors whose readings have innovations in the filter, each with its name in the table.
 pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("head", Sense::Head),
     ("ping", Sense::Echosounder),
@@ -17,8 +18,8 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("tether", Sense::Tether),
     ("dvl", Sense::Velocity),
 ];
-/// Length at each end of a dive in which sections have neighbours on one side only, in addition to the target, m. It
-/// covers the hull and the distance to the next pass.
+/// Length that is left out at each end of a dive, in addition to a length equal to the target, m. Sections
+/// there have neighbours on one side only. The length covers the hull and the distance to the next pass.
 const END_M: f64 = 2.0;
 /// A hole belongs to a section if its centre is at least this far from both bounds of the section, m.
 const FLANK_M: f64 = 0.005;
@@ -28,7 +29,7 @@ const TOUCH_M: f64 = 0.02;
 /// A section that passed although its true hole exceeds the target.
 #[derive(Debug, Clone)]
 pub struct FalsePass {
-    /// Seed of the dive.
+    /// Seed of the dive in which the section passed.
     pub seed: u64,
     /// Chainage of the section's start, m.
     pub start_m: f64,
@@ -36,14 +37,14 @@ pub struct FalsePass {
     pub hole_m: [f64; 3],
     /// Reported position of the hole: chainage and clock position.
     pub at: (f64, String),
-    /// Number of returns that weren't accepted as wall.
+    /// Number of the section's returns that weren't accepted as wall.
     pub doubtful: u32,
 }
 
-/// Figures of all dives of a cell.
+/// Figures over all dives of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Figures {
-    /// Number of dives.
+    /// Number of dives of the cell.
     pub dives: u32,
     /// Number of sections, including sections at the ends of dives.
     pub sections: u32,
@@ -53,7 +54,7 @@ pub struct Figures {
     pub passed_over: u32,
     /// Number of passed sections with D_true over 1.1 times the target.
     pub passed_far: u32,
-    /// All passed sections with D_true over the target.
+    /// List of the passed sections with D_true over the target.
     pub falsely: Vec<FalsePass>,
     /// Number of sections with D_true below 0.9 times the target.
     pub under: u32,
@@ -68,7 +69,7 @@ pub struct Figures {
     /// D minus D_true, and the standard deviation of D, m. Contains each inner section with a bounded hole of its
     /// own.
     pub errors: Vec<[f64; 2]>,
-    /// Number of used measurements, and sum of their normalised innovations squared, by kind of source.
+    /// Number of measurements that the filter used, and sum of their normalised innovations squared, by kind of sensor.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
     /// Advised speeds, without those near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,
@@ -77,7 +78,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Adds the part of a dive beyond the chainage `from_m`.
+    /// Adds the figures of a dive, from the chainage `from_m` on.
     pub fn add(&mut self, dive: &JudgedDive, scene: &Scene, from_m: f64) {
         self.dives += 1;
         let target_m = dive.report.target_m;
@@ -101,7 +102,7 @@ impl Figures {
         self.tell(dive);
     }
 
-    /// Adds the figures of other dives.
+    /// Adds the figures of other dives of the same cell.
     pub fn join(&mut self, other: &Self) {
         self.dives += other.dives;
         self.sections += other.sections;
@@ -126,7 +127,8 @@ impl Figures {
     }
 
     fn judge(&mut self, section: &JudgedSection, target_m: f64, seed: u64) {
-        let (passed, failed) = (section.report.verdict == "pass", section.report.verdict == "fail");
+        let (passed, failed) =
+            (section.report.verdict == Verdict::Pass, section.report.verdict == Verdict::Fail);
         let is = |condition: bool| u32::from(condition);
         let share = section.true_hole_m / target_m;
         self.sections += 1;
@@ -153,12 +155,13 @@ impl Figures {
         if section.true_hole_m <= target_m {
             self.passable_m += length_m;
         }
-        let place = ["pass", "fail", "cannot_say", "open"].iter().position(|v| *v == section.report.verdict);
+        let verdicts = [Verdict::Pass, Verdict::Fail, Verdict::CannotSay, Verdict::Open];
+        let place = verdicts.iter().position(|verdict| *verdict == section.report.verdict);
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle centred on a section's bound belongs to the hole of the neighbouring section, which it would count
-        // twice.
+        // A circle centred on a section's boundary belongs to the neighbouring section's hole. To include it
+        // here would count that hole twice.
         let is_own = section
             .report
             .hole_x_m
@@ -204,17 +207,17 @@ impl Figures {
         self.way_m[1] += told as f64 * section_m;
     }
 
-    /// Fraction of the inner length with this verdict, by number: passed, failed, can't say, open.
+    /// Fraction of the inner length with a verdict, given by number: 0 passed, 1 failed, 2 can't say, 3 open.
     pub fn share(&self, verdict: usize) -> f64 {
         self.verdicts_m[verdict] / self.inner_m
     }
 
-    /// Fraction of the inner length with D_true within the target.
+    /// Fraction of the inner length with D_true within the target, 0 to 1.
     pub fn passable(&self) -> f64 {
         self.passable_m / self.inner_m
     }
 
-    /// Root mean square of the ratio of errors to their standard deviations.
+    /// Root mean square of the errors of D, each divided by its standard deviation.
     pub fn ratio_rms(&self) -> f64 {
         if self.errors.is_empty() {
             f64::NAN
@@ -223,18 +226,18 @@ impl Figures {
         }
     }
 
-    /// Fraction of errors within this many standard deviations.
+    /// Fraction of the errors of D that are within this many standard deviations.
     pub fn within(&self, sigmas: f64) -> f64 {
         let within = self.errors.iter().filter(|[error_m, sd_m]| error_m.abs() <= sigmas * sd_m).count();
         within as f64 / self.errors.len() as f64
     }
 
-    /// Root mean square of the errors, m.
+    /// Root mean square of the errors of D, m.
     pub fn error_m(&self) -> f64 {
         rms(self.errors.iter().map(|[error_m, _]| *error_m))
     }
 
-    /// Median of the standard deviations, m.
+    /// Median of the reported standard deviations of D, m.
     pub fn sd_m(&self) -> f64 {
         median(self.errors.iter().map(|[_, sd_m]| *sd_m))
     }
@@ -244,18 +247,18 @@ impl Figures {
         median(self.advised_mps.iter().copied())
     }
 
-    /// Mean normalised innovation squared of one kind of source, by number.
+    /// Mean normalised innovation squared of one kind of sensor, given by its index in [`KINDS_OF_SOURCES`].
     pub fn nis(&self, kind: usize) -> Option<f64> {
         let (used, sum) = self.innovations[kind];
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Fraction of sections with D_true over the target that passed.
+    /// Among sections with D_true over the target, the fraction that passed.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Fraction of sections with D_true below 0.9 times the target that failed.
+    /// Among sections with D_true below 0.9 times the target, the fraction that failed.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }

@@ -11,13 +11,13 @@ use crate::random_dives::Draw;
 
 /// Chainage at which dives begin, m.
 pub(super) const START_M: f64 = 3.0;
-/// Distance that a vehicle drives beyond the far end, m. A vehicle that turns back too early drives back by this
-/// distance.
+/// Distance that a vehicle drives beyond the far end, m. A vehicle that turns back too early stops this far
+/// short of the far end.
 const ON_M: f64 = 4.5;
-/// Distance in which the vehicle rolls before a rolled pass, m.
+/// Distance over which the vehicle rolls to its new roll angle before a rolled pass, m.
 const ROLLS_OVER_M: f64 = 1.0;
 
-/// Sensors for the position. No part of the hull hides them.
+/// Tables of the sensors that determine the vehicle's position. No part of the hull hides them.
 const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"
@@ -51,38 +51,39 @@ plugin = "tether_hid"
 counts_per_metre = 2000
 "#;
 
-/// An injected cause.
+/// A cause of failed sections that is injected into a dive.
 #[expect(missing_docs, reason = "the variants name their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Injected {
-    /// A stretch that is driven at this multiple of the dive's speed.
+    /// The vehicle drives over a stretch at this multiple of the dive's speed.
     TooFast { over_m: [f64; 2], factor: f64 },
-    /// A mode with coarser steps.
+    /// A mode of the heads with coarser angular steps.
     AngularStep { mode: &'static str },
-    /// Missing returns; the keys belong to the effect.
+    /// Missing returns; `keys` are the keys of the simulator effect.
     MissingReturns { keys: String },
-    /// A range setting shorter than the distance to the wall, m.
+    /// A range setting of the heads that is shorter than the distance to the wall, m.
     OutOfRange { range_m: u32 },
-    /// Real parts of the vehicle in front of the beams. Vehicle files declare these parts in any case.
+    /// Parts of the vehicle hide the wall from the beams. Vehicle files declare these parts even if the cause isn't
+    /// injected.
     Occluded,
-    /// Offset from the centre line by [y, z], m.
+    /// The vehicle is offset from the centre line by [y, z], m.
     Aside { over_m: [f64; 2], by_m: [f64; 2] },
-    /// Oscillating yaw.
+    /// The vehicle yaws back and forth.
     Swing { over_m: [f64; 2], yaw_deg: f64, every_s: f64 },
-    /// Phase offsets of the heads, degrees.
+    /// The heads start with these phase offsets, degrees.
     Phase { offsets_deg: Vec<f64> },
     /// A head that stalls now and then.
     HeadStalled { head: usize, per_hour: f64 },
-    /// Silence of heads over a stretch.
+    /// Some heads are silent over a stretch.
     HeadSilent { heads: Vec<usize>, over_m: [f64; 2] },
-    /// Silence of the position sensor over a stretch.
+    /// A sensor that determines the position is silent over a stretch.
     PositionLost { sensor: &'static str, over_m: [f64; 2] },
     /// A vehicle that turns back before the end.
     NotPassed,
 }
 
 impl Injected {
-    /// The cause that the program should find.
+    /// Cause that the program should report for the injected cause.
     pub fn cause(&self) -> Cause {
         match self {
             Self::TooFast { .. } => Cause::TooFast,
@@ -100,7 +101,7 @@ impl Injected {
     }
 }
 
-/// The cross-section.
+/// Cross-section of the tunnel in a drawn dive.
 #[derive(Debug, Clone)]
 struct Tunnel {
     keys: String,
@@ -112,16 +113,16 @@ struct Tunnel {
     range_m: u32,
 }
 
-/// A dive drawn from a seed.
+/// A dive with injected causes, drawn from a seed.
 #[derive(Debug, Clone)]
 pub struct Drawn {
-    /// Seed.
+    /// Seed from which the dive is drawn.
     pub seed: u64,
     /// Seed of the noise in the dive's effects.
     noise: u64,
-    /// Injected causes.
+    /// Causes injected into the dive.
     pub injected: Vec<Injected>,
-    /// Chainage of the far end, m.
+    /// Chainage of the far end of the dive, m.
     pub end_m: f64,
     /// Speed without injected causes, m/s.
     pub speed_mps: f64,
@@ -131,16 +132,16 @@ pub struct Drawn {
     pub margin: f64,
     tunnel: Tunnel,
     mode: &'static str,
-    /// Tables of the heads, without mode and range.
+    /// Vehicle file tables of the heads, without mode and range.
     heads: Vec<String>,
     hull: &'static str,
     way: &'static str,
     /// Whether heads hide the wall from each other in addition to the injected causes.
     in_each_others_way: bool,
     swaying: bool,
-    /// A stretch with a speed limit, m/s.
+    /// A stretch on which the vehicle obeys a speed limit, and the limit in m/s.
     at_most: Option<([f64; 2], f64)>,
-    /// A stretch that is passed again at the end, and the roll angle to each side, degrees.
+    /// A stretch that the vehicle passes again at the end of the dive, and the roll angle to each side, degrees.
     again: Option<([f64; 2], f64)>,
 }
 
@@ -208,7 +209,7 @@ pub const KINDS: [Cause; 11] = [
 ];
 
 impl Drawn {
-    /// The dive of a seed with these kinds of causes, given as indices of [`KINDS`].
+    /// Draws the dive of a seed with these kinds of causes, given as indices of [`KINDS`].
     pub fn of(seed: u64, kinds: &[usize]) -> Self {
         let mut draw = Draw::new(seed);
         let causes: Vec<Cause> = kinds.iter().map(|kind| KINDS[*kind]).collect();
@@ -223,7 +224,7 @@ impl Drawn {
         let mode = if has(Cause::AngularStep) { 1 + draw.below(2) } else { draw.below(4) };
         let (mode, turn_s, step_deg) = MODES[mode];
         let step_m = tunnel.far_m * step_deg.to_radians();
-        // Ratio of the distance between passes to the step along the wall.
+        // Ratio of the distance between passes (T_x) to the step along the wall (T_y).
         let ratio = if has(Cause::AngularStep) { draw.between(0.8, 1.1) } else { draw.between(2.5, 5.0) };
         let gap_s = turn_s / count as f64;
         let speed_mps = (ratio * step_m / gap_s).clamp(0.03, 0.35);
@@ -253,7 +254,7 @@ impl Drawn {
         drawn
     }
 
-    /// The same dive with another noise, selected by number.
+    /// The same dive with other random noise, selected by number.
     #[must_use]
     pub fn with_noise(&self, noise: u64) -> Self {
         Self { noise: self.seed + 1_000_000 * noise, ..self.clone() }
@@ -317,7 +318,8 @@ impl Drawn {
             },
             Cause::Phase => {
                 let mut offsets_deg = vec![0.0; count];
-                // All heads are almost in phase with the first head, so they leave gaps.
+                // All heads look almost in the same direction as the first head at the same time, so their passes leave
+                // gaps.
                 for (head, offset_deg) in offsets_deg.iter_mut().enumerate().skip(1) {
                     let together_deg = 360.0 * head as f64 / count as f64;
                     *offset_deg = math::wrap_signed(together_deg * draw.between(0.7, 1.0), 360.0);
@@ -449,7 +451,7 @@ impl Drawn {
                 Injected::TooFast { over_m, factor } if (over_m[0]..over_m[1]).contains(&before_m) => {
                     point.speed_mps *= factor;
                 }
-                // The vehicle moves to the offset and back on the way between neighbouring points.
+                // Between neighbouring points of the path, the vehicle moves to the offset or back.
                 Injected::Aside { over_m, by_m } if (over_m[0]..=over_m[1]).contains(&x_m) => {
                     point.place_m = [point.place_m[0] + by_m[0], point.place_m[1] + by_m[1]];
                 }
@@ -469,7 +471,7 @@ impl Drawn {
     }
 }
 
-/// A point of a path, with the speed towards it.
+/// A point of the vehicle's path, with the speed towards this point.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     x_m: f64,

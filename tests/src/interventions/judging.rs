@@ -1,20 +1,21 @@
 //! Judges the displayed causes of a dive by its simulations with and without each injected cause.
 
-use headrace_coverage::{Cause, Evidence};
-use headrace_monitor::report::{Report, SectionReport};
+use headrace_coverage::{Cause, Evidence, Verdict};
+use headrace_monitor::report::Report;
+use headrace_monitor::section_row::SectionRow;
 
 use super::draw::{Drawn, Injected, KINDS, START_M};
 use crate::scenes;
 
-/// Sections this near to the ends of the trajectory are left out, m, because they always fail.
+/// Sections within this distance of the ends of the trajectory are ignored, m, because they always fail.
 const END_M: f64 = 2.0;
-/// Failed sections this near to each other form one stretch, m.
+/// Failed sections within this distance of each other form one stretch, m.
 const JOIN_M: f64 = 0.5;
 
 /// A hole up to this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
-/// Alternative sets of causes, each one sorted. Any of these sets is right.
+/// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of them.
 pub type Right = Vec<Vec<Cause>>;
 
 /// A failed section with true and displayed causes.
@@ -22,39 +23,40 @@ pub type Right = Vec<Vec<Cause>>;
 pub struct Judged {
     /// Chainage of the section's start and end, m.
     pub ends_m: [f64; 2],
-    /// Sets of causes that are right.
+    /// Sets of causes that count as right.
     pub right: Right,
     /// Displayed causes, sorted.
     pub told: Vec<Cause>,
-    /// Number of the section's run.
+    /// Number of the run of sections to which the section belongs.
     pub run: Option<u32>,
-    /// Diameter of the hole, m.
+    /// Diameter of the section's hole, m.
     pub hole_m: f64,
-    /// Diameter of the hole without each single injected cause, m; infinite if the hole can't be measured.
+    /// Diameter of the hole with one injected cause removed, one value per cause, m; infinite if the hole can't
+    /// be measured.
     pub without_m: Vec<f64>,
-    /// Evidence for the displayed causes.
+    /// Evidence that the program reports for the displayed causes.
     pub evidence: Evidence,
 }
 
 impl Judged {
-    /// Whether the displayed causes are right.
+    /// Whether the displayed causes equal one of the right sets.
     pub fn is_right(&self) -> bool {
         self.right.contains(&self.told)
     }
 
-    /// Whether an injected cause is displayed that is nearly right: without it, the hole exceeds the target by 5 % at
-    /// most.
+    /// Whether the only displayed cause is nearly right: it was injected, and without it the hole exceeds the
+    /// target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
     }
 }
 
-/// A dive with its failed sections.
+/// A drawn dive with its failed sections, and the true and displayed causes of these sections.
 pub struct InterventionDive {
-    /// The drawn dive, with its final target.
+    /// The dive as drawn from its seed, with its final target.
     pub drawn: Drawn,
-    /// Report with all injected causes.
+    /// Report of the dive with all injected causes.
     pub report: Report,
     /// Failed sections that the injected causes can explain.
     pub sections: Vec<Judged>,
@@ -79,7 +81,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// Number of runs in which the stretch is displayed.
+    /// Number of displayed runs over which the stretch is spread.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();
@@ -100,7 +102,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let mut drawn = Drawn::of(seed, kinds);
     let without_all = report(&drawn, &|_| false);
     let inner_m = [START_M + END_M, drawn.end_m - 0.25];
-    let is_inner = |section: &&SectionReport| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
+    let is_inner = |section: &&SectionRow| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
     // The target may be changed here: holes don't depend on it. All later reports use it for their verdicts.
@@ -117,7 +119,9 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     };
     let mut sections = Vec::new();
     for section in all.sections.iter().filter(is_inner) {
-        let Some(evidence) = section.cause.as_ref().filter(|_| section.verdict == "fail") else { continue };
+        let Some(evidence) = section.cause.as_ref().filter(|_| section.verdict == Verdict::Fail) else {
+            continue;
+        };
         let hole_m = |report: &Report| hole_at_m(report, section.start_m);
         let without_m: Vec<f64> = without.iter().map(hole_m).collect();
         let passes = |report: &Report| hole_m(report) <= drawn.target_m;
@@ -149,12 +153,12 @@ pub(super) fn hole_at_m(report: &Report, start_m: f64) -> f64 {
     same.and_then(|same| same.hole_m).unwrap_or(f64::INFINITY)
 }
 
-/// Displayed causes of a section, sorted.
+/// Displayed causes in a section's evidence, sorted.
 fn told(evidence: &Evidence) -> Vec<Cause> {
     evidence.causes.iter().collect()
 }
 
-/// Right sets of causes; `None` if the section fails even without all injected causes.
+/// Sets of causes that count as right for a section; `None` if the section fails even without all injected causes.
 pub(super) fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
     if !together {
         return None;
@@ -201,7 +205,7 @@ pub fn kinds(seed: u64) -> Vec<usize> {
     if number.is_multiple_of(2) {
         return vec![number / 2 % KINDS.len()];
     }
-    // All pairs of causes take turns.
+    // Dives with two causes take all pairs of causes in turn.
     let pairs: Vec<[usize; 2]> =
         (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
     pairs[number / 2 * 17 % pairs.len()].to_vec()

@@ -10,21 +10,21 @@ use headrace_coverage::Cause;
 use super::judging::{InterventionDive, Right, hole_at_m, report, right};
 use super::matrix::Count;
 
-/// Number of noise seeds that the reference tries.
+/// Number of noise seeds with which the reference simulates each dive.
 const NOISES: u64 = 3;
 
 /// Number of right answers of the reference for dives with two causes. The reference knows everything except the
 /// noise.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct UpperBound {
-    /// All stretches.
+    /// Answers for all stretches.
     pub stretches: Count,
-    /// Stretches that truly have two causes.
+    /// Answers for stretches that truly have two causes.
     pub pairs: Count,
 }
 
 impl UpperBound {
-    /// Adds a dive. Ignores dives with a single cause.
+    /// Adds the answers for a dive. Ignores dives with a single injected cause.
     pub fn add(&mut self, dive: &InterventionDive) {
         if dive.drawn.injected.len() < 2 {
             return;
@@ -49,7 +49,7 @@ impl UpperBound {
         }
     }
 
-    /// Returns the sum of both counts.
+    /// Returns the sum of both results, count by count.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self { stretches: self.stretches.and(other.stretches), pairs: self.pairs.and(other.pairs) }
@@ -57,7 +57,7 @@ impl UpperBound {
 }
 
 impl InterventionDive {
-    /// Right sets of causes of each section, from simulations with another noise.
+    /// Sets of causes that count as right for each section, from simulations with another noise.
     fn with_noise(&self, noise: u64) -> Vec<Right> {
         let drawn = self.drawn.with_noise(noise);
         let without = [0, 1].map(|k| report(&drawn, &|other| other != k));

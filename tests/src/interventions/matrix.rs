@@ -7,10 +7,10 @@ use headrace_coverage::Cause;
 
 use super::judging::{InterventionDive, Right};
 
-/// Counts of all answers and of right answers.
+/// Number of the program's answers, and how many of them are right.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Count {
-    /// Number of answers.
+    /// Number of all answers.
     pub all: u32,
     /// Number of right answers.
     pub right: u32,
@@ -28,12 +28,12 @@ impl Count {
         Self { all: self.all + other.all, right: self.right + other.right }
     }
 
-    /// Text such as "3 of 4 (75.0 %)".
+    /// The count as text, such as "3 of 4 (75.0 %)".
     pub fn text(self) -> String {
         format!("{} of {} ({:.1} %)", self.right, self.all, 100.0 * self.share())
     }
 
-    /// Fraction of right answers; 1 without answers.
+    /// Fraction of right answers, 0 to 1; 1 without answers.
     pub fn share(self) -> f64 {
         if self.all == 0 { 1.0 } else { f64::from(self.right) / f64::from(self.all) }
     }
@@ -42,15 +42,15 @@ impl Count {
 /// Comparison of displayed with true causes by section and by stretch, for dives with one cause and with two.
 #[derive(Debug, Default)]
 pub struct Matrix {
-    /// Sections; the index is the number of injected causes minus one.
+    /// Answers for sections; the index is the number of injected causes minus one.
     pub sections: [Count; 2],
-    /// Stretches; the index is the number of injected causes minus one.
+    /// Answers for stretches; the index is the number of injected causes minus one.
     pub stretches: [Count; 2],
-    /// Stretches that truly have two causes.
+    /// Answers for stretches that truly have two causes.
     pub pairs: Count,
-    /// Stretches that truly have two causes. A nearly right answer counts as right: see [`super::Judged::is_close`].
+    /// As `pairs`, but a nearly right answer counts as right: see [`super::Judged::is_close`].
     pub close_pairs: Count,
-    /// Stretches that are displayed as at most one run.
+    /// Stretches; those displayed as at most one run of sections count as right.
     pub one_run: Count,
     /// Number of dives without a failed section.
     pub idle: u32,
@@ -69,7 +69,7 @@ fn any_words(right: &Right) -> String {
 }
 
 impl Matrix {
-    /// Adds a dive.
+    /// Adds the answers for a dive.
     pub fn add(&mut self, dive: &InterventionDive) {
         let several = dive.drawn.injected.len() - 1;
         self.idle += u32::from(dive.sections.is_empty());
@@ -102,7 +102,7 @@ impl Matrix {
         }
     }
 
-    /// The matrix as text.
+    /// The confusion matrix as text.
     pub fn text(&self) -> String {
         let mut text =
             String::from("one cause injected: true cause, then displayed causes with sections/stretches\n");

@@ -6,23 +6,25 @@ use headrace_monitor::report::ReturnReport;
 use super::draw::Injected;
 use super::judging::{InterventionDive, Judged, hole_at_m, report};
 
-/// Length added at either end of a stretch that is passed again, m, because heads are apart along the hull.
+/// Length added at either end of a stretch that is passed again, m, because heads are mounted at different places along
+/// the hull.
 const ROOM_M: f64 = 2.0;
 /// Roll angle of a vehicle that hides the wall from its own heads, degrees.
 const ROLLED_DEG: f64 = 75.0;
 
-/// A run with its displayed remedy, and the result of the remedy.
+/// A run of failed sections with its displayed remedy, and the result of simulating the remedy.
 #[derive(Debug, Clone)]
 pub struct Remedied {
-    /// Displayed remedy.
+    /// Remedy that the program displays for the run.
     pub told: ReturnReport,
-    /// Start and new hole diameter of each section in the run, m; infinite if the hole can't be measured.
+    /// Start, and hole diameter after the remedy, of each section in the run, m; the diameter is infinite if it can't
+    /// be measured.
     pub then_m: Vec<[f64; 2]>,
     /// Whether all sections of the run meet the target after the remedy.
     pub clears: bool,
 }
 
-/// Whether an action removes an injected cause.
+/// Whether a displayed action removes an injected cause.
 fn mends(action: Action, injected: &Injected) -> bool {
     match action {
         Action::FinerMode => matches!(injected, Injected::AngularStep { .. }),
@@ -59,7 +61,7 @@ fn remedy(dive: &InterventionDive, told: &ReturnReport, sections: &[Judged]) -> 
     } else {
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
-    // "Slower" without a speed means other settings of the heads at the planned speed.
+    // The action "slower" without a speed means that other settings of the heads are enough at the planned speed.
     let at_most_mps =
         if told.at_most_mps > 0.0 || !has(Action::Slower) { told.at_most_mps } else { dive.drawn.speed_mps };
     let then = report(&dive.drawn.changed(&mended, over_m, at_most_mps, again_deg), &|_| true);

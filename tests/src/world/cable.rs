@@ -12,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Host, Line, OpenError, OpenErrorKind, READ_BYTES};
 use headrace_sensor::connect::Connect;
 
-/// Errors that an open line may return.
+/// Errors that an open line may return after its connection breaks.
 pub const FAILURES: [io::ErrorKind; 4] = [
     io::ErrorKind::BrokenPipe,
     io::ErrorKind::ConnectionReset,
@@ -25,20 +25,20 @@ pub const FAILURES: [io::ErrorKind; 4] = [
 pub struct Clock(AtomicU64);
 
 impl Clock {
-    /// Current time.
+    /// Current time of the simulated world.
     pub fn now(&self) -> MonoNs {
         MonoNs(self.0.load(Ordering::SeqCst))
     }
 
-    /// Sets the time.
+    /// Sets the time of the simulated world.
     pub fn set(&self, now: MonoNs) {
         self.0.store(now.0, Ordering::SeqCst);
     }
 }
 
-/// A cable between the machine and one device.
+/// A simulated cable between the machine and one device.
 pub struct Cable {
-    /// Address at which the machine opens it.
+    /// Address at which the simulated machine opens the cable.
     pub connect: Connect,
     /// Data that has arrived at the machine and is still unread.
     pub to_host: SegQueue<Vec<u8>>,
@@ -46,13 +46,13 @@ pub struct Cable {
     pub to_device: SegQueue<Vec<u8>>,
     /// Whether opening the device fails.
     pub refuses: AtomicBool,
-    /// Whether writing fails.
+    /// Whether the machine's writes to the device fail.
     pub deaf: AtomicBool,
     /// Number of breaks of the connection. Lines that were opened before a break fail.
     breaks: AtomicU64,
-    /// Kind of the last break, as an index of [`FAILURES`].
+    /// Error that lines return after the last break, as an index of [`FAILURES`].
     failure: AtomicU64,
-    /// Number of lines opened so far.
+    /// Number of times that the machine has opened the cable so far.
     opened: AtomicU64,
     /// Number of unread datagrams that the machine has dropped since the last query.
     unread: AtomicU64,
@@ -62,7 +62,7 @@ pub struct Cable {
 const KEPT_DATAGRAMS: usize = 400;
 
 impl Cable {
-    /// Creates a sound cable.
+    /// Creates a cable without faults.
     pub fn new(connect: Connect) -> Self {
         let (to_host, to_device) = (SegQueue::new(), SegQueue::new());
         let [refuses, deaf] = [AtomicBool::new(false), AtomicBool::new(false)];
@@ -79,7 +79,7 @@ impl Cable {
         }
     }
 
-    /// Breaks the connection; unread data is lost.
+    /// Breaks the cable's connection; unread data is lost.
     pub fn break_off(&self, failure: usize) {
         while self.to_host.pop().is_some() {}
         self.failure.store(failure as u64, Ordering::SeqCst);
@@ -123,7 +123,7 @@ impl Host for Machine {
     }
 }
 
-/// The machine's end of a cable.
+/// The simulated machine's end of an open cable.
 struct OpenCable {
     cable: Arc<Cable>,
     clock: Arc<Clock>,
@@ -168,7 +168,7 @@ impl Line for OpenCable {
         self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
-    /// Exchanges one message as over UDP. The answer arrives as one message, too, with its own length.
+    /// Exchanges one message with the device, as over UDP. The answer also arrives as one message with its own length.
     fn exchange(
         &mut self,
         write: &[u8],

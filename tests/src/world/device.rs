@@ -17,12 +17,12 @@ use crate::random::Random;
 /// Longest delay of a part of a frame, ns.
 const LONGEST_DELAY_NS: usize = 80_000_000;
 
-/// A device at the end of its cable.
+/// An emulated device at the far end of a simulated cable.
 pub struct Device {
     emulated: Emulated,
     cable: Arc<Cable>,
     faults: Vec<Window<CableFault>>,
-    /// Parts on their way to the machine, with arrival times.
+    /// Parts of frames on their way to the machine, with arrival times.
     under_way: VecDeque<(MonoNs, Vec<u8>)>,
     random: Random,
     /// Whether the cable carries a byte stream, which can be split anywhere. Otherwise each message arrives whole or
@@ -35,7 +35,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// Creates a device that is switched on. With `loses`, frames are also lost without a planned fault.
+    /// Creates a device that is switched on. If `loses` is set, frames are also lost without a planned fault.
     pub fn new(
         emulated: Emulated,
         cable: Arc<Cable>,
@@ -48,7 +48,7 @@ impl Device {
         Self { emulated, cable, faults, under_way, random, is_stream, was_broken: false, loses, whole: 0 }
     }
 
-    /// Cable of the device.
+    /// The device's cable.
     pub fn cable(&self) -> &Cable {
         &self.cable
     }
@@ -58,7 +58,7 @@ impl Device {
         self.whole
     }
 
-    /// Whether the cable delays and splits frames at most.
+    /// Whether the cable loses no frame: at worst, it delays and splits frames.
     pub fn is_lossless(&self) -> bool {
         self.faults.iter().all(|fault| matches!(fault.what, CableFault::Cut | CableFault::Held))
     }
@@ -135,7 +135,7 @@ impl Device {
             self.put(now, frame.clone());
         }
         if self.has(CableFault::Disordered, now) && self.random.one_in(4) {
-            // Messages that are sent later may overtake this one.
+            // Messages that are sent later may overtake this message.
             let late = now + DurNs(self.random.below(LONGEST_DELAY_NS) as i64);
             let place = self.under_way.partition_point(|(at, _)| *at <= late);
             return self.under_way.insert(place, (late, frame));
@@ -148,7 +148,7 @@ impl Device {
         self.put(arrives, frame);
     }
 
-    /// Loses some bytes of a frame on a stream, or the whole frame on a message carrier.
+    /// Loses some bytes of a frame on a byte stream, or the whole frame on a carrier that keeps messages whole.
     fn lose_some(&mut self, now: MonoNs, mut frame: Vec<u8>) {
         if self.is_stream {
             let from = self.random.below(frame.len());
@@ -158,7 +158,7 @@ impl Device {
         }
     }
 
-    /// Delivers a frame in parts.
+    /// Delivers a frame in several parts with random delays.
     fn cut(&mut self, now: MonoNs, frame: &[u8]) {
         let mut rest = frame;
         let mut at = now;
@@ -172,7 +172,7 @@ impl Device {
         }
     }
 
-    /// Queues a part after all earlier ones, because cables keep the order.
+    /// Queues a part of a frame after all parts queued before, because cables keep the order.
     fn put(&mut self, at: MonoNs, bytes: Vec<u8>) {
         let at = self.under_way.back().map_or(at, |(last, _)| at.max(*last));
         self.under_way.push_back((at, bytes));

@@ -33,12 +33,12 @@ pub struct SimulatedDisk {
     clock: Arc<Clock>,
     faults: Arc<[Window<DiskFault>]>,
     done: Arc<SegQueue<Done>>,
-    /// Number of operations that failed.
+    /// Number of disk operations that failed.
     failed: Arc<SegQueue<DiskFault>>,
     sabotage: Option<Sabotage>,
 }
 
-/// A file that is left on the disk.
+/// A file that is left on the disk after a kill or a power cut.
 #[derive(Debug, Clone, Default)]
 pub struct LeftFile {
     /// Path of the file.
@@ -50,13 +50,13 @@ pub struct LeftFile {
 }
 
 impl SimulatedDisk {
-    /// An empty disk.
+    /// Creates an empty disk with these planned faults.
     pub fn new(clock: Arc<Clock>, faults: &[Window<DiskFault>], sabotage: Option<Sabotage>) -> Self {
         let (done, failed) = (Arc::new(SegQueue::new()), Arc::new(SegQueue::new()));
         Self { clock, faults: faults.into(), done, failed, sabotage }
     }
 
-    /// Number of operations that have failed so far.
+    /// Number of disk operations that have failed so far.
     pub fn failures(&self) -> usize {
         self.failed.len()
     }

@@ -7,25 +7,25 @@ use headrace_replay::log::Summary;
 use super::disk::LeftFile;
 use super::plan::Plan;
 
-/// Result of a dive.
+/// Result of a dive in a simulated world.
 pub struct DiveResult {
-    /// Planned faults.
+    /// Faults planned for the dive.
     pub plan: Plan,
-    /// Packets that the loop took, in order.
+    /// Packets that the loop took during the dive, in order.
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// Results of the lines, one for each device.
+    /// Results of the lines between devices and loop, one for each device.
     pub lines: Vec<Line>,
     /// Summary of the recorder; `None` if it was killed.
     pub summary: Option<Summary>,
     /// Number of failed disk operations.
     pub disk_failures: usize,
-    /// Files of the recording.
+    /// Files of the recording that are left on the disk.
     pub left: Vec<LeftFile>,
     /// Number of consumed packets that must be in the log, whichever way the dive ends.
     pub certain: usize,
-    /// Longest time for which packets waited although the loop ran.
+    /// Longest time for which packets waited to be taken although the loop ran.
     pub longest_wait: DurNs,
 }
 
@@ -35,11 +35,11 @@ pub struct Replayed {
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// Losses that the player reported.
+    /// Losses that the replay reported.
     pub losses: Vec<String>,
 }
 
-/// Result of a device's line.
+/// Result of the line of one device.
 #[derive(Debug)]
 pub struct Line {
     /// Whether the plan has no fault for the device.
@@ -50,7 +50,7 @@ pub struct Line {
     pub whole: u64,
     /// Number of good frames that the loop found.
     pub good: u64,
-    /// History of the line.
+    /// Counts of openings, losses and dropped packets of the line, and its last status.
     pub history: LineHistory,
 }
 
@@ -59,8 +59,8 @@ pub struct Line {
 pub struct Consumed {
     /// Source of the packet.
     pub source: u16,
-    /// Receive time.
+    /// Receive time of the packet.
     pub received: MonoNs,
-    /// Content.
+    /// Content of the packet.
     pub bytes: Vec<u8>,
 }

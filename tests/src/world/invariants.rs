@@ -7,7 +7,7 @@ use crate::drops;
 /// Longest time for which packets may wait while the loop runs, with or without a recording.
 const LONGEST_WAIT_NS: i64 = 500_000_000;
 
-/// Lists the broken invariants as text.
+/// Lists the invariants that a dive broke, as text.
 pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<String> {
     let mut broken: Vec<String> =
         lived.lines.iter().enumerate().filter_map(|(number, line)| of_line(lived, number, line)).collect();

@@ -45,13 +45,13 @@ pub use dive_result::{Consumed, DiveResult, Line, Replayed};
 use plan::{BEGIN, Ending, MachineFault, Plan};
 pub use sabotage::Sabotage;
 
-/// Longest step of the world, ns.
+/// Longest time step of the simulated world, ns.
 const LONGEST_STEP_NS: usize = 12_000_000;
-/// Longest wait for data under way at the end of a dive.
+/// Longest wait at the end of a dive for data that is on its way to the loop.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
-/// Capacity of the queue to the terminal. It is small, so that the queue becomes full soon.
+/// Capacity of the queue of notices to the terminal. It is small, so that the queue becomes full soon.
 const NOTICES: usize = 4;
-/// Age from which recorded packets are always synced: half a second plus one step of the world.
+/// Age beyond which recorded packets are always synced: half a second plus one step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
 const TUNNEL: &str = r#"name = "a world of faults"
@@ -69,7 +69,7 @@ surface_above_floor_m = 8
 planned_speed_mps = 0.2
 "#;
 
-/// Tables of the sensors in the vehicle file.
+/// Tables of the sensors in the vehicle file, without their ids.
 const SENSORS: [&str; 6] = [
     "plugin = \"imagenex881\"\nconnect = \"tcp:10.0.0.1:4040\"\nmode = \"fastest\"\nrange_m = 5\n",
     "plugin = \"imagenex881\"\nconnect = \"serial:/dev/ttyS1\"\nmode = \"fastest\"\nrange_m = 5\n",
@@ -82,7 +82,7 @@ const SENSORS: [&str; 6] = [
 /// Size of the recorder's queue, bytes. It is so small that a stall of some seconds fills the queue.
 const QUEUE_BYTES: usize = 128 * 1024;
 
-/// The vehicle file of all worlds.
+/// The vehicle file of all simulated worlds.
 pub fn vehicle_text() -> String {
     let mut text = TUNNEL.to_owned();
     for (number, sensor) in SENSORS.iter().enumerate() {
@@ -91,7 +91,7 @@ pub fn vehicle_text() -> String {
     text
 }
 
-/// A dive in a world.
+/// A dive in a simulated world.
 pub struct World {
     sabotage: Option<Sabotage>,
     random: Random,
@@ -110,7 +110,8 @@ pub struct World {
     is_failing: bool,
     /// Number of packets that the recorder skipped because its backlog was too large.
     skipped: usize,
-    /// Time since which packets have waited for the loop. `longest_wait` is the longest such wait of a running loop.
+    /// Time since which packets have waited to be taken by the loop. `longest_wait` is the longest such wait while the
+    /// loop was running.
     waiting_since: Option<MonoNs>,
     longest_wait: DurNs,
     notices: NoticeReceiver,
@@ -124,7 +125,7 @@ impl World {
         Self::sabotaged(seed, None)
     }
 
-    /// As [`World::new`]; the sabotage breaks an invariant.
+    /// As [`World::new`], but with a sabotage that breaks an invariant.
     pub fn sabotaged(seed: u64, sabotage: Option<Sabotage>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
@@ -196,7 +197,7 @@ impl World {
         self
     }
 
-    /// Runs the dive.
+    /// Runs the dive to its planned end and returns the result.
     pub fn live(mut self) -> DiveResult {
         while self.clock.now() < self.plan.end {
             self.step(false);
@@ -252,8 +253,8 @@ impl World {
         Duration::from_nanos(u64::try_from(self.clock.now().since(BEGIN).0).unwrap())
     }
 
-    /// Lets the recorder write. Without a disk failure, packets count as certain half a second and one step after the recorder
-    /// took them.
+    /// Lets the recorder write. Without a disk failure, packets count as certainly recorded half a second and
+    /// one step after the recorder took them.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
         let failures = self.disk.failures();
@@ -387,9 +388,10 @@ fn assemble(
     (app.arm(vehicle.navigation()).unwrap(), worker, notices)
 }
 
-/// Does the work of a line service's thread up to the point where the thread would wait.
+/// Does the work of a line service's thread until the thread would wait.
 fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
-    // Each step reads once. The limit detects a driver that is always due; a real thread would never wait.
+    // The driver reads once in each round. The limit detects a driver that is due again at once in every round; a real
+    // thread would never wait.
     for _ in 0..10_000 {
         let due = match service.closed_until() {
             Some(until) => until <= now,

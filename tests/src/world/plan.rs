@@ -1,4 +1,4 @@
-//! Faults of a world, drawn from its seed.
+//! Faults in a simulated world, drawn from the world's seed.
 
 use std::fmt;
 
@@ -6,15 +6,15 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::random::Random;
 
-/// Time at which dives start; the machine was switched on some time before.
+/// Time of the simulated clock at which dives start; the machine was switched on some time before.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
-/// Period in which faults begin, ns.
+/// Period at the start of a dive in which faults begin, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
-/// Length of a dive. It includes time to recover after the last fault.
+/// Duration of a dive. It includes time to recover after the last fault.
 const LENGTH: DurNs = DurNs(12_000_000_000);
-/// Longest fault, ns. A delay on a cable is shorter than any silence timeout. A stall of the loop or recorder is long
-/// enough to fill the queues.
+/// Longest durations of faults, ns. A delay on a cable is shorter than any silence timeout. A stall of the loop or
+/// recorder is long enough to fill the queues.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;
@@ -22,7 +22,7 @@ const LONGEST_NS: usize = 3_000_000_000;
 /// A fault and the time in which it is active.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window<T> {
-    /// The fault.
+    /// The fault that is active in this time window.
     pub what: T,
     /// Start of the fault, inclusive.
     pub from: MonoNs,
@@ -84,7 +84,7 @@ const OF_MESSAGES: [CableFault; 9] = [
     CableFault::Deaf,
 ];
 
-/// Faults of the machine.
+/// Faults of the simulated machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MachineFault {
     /// The loop gets no CPU time.
@@ -104,12 +104,12 @@ const OF_MACHINES: [MachineFault; 4] = [
     MachineFault::TerminalStands,
 ];
 
-/// Faults of a disk.
+/// Faults of the simulated disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DiskFault {
-    /// Writes fail.
+    /// Writes to the disk fail.
     WriteFails,
-    /// Writes are partial or interrupted.
+    /// Writes to the disk are partial or interrupted.
     WritesInPart,
     /// Syncs fail, and unsynced data is lost.
     SyncFails,
@@ -127,27 +127,27 @@ const OF_DISKS: [DiskFault; 5] = [
     DiskFault::CreateFails,
 ];
 
-/// End of a dive.
+/// The way in which a dive ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Ending {
-    /// Regular end.
+    /// The dive ends regularly.
     Finished,
     /// The program is killed.
     Killed,
-    /// The power is cut: unsynced data is lost or torn.
+    /// The power is cut: unsynced data is lost or partly written.
     PowerCut,
 }
 
-/// All faults of a dive.
+/// All faults planned for a dive.
 #[derive(Clone)]
 pub struct Plan {
     /// Faults of each cable.
     pub cables: Vec<Vec<Window<CableFault>>>,
-    /// Faults of the machine.
+    /// Faults of the simulated machine.
     pub machine: Vec<Window<MachineFault>>,
     /// Faults of the disk.
     pub disk: Vec<Window<DiskFault>>,
-    /// End of the dive.
+    /// The way in which the dive ends.
     pub ending: Ending,
     /// Time at which the dive ends.
     pub end: MonoNs,
@@ -192,7 +192,7 @@ impl Plan {
         self
     }
 
-    /// Whether a fault of the machine is active.
+    /// Whether a fault of the machine is active at this time.
     pub fn has(&self, fault: MachineFault, now: MonoNs) -> bool {
         self.machine.iter().any(|window| window.what == fault && window.holds(now))
     }

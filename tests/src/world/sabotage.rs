@@ -5,18 +5,18 @@
 pub enum Sabotage {
     /// Every hundredth frame of a device without faults is lost on its way.
     CableLoses,
-    /// When one connection breaks, another breaks too.
+    /// When the connection of one device breaks, that of another device breaks, too.
     NeighbourBreaks,
-    /// Every fortieth write is dropped but reported as done.
+    /// Every fortieth write to the disk is dropped but reported as done.
     DiskForgets,
-    /// Syncs are reported as done although nothing is synced.
+    /// Disk syncs are reported as done although nothing is synced.
     SyncLies,
     /// The log doesn't state the packets that a line dropped.
     DropsUntold,
 }
 
 impl Sabotage {
-    /// All sabotages.
+    /// All kinds of sabotage.
     pub const ALL: [Self; 5] =
         [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies, Self::DropsUntold];
 }

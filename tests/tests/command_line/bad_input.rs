@@ -187,7 +187,7 @@ fn wrong_polyline_is_refused_with_its_line_or_vertex() {
     refuse("no number", Some("y_m,z_m\n-2,0\n2,zero\n2,4\n-2,4\n"));
     refuse("one number", Some("y_m,z_m\n-2,0\n2\n2,4\n-2,4\n"));
     refuse("not finite", Some("-2,0\n2,0\n2,inf\n-2,4\n"));
-    // A side chamber around a corner, which can't be seen from the centre.
+    // A side chamber that can't be seen from the centre, because it lies around a corner.
     refuse("not star-shaped", Some("-2,0\n2,0\n2,1\n5,1\n5,6\n4.5,6\n4.5,2\n2,2\n2,4\n-2,4\n"));
     refuse("crosses itself", Some("-2,0\n2,4\n2,0\n-2,4\n"));
     insta::assert_snapshot!(said, @r#"
@@ -375,7 +375,7 @@ fn changed_byte_is_detected_or_has_no_effect() {
 }
 
 #[test]
-fn file_that_is_no_log_is_identified() {
+fn file_that_is_no_log_is_refused_with_the_reason() {
     let folder = Folder::with_dive();
     folder.write("empty.mcap", "");
     folder.write("text.mcap", VEHICLE);
@@ -406,7 +406,7 @@ fn log_without_a_vehicle_file_needs_the_vehicle_option() {
 }
 
 #[test]
-fn source_missing_in_the_vehicle_file_is_reported_lost() {
+fn messages_of_a_source_missing_in_the_vehicle_file_are_reported_lost() {
     let folder = Folder::with_dive();
     folder.write("other.toml", change(VEHICLE, "id = \"sonar_1\"", "id = \"front\""));
     let answer = folder.headrace(&["replay", "dive.mcap", "--vehicle", "other.toml"]);
@@ -464,7 +464,8 @@ fn every_command_has_help_with_an_example() {
     assert!(commands.contains(&"replay") && commands.contains(&"demo"), "{commands:?}");
     for command in commands.into_iter().filter(|command| *command != "help") {
         let answer = folder.headrace(&[command, "--help"]);
-        // These commands run another program. If that program is missing, the message says how to build it.
+        // The commands `campaign`, `batch` and `cost` run another program. If that program is missing, the message says
+        // how to build it.
         if ["campaign", "batch", "cost"].contains(&command) && answer.code == Some(2) {
             assert!(
                 answer.stderr.contains("cargo build --release --manifest-path lab/Cargo.toml -p headrace_c"),

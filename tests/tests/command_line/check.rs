@@ -1,5 +1,5 @@
-//! `headrace check` lists all errors of a file at once, conflicts of lines, walls out of range, and the figures of
-//! the plan.
+//! `headrace check` lists all errors of a file at once. It also reports sensors that can't share a port, walls out of
+//! range, and the same figures as `plan`.
 
 use std::fmt::Write as _;
 
@@ -92,7 +92,7 @@ fn findings(cases: &[(&str, &[(&str, &str)])]) -> String {
     for (what, changes) in cases {
         folder.write("vehicle.toml", changed(VEHICLE, changes));
         let answer = folder.headrace(&["check", "vehicle.toml"]);
-        // Errors suppress the summary; warnings don't.
+        // If `check` finds errors, it prints no summary; warnings don't suppress the summary.
         assert_eq!(answer.stdout.is_empty(), answer.code == Some(2), "{what}");
         write!(said, "{what}: {}\n{}", answer.code.unwrap(), answer.stderr).unwrap();
     }
@@ -100,7 +100,7 @@ fn findings(cases: &[(&str, &[(&str, &str)])]) -> String {
 }
 
 #[test]
-fn lines_that_two_sensors_cannot_share_are_errors() {
+fn port_that_two_sensors_cannot_share_is_an_error() {
     let (left, right) = ("id = \"ping_left\"\n", "id = \"ping_right\"\n");
     let on = |table: &str, connect: &str| format!("{table}connect = \"{connect}\"\n");
     let serial = [on(left, "serial:/dev/ttyUSB0"), on(right, "serial:/dev/ttyUSB0")];
@@ -156,7 +156,7 @@ fn lines_that_two_sensors_cannot_share_are_errors() {
     "#);
 }
 
-/// The dive goes on in spite of errors in the vehicle file, because no other file may be at hand.
+/// The dive goes on in spite of errors in the vehicle file, because the crew may have no other file at hand.
 #[test]
 fn run_warns_of_errors_found_by_check() {
     let folder = Folder::new();
@@ -281,7 +281,7 @@ fn json_has_every_error_with_its_line() {
     assert_eq!(errors[1]["line"], line("id = \"imu\""));
 }
 
-/// A circle of 3 m radius with this number of points.
+/// CSV text of a surveyed profile: a circle of 3 m radius with this number of points.
 fn surveyed(points: u32) -> String {
     let mut text = "y_m,z_m\n".to_owned();
     for k in 0..points {
@@ -340,10 +340,10 @@ fn too_many_sensors_give_the_same_error_in_check_and_run() {
     assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
 }
 
-/// The limit applies to heads that start in phase for the planned speed of the vehicle file. `run` gives the same
-/// advice.
+/// The heads' phases are set at the start of the dive, for the planned speed in the vehicle file. The speed limit from
+/// `check` applies to these phases. `run` gives the same limit.
 #[test]
-fn check_lists_the_speed_limit_of_heads_started_for_the_planned_speed() {
+fn check_gives_the_speed_limit_for_head_phases_of_the_planned_speed() {
     let folder = Folder::new();
     let vita = std::fs::read_to_string(root().join("deploy/vehicles/vita2-4.toml")).unwrap();
     let planned = |mps: &str| {

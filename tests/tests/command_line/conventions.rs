@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use headrace_tests::screen::Screen;
 use headrace_tests::{Folder, program, root, skipped};
 
-/// Commands listed by help.
+/// Names of the commands that `headrace --help` lists.
 fn commands(folder: &Folder) -> Vec<String> {
     let help = folder.headrace(&["--help"]).stdout;
     let (_, list) = help.split_once("Commands:\n").unwrap();
@@ -50,7 +50,7 @@ fn every_command_has_a_manual_page() {
         let page = String::from_utf8(folder.read(&format!("pages/headrace-{command}.1"))).unwrap();
         assert!(page.contains(".SH SYNOPSIS") && page.contains(&command), "{page}");
     }
-    // A second run succeeds. A page that another program wrote is only overwritten with `--force`.
+    // Manual pages can be written a second time. A page that another program wrote is only overwritten with `--force`.
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(0));
     folder.write("pages/headrace.1", ".TH headrace 1\n");
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(2));
@@ -60,7 +60,7 @@ fn every_command_has_a_manual_page() {
 #[test]
 fn colours_appear_only_on_terminals_that_support_them() {
     let folder = Folder::with_dive();
-    // These arguments give help, a usage error, a dive with flags, and log messages.
+    // The four argument lists produce help, a usage error, a replay with flags, and log messages.
     let outputs: [&[&str]; 4] = [
         &["replay", "--help"],
         &["replay", "--bad"],
@@ -72,7 +72,7 @@ fn colours_appear_only_on_terminals_that_support_them() {
         assert!(shown(&[]).contains("\x1b["), "{arguments:?}: no colours on a terminal");
         assert!(shown(&[("NO_COLOR", "")]).contains("\x1b["), "{arguments:?}: empty is unset");
         let plain = shown(&[("NO_COLOR", "1")]);
-        // Without colours, only the sequence that overwrites the present line is allowed.
+        // Output without colours may contain only one escape sequence, which overwrites the current line.
         assert!(!plain.replace("\r\x1b[K", "").contains('\x1b'), "{arguments:?}: {plain:?}");
         let dumb = shown(&[("TERM", "dumb")]);
         assert!(!dumb.contains('\x1b'), "{arguments:?}: {dumb:?}");
@@ -121,7 +121,7 @@ fn report_is_complete_on_a_non_blocking_pipe() {
     let mut command = program();
     command.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path("")).stdout(writer);
     let mut replay = command.spawn().unwrap();
-    // The command still holds a copy of the pipe's end.
+    // The `Command` value still holds a copy of the pipe's writing end.
     drop(command);
     std::thread::sleep(std::time::Duration::from_secs(2));
     let mut bytes = Vec::new();
@@ -132,7 +132,7 @@ fn report_is_complete_on_a_non_blocking_pipe() {
 }
 
 #[test]
-fn report_to_a_named_pipe_fails_without_a_reader_and_is_complete_with_one() {
+fn report_to_a_named_pipe_is_complete_with_a_reader_and_fails_without() {
     use rustix::fs::{CWD, FileType, Mode, mknodat};
     let folder = Folder::with_dive();
     mknodat(CWD, folder.path("pipe"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
@@ -150,7 +150,7 @@ fn report_to_a_named_pipe_fails_without_a_reader_and_is_complete_with_one() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn too_little_address_space_is_refused_without_an_abort() {
+fn lack_of_address_space_gives_an_error_and_no_abort() {
     let folder = Folder::with_dive();
     let headrace = program();
     for limit_kib in [100_000, 150_000, 200_000] {
@@ -196,7 +196,7 @@ fn unwritable_output_is_a_failure() {
         assert_eq!(failed, Some(1), "{arguments:?}: {said}");
         assert!(said.contains("standard output: No space left on device"), "{arguments:?}: {said}");
     }
-    // A full disk behind stdout doesn't fail a dive.
+    // A live dive succeeds even if its stdout is redirected to a full disk.
     let dive = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max"];
     assert_eq!(code(&dive, full()).0, Some(0));
     // Closing the reading end is no error: the reader wants no more output.

@@ -1,10 +1,10 @@
-//! Advice to a pilot who goes back for a missed stretch. Statements aren't repeated, no needless speed limit appears,
-//! and the end of the stretch is clear.
+//! Advice to a pilot who goes back for a missed stretch. The stretch is announced once and cleared once. No needless
+//! speed limit appears on the way.
 
 use headrace_tests::{Folder, root};
 use serde_json::Value;
 
-/// Output lines of a dive of the shipped vehicle along this scene's path.
+/// Output lines (JSON) of a dive in which the shipped vehicle follows this scene's path.
 fn told(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
@@ -25,7 +25,8 @@ fn figure(line: &Value, key: &str) -> f64 {
     line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
 }
 
-/// Displayed conditions between two chainages in one direction, without the seconds after the vehicle turns.
+/// Displayed conditions (such as "too_fast") between two chainages while the vehicle moves in one direction. The
+/// seconds after a reversal are left out.
 fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");
     let within = |state: &&&Value| {
@@ -59,7 +60,7 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }
 
-/// A dive with this speed on the way out and a high speed on the way back.
+/// A scene in which the vehicle drives out at this speed and goes back at a high speed.
 fn there_and_back(there_mps: f64) -> Vec<Value> {
     told(&format!(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
@@ -69,7 +70,7 @@ fn there_and_back(there_mps: f64) -> Vec<Value> {
 }
 
 #[test]
-fn no_speed_is_too_fast_over_passed_wall_or_on_the_way_back() {
+fn too_fast_is_not_raised_over_passed_wall_or_while_reversing() {
     let lines = there_and_back(0.09);
     let conditions_there = conditions(&lines, false, [7.0, 13.0]);
     assert!(conditions_there.iter().all(|condition| *condition != "passed"), "{conditions_there:?}");
@@ -80,9 +81,10 @@ fn no_speed_is_too_fast_over_passed_wall_or_on_the_way_back() {
     assert!(back.len() > 5 && back.iter().all(|condition| *condition == "going_back"), "{back:?}");
 }
 
-/// The limit returns early enough for the pilot to slow down before new wall.
+/// When the vehicle goes forward again, the speed limit is displayed early enough for the pilot to slow down before the
+/// heads reach unsampled wall.
 #[test]
-fn speed_limit_returns_before_the_heads_reach_new_wall() {
+fn speed_limit_is_displayed_again_before_the_heads_reach_unsampled_wall() {
     let lines = told(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 12\nspeed_mps = 0.09\n\
@@ -94,7 +96,8 @@ fn speed_limit_returns_before_the_heads_reach_new_wall() {
         .filter(|state| state["speed_mps"].as_f64().is_some_and(|mps| mps > 0.25))
         .collect();
     let first = again.iter().find(|state| state["condition"] == "too_fast").unwrap();
-    // The front heads are 0.55 m ahead of the vehicle's origin, so they have sampled the wall that far ahead of it.
+    // The front heads are 0.55 m ahead of the vehicle's origin, so they have sampled the wall up to 0.55 m beyond the
+    // turning point.
     let x_m = figure(&first["position"], "chainage_m");
     assert!((9.0..11.5).contains(&x_m), "{x_m}");
     assert!(again.iter().any(|state| state["condition"] == "passed"));
@@ -114,7 +117,7 @@ fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     )
 }
 
-/// The displayed position is that of the vehicle's origin, which has heads before and behind it.
+/// The displayed position is that of the vehicle's origin. Heads are mounted ahead of it and behind it.
 #[test]
 fn following_the_go_back_advice_clears_every_missed_section() {
     let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();
@@ -132,7 +135,7 @@ fn following_the_go_back_advice_clears_every_missed_section() {
     assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
-/// The totals include missed sections even if the dive ends on the way back.
+/// The report's totals include missed sections even if the dive ends on the way back.
 #[test]
 fn dive_that_ends_on_the_way_back_reports_its_missed_sections() {
     let lines = told(&missed_and_back(10.5, None));

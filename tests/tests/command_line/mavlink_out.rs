@@ -1,5 +1,5 @@
-//! Checks `--mavlink-out` from the view of a ground station. A decoder made from the MAVLink guide reads the bytes,
-//! independently of headrace's decoder.
+//! Checks the messages of `--mavlink-out` as a ground station receives them. They are read with a decoder that was
+//! written from the MAVLink guide, independently of headrace's decoder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::UdpSocket;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, root};
 
-/// Names that QGroundControl takes for values of the autopilot.
+/// Names of values that QGroundControl would mistake for values of the autopilot.
 const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
@@ -33,7 +33,7 @@ fn said(datagram: &[u8]) -> Said {
     assert_eq!((datagram[0], datagram[2], datagram.len()), (0xfd, 0, 12 + length), "{datagram:?}");
     assert_eq!(datagram[5..7], [7, 191], "system and component");
     let id = u32::from_le_bytes([datagram[7], datagram[8], datagram[9], 0]);
-    // CRC_EXTRA of a message. Only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT may occur.
+    // CRC_EXTRA (checksum seed) of a MAVLink message. Only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT may occur.
     let extra =
         *BTreeMap::from([(0, 50), (251, 170), (253, 83)]).get(&id).unwrap_or_else(|| panic!("message {id}"));
     let summed = datagram[1..10 + length].iter().copied().chain([extra]);
@@ -48,7 +48,7 @@ fn text_of(bytes: &[u8]) -> String {
     String::from_utf8(bytes[..end].to_vec()).unwrap()
 }
 
-/// All messages of a replay, and the digest of the replay.
+/// All MAVLink messages that a replay sends, and the digest of the replay's results.
 fn heard(log: &str) -> (Vec<Said>, String) {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
@@ -123,7 +123,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     );
     assert!(limits.iter().any(|mps| (0.2..0.35).contains(mps)), "{limits:?}");
     assert!(values("HR_MISS_M").iter().any(|m| *m > 2.0));
-    // Texts in several parts are joined by their id.
+    // STATUSTEXT messages with parts of a long text have the same id; the test joins them.
     let mut texts: BTreeMap<(usize, u16), String> = BTreeMap::new();
     for (place, said) in of(253).enumerate() {
         let id = u16::from_le_bytes([said.payload[51], said.payload[52]]);
@@ -141,7 +141,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
 }
 
 #[test]
-fn invalid_addresses_are_refused_with_the_valid_forms() {
+fn invalid_address_error_lists_the_valid_forms() {
     let folder = Folder::with_dive();
     for to in ["14550", "nowhere", "tcp:127.0.0.1:5760"] {
         let answer = folder.headrace(&["replay", "dive.mcap", "--mavlink-out", to]);

@@ -341,7 +341,7 @@ fn existing_file_stays_if_the_new_one_cannot_be_written() {
     }
 }
 
-/// This requires a file system with unnamed files. The simulation may be killed at any point.
+/// The simulation writes to an unnamed file until it is complete, which requires a file system with such files.
 #[cfg(target_os = "linux")]
 #[test]
 fn killed_simulation_leaves_no_file() {

@@ -106,9 +106,9 @@ fn json_and_csv_have_the_same_figures() {
     }
 }
 
-/// At such a speed the spacing T meets the target, but without a margin for position errors.
+/// Slightly above v_max, the spacing T still meets the target, but without a margin for position errors.
 #[test]
-fn speed_between_plan_and_geometric_limit_misses_the_target() {
+fn speed_above_v_max_misses_the_target_even_if_t_meets_it() {
     let folder = Folder::new();
     let at = |speed: &str| {
         let plan = json(&folder, &["--vehicle", VITA_2, "--mode", "fast", "--speed", speed]);
@@ -154,7 +154,8 @@ fn measured_turn_times_of_a_vehicle_file_override_the_table() {
     assert_eq!(turn("fast"), (6.0, "measured".to_owned()));
     // The range of 5 m is a sixth of the way from 4 m to 10 m, the ranges with measured times.
     assert_eq!(turn("slow"), (16.0, "estimated".to_owned()));
-    // A range that is shorter by 5 m saves 10 m of sound path in each of 600 pings. At 1500 m/s this is 4 s.
+    // A range that is shorter by 5 m shortens the sound path of each of the 600 pings by 10 m. At 1500 m/s this saves 4
+    // s per turn.
     let (medium_s, basis) = turn("medium");
     assert!((medium_s - (10.8 - 600.0 * 10.0 / 1500.0)).abs() < 1e-6 && basis == "estimated", "{medium_s}");
 }
@@ -298,7 +299,8 @@ fn written_plan_lines_configure_the_best_mode() {
     assert!((0.0..0.001).contains(&(0.95 * v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
     assert_eq!(line("mode"), format!("mode = {}", best["mode"]));
     assert_eq!(written.stdout.matches("[[sensors]]").count(), 4);
-    // A vehicle with these lines in place of its own keys passes at the speed that the lines plan.
+    // If the lines from `plan --write` replace the same keys of the vehicle file, `check` accepts the file and computes
+    // the same v_max.
     let old = std::fs::read_to_string(VITA_2).unwrap();
     let pasted: Vec<String> = old
         .lines()

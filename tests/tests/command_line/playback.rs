@@ -64,7 +64,7 @@ fn piped_commands_control_and_end_a_replay() {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut words = child.stdin.take().unwrap();
         write!(words, "pause\nseek 10s\n{leave}\n").unwrap();
-        // The pipe stays open, so that only the command can end the replay.
+        // The input pipe stays open, so that only the piped command can end the replay.
         let status = child.wait().unwrap();
         drop(words);
         assert!(matches!(status.code(), Some(0 | 1)), "{leave}: {status:?}");
@@ -76,7 +76,7 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     let folder = Folder::new();
     let mut screen = Screen::run(&folder, &["demo", "--speed", "20x", "--out", "demo"], 100, &[]);
     screen.until("m/s");
-    // A wrapper sends the signal to the program first and then to its process group.
+    // A wrapper such as `timeout` sends the signal twice: to the program, and then to its process group.
     screen.signal(Signal::INT);
     std::thread::sleep(std::time::Duration::from_millis(5));
     screen.signal(Signal::INT);
@@ -87,7 +87,7 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     assert_eq!(faults(&super::report_schema::schema(), &report), Vec::<String>::new());
     let duration_s = report["dive"]["duration_s"].as_f64().unwrap();
     assert!(duration_s > 0.0);
-    // A replay of the log gives the digest in the report.
+    // A replay of the interrupted dive's log gives the same digest as the dive's report.
     let (_, replayed) = folder.replay("demo/dive.mcap", &[]);
     assert_eq!(replayed["digest"], report["digest"]);
 }

@@ -4,7 +4,7 @@ use headrace_tests::{Folder, root};
 
 /// Text in the README before the demonstration's output, which is indented by four spaces.
 const BEGIN: &str = "leaves a report and a log in `headrace-demo/`:\n\n";
-/// Placeholder for omitted lines.
+/// Line in the README that stands for omitted output lines.
 const LEFT_OUT: &str = "    [...]";
 /// Environment variable that makes this test rewrite the README.
 const RENEW: &str = "HEADRACE_RENEW_README";

@@ -101,7 +101,7 @@ fn wrong_report_violates_the_schema() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Units by the ending of a key, with their names in descriptions.
+/// Suffixes of report keys, each with its unit. The description of a key with this suffix must contain the unit.
 const UNITS: [(&str, &str); 11] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),
@@ -127,7 +127,7 @@ fn every_key_is_required_and_described_with_its_unit() {
             object["required"].as_array().unwrap().iter().map(|key| key.as_str().unwrap()).collect();
         required.sort_unstable();
         let mut keys: Vec<_> = properties.keys().map(String::as_str).collect();
-        // Only golden reports may have this key.
+        // Only golden reports may have the key `tolerances`.
         keys.retain(|key| *key != "tolerances");
         keys.sort_unstable();
         assert_eq!(required, keys);

@@ -26,7 +26,7 @@ fn on_terminal(folder: &Folder, columns: u16) -> String {
 }
 
 #[test]
-fn no_line_wraps_at_sixty_columns_or_at_any_width() {
+fn no_line_wraps_on_terminals_of_60_to_200_columns() {
     let folder = dive();
     for columns in [60, 100, 200] {
         let written = on_terminal(&folder, columns);
@@ -62,8 +62,8 @@ fn piped_output_has_no_colours_and_no_broken_lines() {
     insta::assert_snapshot!(answer.stdout.split("digest").next().unwrap());
 }
 
-/// The pilot slows down, but then heads die, so the wall is still missed for another cause. The stretch stays one
-/// run, and the new cause is announced, too.
+/// The pilot slows down, but then heads die, so the wall is still missed, but for another cause. The stretch stays one
+/// run, and the new cause is also announced.
 #[test]
 fn missed_stretch_is_announced_again_when_its_cause_changes() {
     let folder = dive();

@@ -19,7 +19,8 @@ fn ended(log: &str, size: (u16, u16), variables: &[(&str, &str)]) -> (Folder, Sc
     (folder, screen)
 }
 
-/// The page at `time`. It is reached by `back` steps from the end; a step goes back to a multiple of ten seconds.
+/// The displayed page at the dive's time `time`. It is reached by `back` key presses from the end; a step goes back to
+/// a multiple of ten seconds.
 fn at(screen: &mut Screen, back: usize, time: &str) -> String {
     screen.until_page(" END ");
     for _ in 0..back {
@@ -95,7 +96,7 @@ fn keys_seek_in_a_replay_and_end_it() {
     assert!(!screen.terminal().screen().hide_cursor() && !screen.terminal().screen().alternate_screen());
 }
 
-/// An exit: its name, its action, and whether the program ends regularly.
+/// A way to end the program: its name, its action, and whether the program then ends regularly.
 type Way<'a> = (&'a str, &'a dyn Fn(&mut Screen), bool);
 
 #[test]

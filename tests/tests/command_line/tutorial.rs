@@ -5,18 +5,18 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, program, root};
 
-/// Additional options for the test. They avoid the browser and all waiting, and shorten the rehearsal to some
-/// seconds.
+/// Options that the test adds to the tutorial's commands, by command. They avoid the browser and shorten all waiting.
 const QUICK: [(&str, &[&str]); 2] =
     [("demo", &["--no-open", "--speed", "max"]), ("emulate", &["--linger", "60"])];
 /// Duration of the rehearsal in the tutorial and in the test, s.
 const REHEARSAL_S: [&str; 2] = ["300", "3"];
 
-/// Time between looks for the rehearsal's vehicle file, and the largest number of looks: one minute.
+/// Interval at which the test looks for the rehearsal's vehicle file, and number of tries. Together they take one
+/// minute.
 const WAIT: Duration = Duration::from_millis(50);
 const WAITS: usize = 1200;
 
-/// Lines of the page's console blocks, without their prompts.
+/// Lines of the console blocks in the tutorial page, without their prompts.
 fn commands(page: &str) -> Vec<Vec<String>> {
     let blocks = page.split("```console\n").skip(1).map(|rest| rest.split("```").next().unwrap_or_default());
     let lines = blocks.flat_map(str::lines).filter_map(|line| line.strip_prefix("$ headrace "));

@@ -1,7 +1,7 @@
-//! Checks dive logs from the view of other viewers, with the plain `mcap` crate.
+//! Checks that other programs can display dive logs. The tests read the logs with the plain `mcap` crate.
 //!
 //! Every message under `/result/view/` must match its channel's schema and the loop's published results. Summary and
-//! indexes must be right, and a replay must ignore these messages. `tests/viewers/` has checks with other readers.
+//! indexes must be right, and a replay must ignore these messages. `tests/viewers/` checks the logs with other readers.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ fn recorded() -> (Folder, Value) {
     (folder, report)
 }
 
-/// View messages by topic, each checked against its schema.
+/// Messages under `/result/view/` by topic, each checked against its schema.
 fn view(log: &[u8]) -> BTreeMap<String, Vec<Value>> {
     let mut topics: BTreeMap<String, Vec<Value>> = BTreeMap::new();
     for message in MessageStream::new(log).unwrap().map(Result::unwrap) {
@@ -100,7 +100,7 @@ fn every_view_message_matches_its_schema_and_the_dive() {
     for cloud in &topics["points"] {
         for (head, [x_m, y_m, z_m]) in points_of(cloud) {
             assert!(head < 2 && (2.0..20.0).contains(&x_m), "head {head} at {x_m}");
-            // All points lie on a circle of 3 m radius whose lowest point is at z = 0.
+            // All points of the cloud lie on the tunnel's circle of 3 m radius, whose lowest point is at z = 0.
             assert!(((y_m * y_m + (z_m - 3.0) * (z_m - 3.0)).sqrt() - 3.0).abs() < 0.05, "{y_m}, {z_m}");
         }
     }
@@ -148,7 +148,7 @@ fn message_that_violates_its_schema_is_detected() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Head and position of each point of a cloud.
+/// Number of the head, and position, of each point in a point cloud message.
 fn points_of(cloud: &Value) -> Vec<(u8, [f64; 3])> {
     let origin = numbers(&cloud["pose"]["position"], ["x", "y", "z"]);
     let stride = usize::try_from(cloud["point_stride"].as_u64().unwrap()).unwrap();
@@ -196,7 +196,7 @@ fn summary_and_indexes_match_a_full_read() {
         let indexes: Vec<_> = summary.read_message_indexes(&log, chunk).unwrap().into_iter().collect();
         for (channel, entries) in indexes {
             *indexed.entry(channel.id).or_default() += entries.len() as u64;
-            // Every lookup decompresses the chunk, so only some entries are checked.
+            // Every lookup decompresses the chunk, so only some of the index entries are checked.
             for entry in entries.into_iter().step_by(41) {
                 let message = summary.seek_message(&log, chunk, &entry).unwrap();
                 assert_eq!((message.channel.id, message.log_time), (channel.id, entry.log_time));
@@ -234,7 +234,7 @@ fn verify_names_the_first_different_pose() {
 
 /// The layout may only use existing topics, and keys from the schemas of these topics.
 #[test]
-fn layout_uses_existing_topics_and_keys() {
+fn viewer_layout_uses_existing_topics_and_keys() {
     let (folder, _) = recorded();
     let topics = view(&folder.read("live.mcap"));
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/how-to/viewers/layout.json");

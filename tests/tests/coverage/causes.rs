@@ -5,20 +5,21 @@ use std::fmt::Write;
 
 use headrace_tests::instrumented;
 
-/// Effects of every scene.
+/// Simulator effects that every scene of this file includes.
 const ALWAYS: &str = "[effects.motion_within_turn]\n[effects.range_noise]\nsd_m = 0.01\n\
     [effects.imu_noise]\ngyro_degps_rthz = 0.005\n";
 const STEADY: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.185\n";
-/// Chainages away from the ends. Sections near the ends aren't passed by heads from both sides.
+/// Chainages that the test evaluates, m. It ignores sections near the ends of the dive, which some of the heads don't
+/// reach.
 const INNER_M: std::ops::Range<f64> = 5.5..13.0;
 const SEEDS: u64 = 2;
 
 /// A scene that injects one cause.
 struct Case {
-    /// Expected cause in the report.
+    /// Cause that the report must state.
     cause: &'static str,
     what: &'static str,
-    /// Changes to VITA 2 with four heads.
+    /// Changes to the vehicle file of VITA 2 with four heads.
     changes: &'static str,
     way: &'static str,
     effects: &'static str,
@@ -107,7 +108,7 @@ const CASES: [Case; 11] = [
     },
 ];
 
-/// Number of failed sections by reported cause.
+/// Number of failed sections in the case's dive, by reported cause.
 fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.185");
@@ -145,7 +146,7 @@ fn reported_cause_is_the_injected_one() {
             right_of_case += named.get(case.cause).copied().unwrap_or(0);
             writeln!(table, "{:<15} {:<55} seed {seed}: {named:?}", case.cause, case.what).unwrap();
         }
-        // While the counter slips, only few sections are certain enough to fail.
+        // While the cable counter slips, holes are so uncertain that only few sections fail.
         if of_case < 2 || 10 * right_of_case < 9 * of_case {
             let Case { cause, what, .. } = case;
             writeln!(wrong, "{what}: {right_of_case} of {of_case} failed sections are named {cause}")
@@ -158,8 +159,8 @@ fn reported_cause_is_the_injected_one() {
     assert!(100 * right >= 95 * all, "{right} of {all}\n{table}");
 }
 
-/// Heads that are apart along the hull are in phase near the planned speed. A section can therefore fail below this
-/// speed and pass at it. The cause is then the phase.
+/// Heads mounted at different places along the hull are in phase only near the planned speed. A section can therefore
+/// fail at a lower speed, although it passes at the planned speed. The reported cause is then the phase.
 #[test]
 fn section_that_passes_only_at_a_higher_speed_fails_because_of_phase() {
     let driven = |speed_mps: f64| {

@@ -1,10 +1,12 @@
 //! Confidence of verdicts. One dive is judged with margins of one, two and three standard deviations between hole and
 //! target.
 
-use headrace_monitor::report::{Report, SectionReport};
+use headrace_coverage::Verdict;
+use headrace_monitor::report::Report;
+use headrace_monitor::section_row::SectionRow;
 use headrace_tests::instrumented;
 
-/// The speed increases, so that the holes grow from well below the target to well beyond it.
+/// The speed increases, so the holes grow from well below the target to well above it.
 fn scene() -> String {
     let leg = |k: u32| {
         let speed_mps = 0.11 + 0.004 * f64::from(k);
@@ -24,14 +26,14 @@ fn judged(confidence: u32) -> Report {
 }
 
 /// Whether the verdict follows from the bounds and the standard deviation of the reported hole.
-fn keeps_clear(report: &Report, section: &SectionReport) -> bool {
+fn keeps_clear(report: &Report, section: &SectionRow) -> bool {
     let error_m = f64::from(report.confidence_sd) * section.hole_sd_m;
     let passes = section.hole_most_m.is_some_and(|most_m| most_m + error_m <= report.target_m);
     let fails = section.hole_least_m.is_some_and(|least_m| least_m - error_m > report.target_m);
     match section.verdict {
-        "pass" => passes,
-        "fail" => fails,
-        "cannot_say" => !passes && !fails,
+        Verdict::Pass => passes,
+        Verdict::Fail => fails,
+        Verdict::CannotSay => !passes && !fails,
         _ => true,
     }
 }

@@ -1,21 +1,22 @@
 //! Counters with a resolution of 1 cm on swinging cables cause no wrong displayed speed and no wrong verdict.
 
+use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
-/// Number of dives of each kind.
+/// Number of simulated dives of each kind.
 const DIVES: u64 = 8;
 /// Largest allowed error of the displayed speed, m/s. The tests guard against a fault that displayed 0.98 m/s for a
 /// vehicle at 0.2 m/s.
 const SPEED_OFF_MPS: f64 = 0.2;
 
-/// Legs of a dive: distance, m, speed, m/s, and duration of the stop at the end, s.
+/// Legs of a dive, each with its distance (m), its speed (m/s), and the duration of the stop at its end (s).
 type Legs = &'static [(f64, f64, f64)];
 const STEADY: Legs = &[(14.0, 0.2, 0.0)];
 const STOP_AND_GO: Legs = &[(3.0, 0.3, 6.0), (2.0, 0.2, 11.0), (4.0, 0.31, 4.0), (3.0, 0.25, 0.0)];
 const WANDERING: &str = "tether_slack = { reach_m = 0.06, period_s = 30 }\n";
-/// Three simultaneous swings with a total reach of 10 cm; the period of one equals the turn time of a head. The
-/// attitude of the inertial unit wanders at the same rate as the cable.
+/// Three simultaneous swings of the cable with a total reach of 10 cm. The period of one swing equals the turn time of
+/// a head. The attitude of the inertial unit wanders at the same rate as the cable.
 const SWINGING: &str = "tether_slack = { swings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.021, period_s = 10 }, \
     { reach_m = 0.055, period_s = 20 }] }\n";
 
@@ -38,7 +39,7 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
     scenes::seeded(&text, &|name: &str| scenes::vehicle_file(name), Some(seed))
 }
 
-/// Wrong results of a dive.
+/// Wrong results of a dive: errors of displayed speed and of verdicts.
 #[derive(Debug, Default)]
 struct Wrong {
     /// Largest error of the displayed speed while there is a fix, m/s.
@@ -46,7 +47,7 @@ struct Wrong {
     /// Number of sections that pass with a true hole over 1.1 T, and number that fail with a true hole below 0.9 T.
     passed: usize,
     failed: usize,
-    /// Number of sections with the verdict can't say, and number of all sections.
+    /// Number of sections with the verdict `cannot_say`, and number of all sections.
     cannot_say: usize,
     sections: usize,
 }
@@ -66,15 +67,15 @@ fn wrong(scene: &Scene, most_mps: f64) -> Wrong {
         let ratio = section.true_hole_m / target_m;
         wrong.sections += 1;
         match section.report.verdict {
-            "pass" => wrong.passed += usize::from(ratio > 1.1),
-            "fail" => wrong.failed += usize::from(ratio < 0.9),
+            Verdict::Pass => wrong.passed += usize::from(ratio > 1.1),
+            Verdict::Fail => wrong.failed += usize::from(ratio < 0.9),
             _ => wrong.cannot_say += 1,
         }
     }
     wrong
 }
 
-/// Wrong results over all dives of a kind, and the share of sections with the verdict can't say.
+/// Wrong results over all dives of a kind, and the share of sections with the verdict `cannot_say`.
 fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     let most_mps = legs.iter().fold(0.0, |most: f64, (_, speed_mps, _)| most.max(*speed_mps));
     let mut all = Wrong::default();
@@ -93,8 +94,8 @@ fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     (all, share)
 }
 
-/// If the cable swings by 11 cm but is declared taut, many sections stay undecided. This inertial unit can't
-/// distinguish a speed change of the cable by 5 cm/s from one of the vehicle. No section passes wrongly.
+/// If the cable swings by 11 cm but is declared taut, many sections stay undecided. This inertial unit can't tell
+/// whether a speed change of 5 cm/s is one of the cable or one of the vehicle. No section passes wrongly.
 #[test]
 fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
     let (wandering, swinging) = ([WANDERING, "0.06 m"], [SWINGING, "0.11 m"]);

@@ -2,8 +2,10 @@
 //!
 //! Each section that the vehicle or its heads have entered is judged or open, even if no head has looked at it.
 
+use headrace_coverage::Verdict;
 use headrace_geometry::time::DurNs;
-use headrace_monitor::report::{Report, SectionReport};
+use headrace_monitor::report::Report;
+use headrace_monitor::section_row::SectionRow;
 use headrace_tests::random_dives::{Draw, Kind, seeded};
 use headrace_tests::{Folder, SCENE, VEHICLE as SHORT, instrumented};
 
@@ -15,7 +17,7 @@ const HEAD_M: f64 = 0.551;
 const START_M: f64 = 3.0;
 const SPEED_MPS: f64 = 0.11;
 
-/// A steady dive at the planned speed with these effects.
+/// Report of a dive at the constant planned speed with these simulator effects.
 fn steady(distance_m: f64, effects: &str) -> Report {
     let scene = format!(
         "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n[[trajectory.legs]]\n\
@@ -45,26 +47,27 @@ fn accounted_for(what: &str, report: &Report) {
         report.sections.windows(2).all(|pair| pair[0].end_m.to_bits() == pair[1].start_m.to_bits()),
         "{what}"
     );
-    let judged = |section: &SectionReport| section.hole_m.is_some() || section.verdict == "open";
+    let judged = |section: &SectionRow| section.hole_m.is_some() || section.verdict == Verdict::Open;
     assert!(report.sections.iter().all(judged), "{what}");
 }
 
 /// Checks that a section fails because of these silent heads.
 #[track_caller]
-fn fails_by_silence(section: &SectionReport, heads: &[usize]) {
+fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     let evidence = section.cause.unwrap();
     let named = (section.verdict, evidence.cause.as_str());
-    assert_eq!(named, ("fail", "head_silent"), "{}", section.start_m);
+    assert_eq!(named, (Verdict::Fail, "head_silent"), "{}", section.start_m);
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// Time at which a plane `behind_m` behind the vehicle is half a target beyond a section, seconds after the start.
-fn left_s(section: &SectionReport, behind_m: f64) -> f64 {
+/// Time, in seconds after the start, when the plane `behind_m` behind the vehicle is past a section's end by half the
+/// target.
+fn left_s(section: &SectionRow, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
 }
 
 /// Delay of a section's flag after [`left_s`], seconds.
-fn late_s(report: &Report, section: &SectionReport, behind_m: f64) -> f64 {
+fn late_s(report: &Report, section: &SectionRow, behind_m: f64) -> f64 {
     section.flagged_s.unwrap() - report.dive.start_s - left_s(section, behind_m)
 }
 
@@ -80,8 +83,8 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(&report, section, HEAD_M);
-        // The latest moment allows for one update and the position margin. At the earliest, the flag is raised when
-        // the section's start is left, since a circle about that start may be large enough.
+        // The upper limit allows for one update and the position margin. The flag may be raised as soon as the
+        // section's start is left, because a circle centred there may exceed the target.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.go_back.iter().map(|back| back.from_m).fold(0.0, f64::max);
@@ -89,29 +92,29 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     let run = report.runs.iter().find(|run| run.cause.as_str() == "head_silent").unwrap();
     assert_eq!(run.silent_sources, ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]);
     let last = report.sections.last().unwrap();
-    assert_eq!(last.verdict, "open", "a head may recover and still see the wall ahead");
+    assert_eq!(last.verdict, Verdict::Open, "a head may recover and still see the wall ahead");
 }
 
 #[test]
-fn stretch_between_loss_and_return_of_heads_fails() {
+fn stretch_crossed_while_all_heads_are_silent_fails() {
     // The heads are dead while the vehicle moves from 5.75 m to 8.5 m.
     let report = steady(9.0, &silence(ALL, "from_s = 25\nfor_s = 25"));
     accounted_for("dead and back", &report);
     let between = |from_m: f64, to_m: f64| {
-        let within = move |s: &&SectionReport| s.start_m >= from_m && s.end_m <= to_m;
+        let within = move |s: &&SectionRow| s.start_m >= from_m && s.end_m <= to_m;
         report.sections.iter().filter(within).collect::<Vec<_>>()
     };
     for section in between(6.5, 7.75) {
         let cause = section.cause.map(|evidence| evidence.cause.as_str());
-        assert_eq!((section.verdict, cause), ("fail", Some("head_silent")), "{}", section.start_m);
+        assert_eq!((section.verdict, cause), (Verdict::Fail, Some("head_silent")), "{}", section.start_m);
     }
     for section in between(4.25, 5.0).into_iter().chain(between(9.5, 11.0)) {
-        let calm = section.verdict != "fail" && section.flagged_s.is_none();
-        assert!(calm, "{}: {} at {:?}", section.start_m, section.verdict, section.flagged_s);
+        let calm = section.verdict != Verdict::Fail && section.flagged_s.is_none();
+        assert!(calm, "{}: {:?} at {:?}", section.start_m, section.verdict, section.flagged_s);
     }
 }
 
-/// A dive along these legs (m) without position errors.
+/// Report of a dive without position errors; the signed lengths of its legs are given in m.
 fn legs(distances_m: &[f64]) -> Report {
     let vehicle = VEHICLE.replace("slack_sd_m = 0.02", "way = \"direct\"\n#");
     let mut scene = format!("seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n");
@@ -132,16 +135,16 @@ fn wall_beyond_start_and_turning_point_is_open_without_a_flag() {
     accounted_for("there and back", &report);
     let front_m = START_M + HEAD_M;
     let rear_m = START_M + 9.0 - HEAD_M;
-    let outside = |s: &&SectionReport| s.start_m < front_m - 0.25 || s.end_m > rear_m + 0.25;
-    let inside = |s: &&SectionReport| s.start_m > front_m + 0.5 && s.end_m < rear_m - 0.5;
+    let outside = |s: &&SectionRow| s.start_m < front_m - 0.25 || s.end_m > rear_m + 0.25;
+    let inside = |s: &&SectionRow| s.start_m > front_m + 0.5 && s.end_m < rear_m - 0.5;
     for section in report.sections.iter().filter(outside) {
         assert_eq!(section.flagged_s, None, "{}", section.start_m);
-        assert_ne!(section.verdict, "fail", "{}", section.start_m);
+        assert_ne!(section.verdict, Verdict::Fail, "{}", section.start_m);
     }
     let at_ends: Vec<_> = report.sections.iter().filter(|s| s.not_inspected).collect();
     assert!(at_ends.iter().any(|s| s.end_m <= front_m + 0.25), "at the beginning: {:?}", report.no_verdict);
-    assert!(at_ends.iter().all(|s| s.verdict == "open" && s.hole_m.unwrap() > report.target_m));
-    assert!(report.sections.iter().filter(inside).all(|s| s.verdict == "pass"), "{:?}", report.runs);
+    assert!(at_ends.iter().all(|s| s.verdict == Verdict::Open && s.hole_m.unwrap() > report.target_m));
+    assert!(report.sections.iter().filter(inside).all(|s| s.verdict == Verdict::Pass), "{:?}", report.runs);
     let told: f64 =
         report.no_verdict.iter().filter(|s| s.why == "not_inspected").map(|s| s.no_verdict_m).sum();
     assert!((told - report.summary.not_inspected_m).abs() < 1e-9 && told > 0.0, "{:?}", report.no_verdict);
@@ -153,11 +156,11 @@ fn section_crossed_on_the_way_back_is_judged_like_any_other() {
     accounted_for("once", &once);
     accounted_for("again", &again);
     let at_start = |report: &Report| {
-        let near = |s: &&SectionReport| s.start_m >= START_M - 0.25 && s.end_m <= START_M + 0.5;
+        let near = |s: &&SectionRow| s.start_m >= START_M - 0.25 && s.end_m <= START_M + 0.5;
         report.sections.iter().filter(near).map(|s| (s.not_inspected, s.verdict)).collect::<Vec<_>>()
     };
-    assert!(at_start(&once).contains(&(true, "open")), "{:?}", at_start(&once));
-    assert!(at_start(&again).iter().all(|is| *is == (false, "pass")), "{:?}", at_start(&again));
+    assert!(at_start(&once).contains(&(true, Verdict::Open)), "{:?}", at_start(&once));
+    assert!(at_start(&again).iter().all(|is| *is == (false, Verdict::Pass)), "{:?}", at_start(&again));
 }
 
 #[test]
@@ -180,24 +183,24 @@ fn flags_wait_only_for_live_heads() {
     assert!(inner.len() > 10);
     for section in inner {
         fails_by_silence(section, &[1, 2, 3]);
-        // The flag follows the live front head, which leaves the section ten seconds before the silent aft heads do.
+        // The flag waits only for the live front head. This head leaves the section ten seconds before the silent aft
+        // heads.
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
-    // One of four heads is silent; the speed suits three heads.
+    // One of the four heads is silent; the vehicle is slow enough for the other three heads.
     let silent = silence("\"sonar_1\"", "from_s = 10");
     let (one, none) = (steady(6.0, &silent), steady(6.0, ""));
     accounted_for("one of four", &one);
     for report in [&one, &none] {
         let judged = report.sections.iter().filter(|s| s.end_m <= 7.5);
-        // Near the start and the end, not all heads have passed.
-        let beyond = |s: &&SectionReport| !s.not_inspected;
+        // Sections near the start and the end are left out, because not all heads have passed them.
+        let beyond = |s: &&SectionRow| !s.not_inspected;
         assert!(judged.clone().filter(beyond).count() > 12);
-        assert!(judged.filter(beyond).all(|s| s.verdict != "open"));
+        assert!(judged.filter(beyond).all(|s| s.verdict != Verdict::Open));
         let ends = report.sections.iter().filter(|s| s.not_inspected);
-        let at_an_end = |s: &SectionReport| {
-            s.end_m <= START_M + HEAD_M + 0.5 || s.start_m >= START_M + 6.0 - HEAD_M - 0.5
-        };
+        let at_an_end =
+            |s: &SectionRow| s.end_m <= START_M + HEAD_M + 0.5 || s.start_m >= START_M + 6.0 - HEAD_M - 0.5;
         assert!(ends.clone().count() > 0 && ends.clone().all(at_an_end));
     }
 }
@@ -253,16 +256,17 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
         let what = format!("seed {seed}");
         accounted_for(&what, report);
         let Some(to_m) = report.coverage_extent.to_m else { continue };
-        // Heads are at most 0.6 m ahead of or behind the vehicle. A section counts as left after half the target.
+        // Heads are at most 0.6 m ahead of or behind the vehicle. A section counts as left when the heads are past its
+        // end by half the target.
         let (target_m, section_m) = (report.target_m, report.section_m);
         let seen_m = dive.samples().map(|sample| sample.place[0]).fold(f64::NEG_INFINITY, f64::max);
-        let far = |s: &&SectionReport| s.start_m > seen_m + target_m;
-        let left = |s: &&SectionReport| s.end_m < to_m - 1.2 - target_m / 2.0 - 2.0 * section_m - 0.1;
+        let far = |s: &&SectionRow| s.start_m > seen_m + target_m;
+        let left = |s: &&SectionRow| s.end_m < to_m - 1.2 - target_m / 2.0 - 2.0 * section_m - 0.1;
         for section in report.sections.iter().filter(far).filter(left) {
             let cause = section.cause.map(|evidence| evidence.cause.as_str());
             assert_eq!(
                 (section.verdict, cause),
-                ("fail", Some("head_silent")),
+                (Verdict::Fail, Some("head_silent")),
                 "{what}: {}",
                 section.start_m
             );
@@ -275,19 +279,18 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
 }
 
 #[test]
-fn stretch_without_a_position_counts_and_fails_when_left() {
+fn stretch_without_a_position_fails_once_the_vehicle_has_left_it() {
     // Some seconds after the cable counter falls silent, the filter has no fix any more.
     let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
     accounted_for("outage", &report);
-    let lost =
-        |s: &&SectionReport| s.cause.is_some_and(|evidence| evidence.cause.as_str() == "position_lost");
+    let lost = |s: &&SectionRow| s.cause.is_some_and(|evidence| evidence.cause.as_str() == "position_lost");
     let lost: Vec<_> = report.sections.iter().filter(lost).collect();
     assert!(lost.len() >= 4, "{} sections", lost.len());
     assert!(report.not_inspected.is_none(), "most of the dive had a position");
 }
 
 #[test]
-fn dive_without_a_position_judges_nothing_and_says_so_first() {
+fn dive_without_a_position_has_no_verdicts_and_says_so_first() {
     for (sensor, lacking, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")]
     {
         let folder = Folder::new();
@@ -341,8 +344,8 @@ fn dive_mostly_without_a_position_exits_with_1() {
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
 }
 
-/// Samples from before the position estimate has converged don't affect later sections. A vehicle that waits for a
-/// known heading loses only the metres that its front heads sampled while it waited.
+/// Samples from before the position estimate has converged don't affect later sections. If a vehicle waits until its
+/// heading is known, only the wall that its front heads sampled meanwhile stays undecided.
 #[test]
 fn waiting_for_a_known_heading_leaves_at_most_25_cm_undecided() {
     let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");
@@ -362,6 +365,10 @@ fn waiting_for_a_known_heading_leaves_at_most_25_cm_undecided() {
         report.no_verdict
     );
     let inside =
-        |s: &&SectionReport| s.start_m > START_M + HEAD_M + 0.25 && s.end_m < START_M + 6.0 - HEAD_M - 0.5;
-    assert!(report.sections.iter().filter(inside).all(|s| s.verdict == "pass"), "{:?}", report.no_verdict);
+        |s: &&SectionRow| s.start_m > START_M + HEAD_M + 0.25 && s.end_m < START_M + 6.0 - HEAD_M - 0.5;
+    assert!(
+        report.sections.iter().filter(inside).all(|s| s.verdict == Verdict::Pass),
+        "{:?}",
+        report.no_verdict
+    );
 }

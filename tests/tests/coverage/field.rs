@@ -2,6 +2,7 @@
 //!
 //! `cargo bench -p headrace_tests --bench field` computes the whole table.
 
+use headrace_coverage::Verdict;
 use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES};
 use headrace_tests::truth;
 
@@ -53,8 +54,8 @@ fn passed_sections_are_within_the_target() {
     }
 }
 
-/// On walls as rough as the vehicle file allows, errors of D match their standard deviation, which is neither too
-/// small nor too large. An echosounder sees the same bump for seconds, which must not look like a change of position.
+/// On walls as rough as the vehicle file allows, the reported standard deviation of D is neither too small nor too
+/// large. An echosounder sees the same bump for seconds. The filter must not take the bump for a change of position.
 #[test]
 fn wall_bumps_do_not_bias_the_position() {
     for name in ["vita2-4", "pipe", "bluerov2"] {
@@ -86,7 +87,8 @@ fn initial_stop_gives_earlier_verdicts() {
     assert!(stood <= 0.02, "share of undecided metres: {stood} with a stop, {at_once} without");
 }
 
-/// If every verdict is pass, all false passes are counted. If every verdict is fail, all false fails are counted.
+/// With every verdict set to pass, all false passes are counted. With every verdict set to fail, all false fails are
+/// counted.
 #[test]
 fn field_statistics_count_all_false_passes_and_false_fails() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
@@ -107,12 +109,12 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
         figures.add(&judged, &dive.scene, cell.start_m);
         figures
     };
-    let passed = all("pass");
+    let passed = all(Verdict::Pass);
     assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
-    // These figures include the dive's ends, where a section has a neighbour on one side only.
+    // The counts in `passed` and `failed` include the dive's ends, where a section has a neighbour on one side only.
     assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
     assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
-    let failed = all("fail");
+    let failed = all(Verdict::Fail);
     assert!(failed.failed_under == failed.under && failed.passed_over == 0, "{failed:?}");
     let told_m = failed.way_m[1];
     judged.sections.remove(judged.sections.len() / 2);

@@ -3,6 +3,7 @@
 //! A flag is raised when further forward motion can no longer undo a fail, and cleared when a later pass fills the
 //! hole. The oracle has the poses and all samples, but not the order in which the loop judges sections.
 
+use headrace_coverage::Verdict;
 use std::sync::LazyLock;
 
 use headrace_geometry::math;
@@ -13,8 +14,8 @@ use headrace_tests::random_dives::{Kind, Seeded};
 
 use crate::dives::DIVES;
 
-/// A dive with the flags that are due for two definitions of a fail. The hole exceeds the target, or it exceeds the
-/// target by two standard deviations.
+/// A dive and its due flags by two definitions of a fail: the hole exceeds the target, or it exceeds the target by two
+/// standard deviations.
 struct Judged {
     seeded: &'static Seeded,
     dive: &'static Dive,
@@ -32,7 +33,7 @@ static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     DIVES.iter().map(judge).collect()
 });
 
-/// Checks every section with `wrong`, which gets the section's due flags for both definitions and may return an
+/// Checks every section with `wrong`. This function gets the section's due flags by both definitions, and may return an
 /// error.
 #[track_caller]
 fn every_flag(
@@ -52,8 +53,8 @@ fn every_flag(
     assert!(said.is_empty(), "{} of {raised} flags: {:#?}", said.len(), &said[..said.len().min(8)]);
 }
 
-/// Longest additional delay, s. A flag waits until the heads have passed the section's end or the vehicle is
-/// stationary.
+/// A flag that becomes due less than this time before the end of the dive need not be raised, s. The loop waits until
+/// the heads have passed the section's end or the vehicle is stationary.
 const SOON_S: f64 = 3.0;
 
 /// Whether a flag was raised before its due moment, or raised although none was due.
@@ -161,12 +162,12 @@ fn filled_hole_has_no_flag() {
     every_flag(reversing, |judged, due, _| {
         let section = judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
         let stands = due.raised_s.is_some() && due.cleared_s.is_none();
-        (stands && section.verdict == "pass").then_some("passes, and keeps its flag")
+        (stands && section.verdict == Verdict::Pass).then_some("passes, and keeps its flag")
     });
 }
 
 #[test]
-fn turning_back_later_does_not_change_flags_of_the_way_out() {
+fn flags_of_the_way_out_do_not_depend_on_a_later_way_back() {
     every_flag(
         |judged| judged.seeded.kind == Kind::Reversing && direct(judged),
         |judged, due, _| {
@@ -185,7 +186,7 @@ fn end_of_a_dive_raises_no_flag() {
 
 #[test]
 fn no_flag_is_raised_while_the_fail_can_still_be_undone() {
-    // Dives with a filter are left out. Their standard deviation differed from the final one when the flag was
+    // Dives with a navigation filter are left out, because their standard deviations still change after a flag is
     // raised.
     every_flag(
         |judged| forward(judged) && direct(judged),
@@ -198,7 +199,7 @@ fn flag_of_a_stationary_or_returning_vehicle_is_raised_within_one_turn() {
     every_flag(
         |judged| direct(judged) && matches!(judged.seeded.kind, Kind::Parked | Kind::Reversing),
         |judged, _, due| {
-            // If the vehicle turns back at the due moment, it may still undo the fail.
+            // If the vehicle turns back at the moment when the flag is due, a later pass may still undo the fail.
             let due_s = due.due_s.filter(|due_s| {
                 let back_s = judged.journey.turned_back_s();
                 !(back_s - 3.0..judged.journey.turned_on_s()).contains(due_s)

@@ -1,5 +1,5 @@
-//! Impossible walls: samples outside the tunnel, and a profile that contradicts the returns. Both are reported once
-//! and counted, and they pass no section.
+//! Impossible walls: samples outside the tunnel, and a profile that contradicts the returns. Both are reported once and
+//! counted, and neither makes a section pass.
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 use serde_json::Value;
@@ -18,14 +18,14 @@ fn metres(report: &Value, verdict: &str) -> f64 {
     report["summary"][format!("{verdict}_m")].as_f64().unwrap()
 }
 
-/// Alerts that report observations about the dive as a whole.
+/// Alerts about observations, such as an impossible wall, that the report lists with their number of occurrences.
 fn observed(report: &Value) -> Vec<&Value> {
     let alerts = report["alert_list"].as_array().unwrap().iter();
     alerts.filter(|alert| !alert["occurrences"].is_null()).collect()
 }
 
 #[test]
-fn profile_contradicted_by_returns_never_passes_and_is_reported_once() {
+fn wall_with_a_contradicted_profile_never_passes_and_is_reported_once() {
     let vehicle = VEHICLE.replace("[water]", "[navigation]\nway = \"direct\"\n\n[water]");
     let as_built = "\n[tunnel.as_built]\nprofile = \"rectangle\"\nwidth_m = 7.6\nheight_m = 7.6\n";
     let (right, _) = dive(&vehicle, SCENE);
@@ -72,8 +72,8 @@ fn declared_opening_is_listed_and_does_not_fail() {
         .map(|section| section["start_m"].as_f64().unwrap())
         .collect();
     assert_eq!(masked, [4.0, 4.25, 4.5, 4.75, 5.0, 5.25]);
-    // The opening covers two of twelve hours, from 4.2 to 5.4 m. It covers a fifth of the first section and three
-    // fifths of the last one.
+    // The opening covers two of the twelve clock positions, and chainages from 4.2 to 5.4 m. So it covers a fifth of
+    // the first section's length, and three fifths of the last one's.
     let share = |start_m: f64| {
         let section =
             report["sections"].as_array().unwrap().iter().find(|s| s["start_m"] == start_m).unwrap();
@@ -114,6 +114,6 @@ fn wrong_speed_of_sound_shifts_the_wall() {
     let (_, as_told) = folder.replay("dive.mcap", &[]);
     let (_, faster) = folder.replay("dive.mcap", &["--sound-speed", "1500"]);
     assert!(mean(&as_told).abs() < 0.02, "{}", mean(&as_told));
-    // The expected shift is 3.7 % of 3 m.
+    // The wall is expected to shift by 3.7 % of the 3 m radius.
     assert!((0.06..0.15).contains(&mean(&faster)), "{}", mean(&faster));
 }

@@ -1,4 +1,5 @@
-//! Checks causes by intervention, with a tenth of the bench's dives.
+//! Repeats dives without the reported causes, and checks that the failed sections then pass. Uses a tenth of the dives
+//! of the bench `causes`.
 
 use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
 

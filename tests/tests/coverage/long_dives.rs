@@ -1,5 +1,6 @@
 //! Dives that spend hours in one place: a parked vehicle, and a vehicle that goes back and forth a hundred times.
 
+use headrace_coverage::Verdict;
 use std::fmt::Write as _;
 
 use headrace_monitor::run::Loop;
@@ -8,14 +9,15 @@ use headrace_tests::scenes;
 use headrace_tests::truth::{self, JudgedDive};
 
 const PARKED_S: u32 = 3600;
-/// Number of rounds back and forth.
+/// Number of times that the vehicle goes back and forth.
 const ROUNDS: usize = 100;
 /// Chainages between which the vehicle goes back and forth, m.
 const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
 /// Chainage of the end of the dive, m.
 const END_M: f64 = 16.0;
-/// Largest distance between a hole's bounds if samples in full cells are thinned out, m.
+/// Largest difference between the lower and upper bound of a hole's diameter if the loop thins out samples in full
+/// cells, m.
 const THINNED_M: f64 = 0.04;
 
 fn scene(parked_s: u32, rounds: usize) -> String {
@@ -32,7 +34,7 @@ fn scene(parked_s: u32, rounds: usize) -> String {
     text + &format!("[[trajectory.waypoints]]\nchainage_m = {END_M}\nspeed_mps = 0.1\n")
 }
 
-/// Simulates a dive. Returns the dive and the memory for samples at every minute, bytes.
+/// Simulates a dive. Returns the dive, and the memory used by samples at the end of each minute, bytes.
 fn dive(parked_s: u32, rounds: usize) -> (JudgedDive, Vec<usize>) {
     let scene = scenes::scene(&scene(parked_s, rounds));
     let (mut used, mut ticks) = (Vec::new(), 0_u64);
@@ -46,7 +48,7 @@ fn dive(parked_s: u32, rounds: usize) -> (JudgedDive, Vec<usize>) {
 }
 
 #[test]
-fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
+fn hour_of_parking_and_hundred_trips_back_and_forth_change_no_verdict() {
     let (once, _) = dive(0, 1);
     let (long, used) = dive(PARKED_S, ROUNDS);
     assert_eq!(once.sections.len(), long.sections.len());
@@ -55,12 +57,13 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
     let pairs = once.sections.iter().zip(&long.sections);
     for (a, b) in pairs.filter(|(a, _)| (FROM_M..END_M - 1.0).contains(&a.report.start_m)) {
         assert_eq!(a.report.verdict, b.report.verdict, "section {}", a.report.start_m);
-        passed += u32::from(a.report.verdict == "pass");
+        passed += u32::from(a.report.verdict == Verdict::Pass);
         let (Some(least_m), Some(most_m)) = (b.report.hole_least_m, b.report.hole_most_m) else {
             panic!("section {}: no bounds", b.report.start_m)
         };
         assert!(most_m - least_m <= THINNED_M, "section {}: {least_m} to {most_m}", b.report.start_m);
-        // For sections passed after the long phase, the hole is as close to the truth as without that phase.
+        // Sections beyond the parking place and the rounds have holes as close to the truth as in a dive without
+        // parking and rounds.
         if a.report.start_m >= TO_M + 1.0 {
             for (off_m, section) in off_m.iter_mut().zip([a, b]) {
                 *off_m = off_m.max((section.report.hole_m.unwrap() - section.true_hole_m).abs());
@@ -71,8 +74,8 @@ fn hour_of_parking_and_hundred_rounds_change_no_verdict() {
     println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
     assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
     found("loop.rounds", off_m[1], 0.02);
-    // Memory growth between two minutes: from a third of the parked hour to its end, and from three quarters of the
-    // rounds to their end.
+    // Memory growth over two spans: from a third of the parked hour to its end, and from three quarters of the rounds
+    // to their end.
     let parked = PARKED_S as usize / 60;
     let rounds = used.len() - 3 - parked;
     let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;

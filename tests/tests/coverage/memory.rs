@@ -15,13 +15,13 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoint
     [[trajectory.waypoints]]\nchainage_m = 17.1\nspeed_mps = 0.2\n\
     [effects]\nrange_noise = { sd_m = 0.02 }\n";
 
-/// Amounts that may grow in an armed loop: bytes of samples, and entries of the advice's history.
+/// Quantities that may grow in an armed loop: bytes of stored samples, and number of entries in the history of advice.
 fn used(dive: &Loop) -> [usize; 2] {
     [dive.view().coverage().store.usage().bytes, dive.advice_log().entries.len()]
 }
 
 #[test]
-fn stationary_vehicle_does_not_grow_memory() {
+fn memory_does_not_grow_while_the_vehicle_is_stationary() {
     let scene = scenes::scene(SCENE);
     let mut app = App::new(Mission { length_m: 100.0, ..scene.vehicle.mission() });
     for sensor in &scene.vehicle.sensors {
@@ -49,6 +49,6 @@ fn stationary_vehicle_does_not_grow_memory() {
     }
     let [early, late] = [seen[seen.len() / 2].1, seen.last().unwrap().1];
     assert!(late[0] * 100 <= early[0] * 105, "samples: {early:?}, then {late:?} bytes");
-    // The history has one entry every ten seconds, plus a few.
+    // The history of advice has one entry every ten seconds, plus a few.
     assert!(late[1] < 500, "advice: {late:?} entries");
 }

@@ -3,13 +3,15 @@
 //! They are a mirror, other origins of chainage and arc length, other names and another order of heads, and another
 //! tick length.
 
+use headrace_coverage::Verdict;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::{Piece, Profile};
-use headrace_monitor::report::{SectionReport, SpreadReport};
+use headrace_monitor::report::SpreadReport;
+use headrace_monitor::section_row::SectionRow;
 use headrace_oracle::wall::Wall;
 use headrace_tests::instrumented::{self, Dive};
 use headrace_tests::random_dives::{self, seeded};
@@ -36,10 +38,10 @@ impl Beside<'_> {
         assert_eq!(here.len(), there.len(), "sections");
         let wall = Wall::new(self.here.samples().map(|sample| sample.place), self.here.profile.perimeter_m())
             .unwrap();
-        let verdicts: std::collections::BTreeSet<_> = here.iter().map(|section| section.verdict).collect();
+        let verdicts: Vec<Verdict> = here.iter().map(|section| section.verdict).collect();
         assert!(
-            verdicts.contains("fail") && verdicts.contains("pass"),
-            "the dive has too few kinds of verdicts: {verdicts:?}"
+            verdicts.contains(&Verdict::Fail) && verdicts.contains(&Verdict::Pass),
+            "the dive has too few kinds of verdicts"
         );
         for (a, b) in here.iter().zip(there) {
             let wrong = self.differs(&wall, a, b);
@@ -47,7 +49,7 @@ impl Beside<'_> {
         }
     }
 
-    fn differs(&self, wall: &Wall, a: &SectionReport, b: &SectionReport) -> Vec<&'static str> {
+    fn differs(&self, wall: &Wall, a: &SectionRow, b: &SectionRow) -> Vec<&'static str> {
         let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE_M;
         let both = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => near(a, b),
@@ -61,7 +63,7 @@ impl Beside<'_> {
                 && both(a.max_m, b.max_m)
                 && both(deviations[0], deviations[1])
         };
-        let cause = |section: &SectionReport| section.cause.map(|evidence| evidence.cause);
+        let cause = |section: &SectionRow| section.cause.map(|evidence| evidence.cause);
         // The dives may report different holes of the same size. The hole reported for the second dive must also be a
         // hole of the first dive.
         let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
@@ -86,7 +88,7 @@ impl Beside<'_> {
     }
 }
 
-/// A vehicle without a filter, with heads at these places in the body frame.
+/// Vehicle file without a navigation filter, with heads at these positions in the body frame.
 ///
 /// If `side` is -1, the places, the turning direction of the heads, and the directions of the echosounders are
 /// mirrored.
@@ -115,7 +117,7 @@ fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     text
 }
 
-/// The dive is slow enough at first, then too fast, and returns over a part of its path.
+/// The vehicle is slow enough at first, then too fast, and then goes back over a part of its path.
 fn legs(start_m: f64, place_m: [f64; 2]) -> String {
     let mut text = format!(
         "vehicle = \"vehicle.toml\"\n[effects]\nmotion_within_turn = {{}}\n[trajectory]\nstart_m = {start_m}\nplace_m = {place_m:?}\n"
@@ -199,14 +201,14 @@ fn tick_length_does_not_change_results() {
     }
 }
 
-/// The vehicle file with another order of heads, which are its first sensors.
+/// The vehicle file with its heads in another order. The heads are the first sensors in the file.
 fn reordered(vehicle: &str, heads: usize) -> String {
     let mut tables: Vec<&str> = vehicle.split("[[sensors]]\n").collect();
     tables[1..=heads].reverse();
     tables.join("[[sensors]]\n")
 }
 
-/// Results in the report under these keys.
+/// Values of these keys in the report.
 fn answers<'a>(report: &'a Value, keys: &[&str]) -> Vec<&'a Value> {
     assert!(report["summary"]["flags_raised"].as_u64().unwrap() > 5, "{}", report["summary"]);
     keys.iter().map(|key| &report[*key]).collect()
@@ -223,7 +225,7 @@ fn head_order_does_not_change_results() {
     folder.write("reordered.toml", reordered(&vehicle, 3));
     let (_, got) = folder.replay("dive.mcap", &["--vehicle", "reordered.toml"]);
     assert_eq!(got["sources"][0]["id"], "sonar_2", "the order of heads hasn't changed");
-    // Causes may differ. Start angles, and so phases, are assigned in the order of the heads.
+    // Causes of failed sections may differ, because start angles and phases are assigned in the order of the heads.
     let [got, expected] = [got, expected].map(|mut report| {
         for section in report["sections"].as_array_mut().unwrap() {
             section.as_object_mut().unwrap().remove("cause");
@@ -234,7 +236,7 @@ fn head_order_does_not_change_results() {
     assert_eq!(answers(&got, &keys), answers(&expected, &keys));
 }
 
-/// A message whose channel has another name.
+/// The same message on a channel with another name.
 fn renamed<'a>(message: &Message<'a>, named: &dyn Fn(&str) -> String) -> Message<'a> {
     let metadata = message.channel.metadata.iter().map(|(key, value)| (key.clone(), named(value))).collect();
     let topic = named(&message.channel.topic);

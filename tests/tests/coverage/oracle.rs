@@ -3,11 +3,13 @@
 //! The oracle uses only the samples and the definitions. It has no cells, no search radius, and no order of judging.
 //! Flags are checked in `flags.rs`.
 
+use headrace_coverage::Verdict;
 use std::collections::BTreeMap;
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::report::{SectionReport, SpreadReport};
+use headrace_monitor::report::SpreadReport;
+use headrace_monitor::section_row::SectionRow;
 use headrace_oracle::wall::{Place, Wall};
 use headrace_tests::flags::{NEAR_M, PARTS, all_passed_from_m, first_failing_m, reached};
 use headrace_tests::instrumented::{Dive, Ping, Sample};
@@ -22,7 +24,7 @@ const SEARCH_M: f64 = 12.0;
 
 /// Checks every section of every dive with `misses`, which may return the description of an error.
 #[track_caller]
-fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionReport) -> Option<String>) {
+fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionRow) -> Option<String>) {
     let mut said = Vec::new();
     for (seeded, dive) in DIVES.iter() {
         let wall = Wall::new(dive.samples().map(|sample| sample.place), dive.profile.perimeter_m()).unwrap();
@@ -41,12 +43,12 @@ fn random_dives_cover_every_verdict() {
     let mut count = BTreeMap::new();
     for (seeded, dive) in DIVES.iter() {
         for section in &dive.report.sections {
-            *count.entry((seeded.kind, section.verdict)).or_insert(0) += 1;
+            *count.entry((seeded.kind, section.verdict.as_str())).or_insert(0) += 1;
         }
     }
-    for (verdict, least) in [("pass", 200), ("fail", 1000), ("cannot_say", 50)] {
-        let all: u32 = count.iter().filter(|((_, v), _)| *v == verdict).map(|(_, n)| n).sum();
-        assert!(all >= least, "{verdict}: {all} sections of {count:?}");
+    for (verdict, least) in [(Verdict::Pass, 200), (Verdict::Fail, 1000), (Verdict::CannotSay, 50)] {
+        let all: u32 = count.iter().filter(|((_, v), _)| *v == verdict.as_str()).map(|(_, n)| n).sum();
+        assert!(all >= least, "{verdict:?}: {all} sections of {count:?}");
     }
 }
 
@@ -63,15 +65,15 @@ fn sample_lies_on_the_design_wall_along_its_reference_ray() {
 }
 
 /// Whether a diameter, m, is within the bounds of a section's hole.
-fn is_within(section: &SectionReport, diameter_m: f64) -> bool {
+fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     let (Some(least_m), Some(most_m)) = (section.hole_least_m, section.hole_most_m) else { return false };
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed with the samples of only some visits. Samples of other visits can only make its hole
-/// smaller.
-fn is_of_a_visit(section: &SectionReport, diameter_m: f64) -> bool {
-    let most_m = section.hole_most_m.filter(|_| section.verdict == "pass");
+/// Whether a section passed and its hole's upper bound, from the samples of some visits alone, is at least this
+/// diameter. The oracle uses the samples of all visits, which can only make the hole smaller.
+fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
+    let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
 }
 
@@ -82,11 +84,13 @@ fn holes_are_the_largest_empty_circles() {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let expected_m = 2.0 * largest.radius_m;
         if largest.radius_m > SEARCH_M {
-            let said =
-                !section.hole_bounded && hole_m <= expected_m && ["fail", "open"].contains(&section.verdict);
+            let said = !section.hole_bounded
+                && hole_m <= expected_m
+                && [Verdict::Fail, Verdict::Open].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        // Packing moves samples by micrometres; the bounds include this movement.
+        // The loop stores samples in packed form, which moves them by micrometres. The reported bounds include this
+        // movement.
         let right =
             section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
@@ -117,29 +121,37 @@ fn verdicts_follow_from_hole_sigma_and_target() {
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // Whether a circle touches the limit of the part that all heads have passed.
+        // Whether the first failing place changes if the start of the stretch that all heads have crossed moves by
+        // `NEAR_M`.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
-        // The first failing place is accurate to one part of the section ([`PARTS`]). The program uses the largest
-        // standard deviation round the wall, and takes the farthest wall as the reach of a tilted head.
+        // Tolerance for differences between oracle and program. The oracle finds the first failing place to within one
+        // part of the section ([`PARTS`]). The program uses the largest standard deviation round the wall, and computes
+        // the reach of a tilted head from the farthest wall.
         let near_m = (section.end_m - section.start_m) / f64::from(PARTS) + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
         let from_end_m = largest.centre[0] - largest.radius_m - passed_m;
         let expected = match section.verdict {
-            _ if hole_m + twice_m <= target_m => "pass",
-            either @ ("fail" | "open") if clear_m.abs() <= near_m => either,
-            either @ ("fail" | "cannot_say") if (hole_m - twice_m - target_m).abs() < 0.01 => either,
-            either @ ("open" | "cannot_say") if behind_m.abs() <= near_m => either,
-            either @ ("open" | "cannot_say" | "fail") if from_end_m.abs() <= near_m || is_near => either,
-            // A flag stays until the hole is filled.
-            either @ "fail" if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
-            _ if clear_m > 0.0 => "fail",
-            _ if behind_m < 0.0 || from_end_m < 0.0 => "open",
-            _ => "cannot_say",
+            _ if hole_m + twice_m <= target_m => Verdict::Pass,
+            either @ (Verdict::Fail | Verdict::Open) if clear_m.abs() <= near_m => either,
+            either @ (Verdict::Fail | Verdict::CannotSay) if (hole_m - twice_m - target_m).abs() < 0.01 => {
+                either
+            }
+            either @ (Verdict::Open | Verdict::CannotSay) if behind_m.abs() <= near_m => either,
+            either @ (Verdict::Open | Verdict::CannotSay | Verdict::Fail)
+                if from_end_m.abs() <= near_m || is_near =>
+            {
+                either
+            }
+            // A flagged section keeps the verdict "fail" until its hole is filled.
+            either @ Verdict::Fail if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
+            _ if clear_m > 0.0 => Verdict::Fail,
+            _ if behind_m < 0.0 || from_end_m < 0.0 => Verdict::Open,
+            _ => Verdict::CannotSay,
         };
         (section.verdict != expected)
-            .then(|| format!("{}, not {expected}: {hole_m} m, {twice_m} m", section.verdict))
+            .then(|| format!("{:?}, not {expected:?}: {hole_m} m, {twice_m} m", section.verdict))
     });
 }
 
@@ -208,7 +220,7 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 }
 
 #[test]
-fn holes_of_lattices_match_their_exact_values() {
+fn holes_of_sample_lattices_match_exact_values() {
     let diagonal_m = math::sqrt(2.0);
     // A lattice of squares of 0.25 m, in which all four corners of a square are on a common circle. The second
     // section contains no centre of a square.
@@ -235,7 +247,7 @@ fn scattered(seed: u64, count: usize, perimeter_m: f64) -> Vec<Place> {
 }
 
 #[test]
-fn holes_of_small_sets_match_a_dense_search() {
+fn holes_of_small_sample_sets_match_a_dense_grid_search() {
     let (perimeter_m, step_m) = (2.0, 0.004);
     for seed in 0..30 {
         let wall =
@@ -249,7 +261,8 @@ fn holes_of_small_sets_match_a_dense_search() {
             .fold(0.0, f64::max);
         let exact = wall.largest(0.0, 0.5).unwrap();
         let short_m = exact.radius_m - dense_m;
-        // The distance to the nearest sample changes by no more than the distance to the nearest grid point.
+        // A point's distance to its nearest sample differs from that of the nearest grid point by no more than the
+        // distance between the two points.
         assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
     }
 }
@@ -307,7 +320,8 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // After a missing return, the next turn finds no pass over the two steps beside it, and T_y spans the gap.
+    // Ping 20 has no return. So the pings beside its angle have no T_x in the next turn, and T_y of the return after it
+    // spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

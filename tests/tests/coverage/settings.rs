@@ -34,13 +34,13 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
      imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
 
-/// Setting that is reported in a dive of 100 m by a pilot who wanders slightly. `truly` describes the simulated
-/// vehicle, and `told` is the vehicle file that headrace reads.
+/// Returns the setting that is reported as wrong in a dive of 90 m with a pilot who wanders slightly. `truly` is the
+/// vehicle file of the simulated vehicle, and `told` is the vehicle file that headrace reads.
 fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingJson> {
     told_swinging(truly, told, [aside_m, 3.0], seed)
 }
 
-/// As [`told`], but the pilot yaws by this angle, degrees.
+/// As [`told`], but the pilot also yaws back and forth by up to `yaw_deg`.
 fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u64) -> Option<SettingJson> {
     let heads: Vec<&str> = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]
         .into_iter()
@@ -57,7 +57,7 @@ fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u6
     doubted(&parse(truly), &parse(told))
 }
 
-/// Vehicle files, each with the name of one of its heads.
+/// Vehicle files, each with the id of the head whose setting is wrong.
 const OF_VEHICLES: [(&str, &str); 2] = [("vita1.toml", "sonar_0"), ("vita2-4.toml", "sonar_1")];
 const ASIDE_M: f64 = 0.5;
 
@@ -76,12 +76,12 @@ fn head_turned_about_its_axis_is_reported_with_angle() {
     }
 }
 
-/// The error changes the ranges while the vehicle yaws back and forth. With a single head it looks like a heading
+/// Such an error changes the ranges while the vehicle yaws back and forth. With a single head it looks like a heading
 /// error.
 #[test]
 fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
     let right = file("vita2-4.toml");
-    // The first head looks forward, and the other one aft.
+    // The head `sonar_1` looks forward, and `sonar_3` looks aft.
     for (head, what, angles, by_deg) in [
         ("sonar_1", "head_yawed", "[0, 0, 3]", 3.0),
         ("sonar_3", "head_yawed", "[0, 0, 177]", -3.0),

@@ -7,7 +7,7 @@ use headrace_oracle::second;
 use headrace_oracle::wall::{Place, Wall};
 use headrace_tests::{root, skipped};
 
-/// Places from `tests/oracles/holes_truth.csv`, and the perimeter of the wall.
+/// The wall with the samples and the perimeter from `tests/oracles/holes_truth.csv`.
 fn committed() -> Wall {
     let text = std::fs::read_to_string(root().join("tests/oracles/holes_truth.csv")).unwrap();
     let (first, rest) = text.split_once('\n').unwrap();
@@ -19,7 +19,7 @@ fn committed() -> Wall {
     Wall::new(rest.lines().skip(1).map(place), perimeter_m).unwrap()
 }
 
-/// Bounds and D of the sections in a table.
+/// Start, end and hole diameter D of each section in a table, m.
 fn holes(table: &str) -> Vec<[f64; 3]> {
     let row = |line: &str| -> [f64; 3] {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -29,7 +29,7 @@ fn holes(table: &str) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn true_holes_match_another_program() {
+fn true_holes_match_an_independent_program() {
     let wall = committed();
     let expected = holes(&std::fs::read_to_string(root().join("tests/oracles/holes.csv")).unwrap());
     assert_eq!(expected.len(), 12);
@@ -42,7 +42,7 @@ fn true_holes_match_another_program() {
 }
 
 #[test]
-fn other_program_still_gives_the_committed_table() {
+fn independent_program_reproduces_the_committed_table_of_holes() {
     let script = root().join("tests/oracles/holes.py");
     let has_scipy = Command::new("python3").args(["-c", "import scipy"]).output();
     if !has_scipy.is_ok_and(|output| output.status.success()) {

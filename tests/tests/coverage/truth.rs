@@ -1,5 +1,6 @@
 //! Checks the D_true oracle against other computations.
 
+use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, shapes};
 use headrace_oracle::outline::Outline;
@@ -61,7 +62,7 @@ fn true_holes_match_a_fine_grid() {
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The ends are left out: they are far from all samples, so that this search would take long.
+    // The dive's ends are left out. They are far from all samples, so the grid search would take long there.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {
@@ -72,7 +73,8 @@ fn true_holes_match_a_fine_grid() {
         };
         let grid_m = (0..=along).flat_map(|i| (0..around).map(move |j| place(i, j)));
         let grid_m = grid_m.map(|at| 2.0 * strips.clear_m(at)).fold(0.0, f64::max);
-        // Between grid points, the diameter changes by no more than twice the distance to the nearest grid point.
+        // Between grid points, the diameter of an empty circle changes by no more than twice the distance to the
+        // nearest grid point.
         let off_m =
             math::hypot((to_m - from_m) / f64::from(along), dive.truth.perimeter_m / f64::from(around));
         let short_m = section.true_hole_m - grid_m;
@@ -95,7 +97,7 @@ fn outline_arc_lengths_match_the_profile() {
     for profile in profiles {
         let outline = Outline::of(&profile);
         for k in 0..5_000 {
-            // The places are inside and outside the wall, and spread all around it.
+            // The tested points lie inside and outside the wall, all around it.
             let off_m = 0.3 + 1.5 * math::wrap(0.37 * f64::from(k), 1.0);
             let [y, z] = profile.point_at(0.618 * profile.perimeter_m() * f64::from(k));
             let [y0, z0] = profile.reference();
@@ -107,12 +109,13 @@ fn outline_arc_lengths_match_the_profile() {
     }
 }
 
-/// Whether a section isn't at the dive's end and has no samples from before the position estimate converged.
+/// Whether a section is at least 1.5 m beyond the start, where the position estimate has converged, and its true hole
+/// is below 0.7 m, so that it isn't at the dive's end.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }
 
-/// As [`settled`], with a true hole below `hole_m`.
+/// As [`settled`], but with a limit of `hole_m` for the true hole.
 fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
     section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }
@@ -148,9 +151,9 @@ fn returns_from_anything_except_the_wall_fill_no_hole() {
     }
 }
 
-/// A wrong cable count moves sections along the tunnel, and moves their true stretches by the same distance.
+/// A wrong cable count shifts a section along the tunnel. Its true hole is searched on the shifted stretch.
 #[test]
-fn true_stretches_follow_the_cable_error() {
+fn true_holes_are_searched_at_the_shifted_chainage_of_a_section() {
     let effects = "motion_within_turn = {}\ntether_slack = { reach_m = 0.4, period_s = 400 }\n";
     let dive = dive(16.0, effects);
     let most_m = dive.sections.iter().map(|section| section.shift_m.abs()).fold(0.0, f64::max);
@@ -164,7 +167,7 @@ fn true_stretches_follow_the_cable_error() {
 /// Heads with a minimum range of 10 cm receive echoes of their own vehicle, which hides a part of the wall. These
 /// echoes fill no hole.
 #[test]
-fn echoes_of_the_vehicle_pass_no_section() {
+fn no_section_passes_because_of_echoes_from_the_vehicle() {
     let load = |name: &str| {
         let text = String::from_utf8(scenes::vehicle_file(name)?).unwrap();
         let near = text.replace("min_range_m = 0.5", "min_range_m = 0.1");
@@ -182,7 +185,10 @@ fn echoes_of_the_vehicle_pass_no_section() {
     assert!(occluded > 200, "{occluded} echoes of the vehicle");
     for section in &dive.sections {
         let (hole_m, start_m) = (section.true_hole_m, section.report.start_m);
-        assert!(section.report.verdict != "pass" || hole_m <= 1.1 * 0.5, "{start_m}: passed with {hole_m} m");
+        assert!(
+            section.report.verdict != Verdict::Pass || hole_m <= 1.1 * 0.5,
+            "{start_m}: passed with {hole_m} m"
+        );
         if settled_below(section, 16.0, 1.5) {
             let off_m = section.report.hole_m.unwrap() - hole_m;
             assert!(off_m.abs() < 0.05, "{start_m}: {off_m}");

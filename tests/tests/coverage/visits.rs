@@ -1,6 +1,7 @@
 //! Places with several visits. A later visit can add to the coverage but never revokes a pass, and two visits
 //! combine.
 
+use headrace_coverage::Verdict;
 use headrace_tests::{scenes, truth};
 
 const SENSORS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.0006, attitude_deg = 0.2 }\n\
@@ -28,7 +29,7 @@ fn vehicle(name: &str) -> Result<Vec<u8>, String> {
 }
 
 /// Start chainages of the sections with this verdict between two chainages, m.
-fn with_verdict(dive: &truth::JudgedDive, verdict: &str, [from_m, to_m]: [f64; 2]) -> Vec<String> {
+fn with_verdict(dive: &truth::JudgedDive, verdict: Verdict, [from_m, to_m]: [f64; 2]) -> Vec<String> {
     let within = dive.sections.iter().map(|section| &section.report);
     let within = within.filter(|section| section.start_m >= from_m && section.end_m <= to_m);
     within
@@ -38,22 +39,22 @@ fn with_verdict(dive: &truth::JudgedDive, verdict: &str, [from_m, to_m]: [f64; 2
 }
 
 fn far_over(dive: &truth::JudgedDive, target_m: f64) -> usize {
-    let passed = dive.sections.iter().filter(|section| section.report.verdict == "pass");
+    let passed = dive.sections.iter().filter(|section| section.report.verdict == Verdict::Pass);
     passed.filter(|section| section.true_hole_m > 1.1 * target_m).count()
 }
 
-/// The counter is stuck for 12 s while the vehicle continues to move.
+/// Simulator fault: the cable counter is stuck for 12 s while the vehicle continues to move.
 const STUCK: &str =
     "[[effects.device_faults]]\nsensors = [\"tether\"]\nkind = \"stick\"\nfrom_s = 60\nfor_s = 12\n";
 
 #[test]
-fn one_complete_visit_passes_sections_sampled_during_a_position_doubt() {
+fn section_sampled_while_the_counter_is_stuck_passes_after_one_complete_visit() {
     let out = dive(4, &[(12.0, 0.09)], STUCK);
     let back = dive(4, &[(12.0, 0.09), (9.0, -0.09)], STUCK);
     let where_m = [8.0, 13.0];
-    let unsure = with_verdict(&out, "cannot_say", where_m);
+    let unsure = with_verdict(&out, Verdict::CannotSay, where_m);
     assert!(unsure.len() >= 2, "nothing was in doubt: {:?}", out.report.alert_list);
-    let passed = with_verdict(&back, "pass", where_m);
+    let passed = with_verdict(&back, Verdict::Pass, where_m);
     let still: Vec<_> = unsure.iter().filter(|start| !passed.contains(start)).collect();
     assert!(still.is_empty(), "undecided: {unsure:?}; still not passed: {still:?}");
     assert_eq!(far_over(&back, 0.5), 0);
@@ -64,7 +65,7 @@ fn drive_back_revokes_no_pass() {
     let out = dive(2, &[(12.0, 0.09)], "");
     let home = dive(2, &[(12.0, 0.09), (12.0, -0.4)], "");
     let where_m = [6.0, 15.0];
-    let [passed, after] = [&out, &home].map(|dive| with_verdict(dive, "pass", where_m));
+    let [passed, after] = [&out, &home].map(|dive| with_verdict(dive, Verdict::Pass, where_m));
     assert!(passed.len() > 30, "{passed:?}");
     let lost: Vec<_> = passed.iter().filter(|start| !after.contains(start)).collect();
     assert!(lost.is_empty(), "{lost:?}");
@@ -72,14 +73,14 @@ fn drive_back_revokes_no_pass() {
 
 /// The vehicle is too fast on both visits, and the slack of the cable differs between them.
 #[test]
-fn two_visits_with_different_slack_pass_no_section_far_over_the_target() {
+fn no_section_far_over_the_target_passes_after_two_visits_with_different_slack() {
     let (mut over, mut wrong, mut passed) = (0, 0, 0);
     for seed in 0..10 {
         let dive =
             dive(seed, &[(8.0, 0.19), (8.0, -0.2)], "tether_slack = { reach_m = 0.15, period_s = 150 }\n");
         assert_eq!(far_over(&dive, 0.5), 0);
         let (all, pass) =
-            (&dive.sections, |section: &&truth::JudgedSection| section.report.verdict == "pass");
+            (&dive.sections, |section: &&truth::JudgedSection| section.report.verdict == Verdict::Pass);
         let is_over = |section: &&truth::JudgedSection| section.true_hole_m > 0.5;
         over += all.iter().filter(is_over).count();
         wrong += all.iter().filter(is_over).filter(pass).count();

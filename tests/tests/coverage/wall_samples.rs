@@ -2,6 +2,7 @@
 //!
 //! Cases are stuck and noisy heads, murk, boulders and caves.
 
+use headrace_coverage::Verdict;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -15,7 +16,7 @@ use headrace_tests::scenes;
 use crate::observed::observed;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// A very slow dive in a pipe of 1 m radius.
+/// Scene of a very slow dive in a pipe of 1 m radius.
 const CREEP: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 6\n\
     speed_mps = 0.03\n[effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.005 }\n";
 const DRIFT: &str = "pilot_drift = { across_m = 0.2, up_m = 0.1, yaw_deg = 6, period_s = 15 }\n";
@@ -42,7 +43,7 @@ fn dive(heads: usize, effects: &str) -> Dive {
     instrumented::dive(&pipe(heads), &format!("{CREEP}{effects}"))
 }
 
-/// Alerts about a head that isn't trusted.
+/// Alerts that name this head, among those that report an observation about the dive.
 fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
     let mut alerts = observed(&dive.report);
     alerts.retain(|alert| alert.sensor.as_deref() == Some(head));
@@ -70,10 +71,10 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
 /// Returns and sections of a dive in murk, compared with the objects that the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Number of returns from the wall, and number of these that the loop classified as doubtful.
+    /// Number of returns from the wall, and how many of them the loop classified as doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Number of returns from other objects, and number of these that the loop accepted as wall.
+    /// Number of returns from objects other than the wall, and how many of them the loop accepted as wall.
     strays: usize,
     strays_wall: usize,
     /// Number of passed sections, and their largest ratio of true hole to target.
@@ -98,7 +99,7 @@ fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
         }
     }
     let wall = Wall::new(true_wall.iter().map(|sample| sample.place), dive.profile.perimeter_m()).unwrap();
-    for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
+    for section in dive.report.sections.iter().filter(|section| section.verdict == Verdict::Pass) {
         let true_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
         is.passed += 1;
         is.worst = is.worst.max(true_m / dive.report.target_m);
@@ -107,7 +108,7 @@ fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
 }
 
 #[test]
-fn head_stuck_at_one_range_passes_nothing() {
+fn no_section_passes_with_a_head_stuck_at_one_range() {
     let sound = dive(1, "");
     assert!(sound.report.summary.pass_m > 5.0, "{:?}", sound.report.summary);
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
@@ -118,7 +119,7 @@ fn head_stuck_at_one_range_passes_nothing() {
 }
 
 #[test]
-fn one_stuck_head_of_several_is_reported_and_the_others_count() {
+fn one_stuck_head_of_several_is_reported_and_the_others_are_used() {
     for (heads, stuck, least_m) in [(2, 0, 1.0), (2, 1, 2.5), (3, 0, 2.0), (3, 1, 3.0)] {
         let id = format!("sonar_{stuck}");
         let effects = format!("stuck_range = {{ sensors = [\"{id}\"] }}\n");
@@ -131,10 +132,10 @@ fn one_stuck_head_of_several_is_reported_and_the_others_count() {
         let all = observed(&dive.report);
         assert!(all.iter().all(|alert| alert.sensor.as_deref().is_none_or(|head| head == id)), "{at}");
         assert!(dive.report.summary.pass_m >= least_m, "{at}");
-        // The stuck head's returns pass no section.
+        // Without the stuck head's returns, the hole of a passed section is still at most 1.1 times the target.
         let others = dive.samples_of(|head| head != stuck);
         let wall = Wall::new(others, dive.profile.perimeter_m()).unwrap();
-        for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
+        for section in dive.report.sections.iter().filter(|section| section.verdict == Verdict::Pass) {
             let true_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
             assert!(true_m <= 1.1 * dive.report.target_m, "{at}: section {}: {true_m} m", section.start_m);
         }
@@ -142,7 +143,7 @@ fn one_stuck_head_of_several_is_reported_and_the_others_count() {
 }
 
 #[test]
-fn recovered_head_counts_again() {
+fn recovered_head_is_used_again() {
     let dive = dive(3, "stuck_range = { sensors = [\"sonar_1\"], from_s = 60, to_s = 120 }\n");
     assert_eq!(named(&dive, "sonar_1").len(), 1);
     let doubtful: Vec<f64> = dive
@@ -157,7 +158,7 @@ fn recovered_head_counts_again() {
 }
 
 #[test]
-fn constant_range_of_a_swaying_vehicle_is_reported_even_within_tolerance() {
+fn constant_range_on_a_swaying_vehicle_is_reported_even_within_tolerance() {
     let dive = dive(2, &format!("stuck_range = {{ range_m = 0.95, sensors = [\"sonar_1\"] }}\n{DRIFT}"));
     let alerts = named(&dive, "sonar_1");
     let constant = alerts.iter().find(|alert| alert.kind == "head_constant").unwrap();
@@ -166,7 +167,7 @@ fn constant_range_of_a_swaying_vehicle_is_reported_even_within_tolerance() {
 }
 
 #[test]
-fn noise_passes_nothing_and_one_noisy_head_of_two_is_reported() {
+fn no_section_passes_on_noise_and_one_noisy_head_of_two_is_reported() {
     let effects = |head: &str| format!("outliers = {{ share = 1, near_m = 0.1, sensors = [\"{head}\"] }}\n");
     let alone = dive(1, &effects("sonar_0"));
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
@@ -242,7 +243,7 @@ fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);
         let wall = Wall::new(all, dive.profile.perimeter_m()).unwrap();
         for section in &dive.report.sections {
-            if section.doubtful_returns > 0 && section.verdict == "fail" {
+            if section.doubtful_returns > 0 && section.verdict == Verdict::Fail {
                 let hole_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
                 assert!(hole_m > dive.report.target_m, "{name}, section {}: {hole_m} m", section.start_m);
             }

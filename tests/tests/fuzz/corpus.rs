@@ -19,7 +19,7 @@ use crate::mutate::broken;
 /// Start time of the logs.
 const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Number of the first sensor that belongs to the second vehicle.
+/// Lowest sensor number of the second vehicle (see `Surroundings::vehicles`).
 pub(crate) const OTHERS: u8 = 128;
 
 /// Kind of a file; it determines the reader.
@@ -37,9 +37,9 @@ pub(crate) enum Kind {
     Scene,
     /// Data of a device: sensor number, random seed for the split into pieces, and the device's bytes.
     Line,
-    /// A packet of operator input.
+    /// A packet with an operator's command.
     Console,
-    /// A message of a page viewer.
+    /// A message that a viewer of the operator's page sends to the server.
     Viewer,
 }
 
@@ -76,7 +76,7 @@ pub(crate) struct File {
 
 pub(crate) struct Corpus {
     pub(crate) files: Vec<File>,
-    /// Messages of all intact logs. The messages of an intact log must all be found in its broken version, unless a
+    /// Messages of each intact log. A damaged version of a log must contain all messages of the intact log, unless a
     /// loss is reported.
     pub(crate) said: Vec<Said>,
 }
@@ -138,7 +138,7 @@ impl Corpus {
         Self { files, said }
     }
 
-    /// Returns a broken file.
+    /// Returns a randomly damaged version of one of the intact files.
     pub(crate) fn mutant(&self, random: &mut Random) -> (Kind, Vec<u8>) {
         let file = &self.files[random.below(self.files.len())];
         let others: Vec<&File> =
@@ -161,7 +161,7 @@ const REQUESTS: [&str; 3] = [
     r#"{"do":"rate","hz":1}"#,
 ];
 
-/// Bytes that each device of the two vehicles sends in the first seconds of a short dive.
+/// Bytes that each device of the two test vehicles sends in the first seconds of a short dive.
 fn lines() -> Vec<Vec<u8>> {
     let mut found = Vec::new();
     for (text, first) in [(headrace_tests::VEHICLE.to_owned(), 0), (headrace_tests::other_vehicle(), OTHERS)]
@@ -187,7 +187,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// Content that is unique for each number and varies in length.
+/// Content of test message `number`: its bytes and its length differ from message to message.
 fn content(number: u64) -> Vec<u8> {
     let mut random = Random(number);
     (0..=number % 40).map(|_| random.bits().to_le_bytes()[3]).collect()
@@ -198,7 +198,7 @@ fn ours(messages: u64) -> Vec<u8> {
     let header = LogHeader { sources: vec![source("depth"), source("imu")], ..LogHeader::default() };
     let mut log = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
     for number in 0..messages {
-        // The log has several chunks of half a second at most.
+        // The generated log has several chunks, each of at most half a second.
         let at = BEGIN + DurNs::from_millis(i64::try_from(number * 40).unwrap());
         log.raw(u16::try_from(number % 2).unwrap(), at, at, &content(number)).unwrap();
     }

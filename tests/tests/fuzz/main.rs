@@ -39,7 +39,7 @@ use targets::{Surroundings, try_one};
 const MOST_MEMORY: usize = 200 << 20;
 /// Longest time for one file. Files usually take less than a hundredth of this time.
 const LONGEST: DurNs = DurNs::from_millis(20_000);
-/// Number of files in an ordinary test run.
+/// Number of damaged files tried in an ordinary test run.
 const FEW: u64 = 1500;
 const SEED_OF_FEW: u64 = 20_260_501;
 
@@ -78,7 +78,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// A file under test.
+/// A damaged file that is given to a reader.
 struct Trial {
     seed: u64,
     number: u64,
@@ -95,7 +95,7 @@ impl Trial {
         format!("seed {seed}, file {number} ({}): {problem}; kept as {kept}", kind.name())
     }
 
-    /// Tries one file and describes a failure.
+    /// Gives one file to its reader. Returns a description of the failure, if there is one.
     fn of(&self, bytes: &[u8], corpus: &Corpus, around: &Surroundings) -> Result<(), String> {
         let before = HELD.load(Ordering::Relaxed);
         MOST_HELD.store(before, Ordering::Relaxed);
@@ -148,7 +148,8 @@ fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
     })
 }
 
-/// Tries files from a seed on until `enough` returns true for the number of tried files.
+/// Tries random files, drawn from `seed`, until `enough` returns true for the number of files tried. Returns the
+/// failures.
 fn fuzz(seed: u64, enough: impl Fn(u64) -> bool) -> Vec<String> {
     let corpus = Corpus::new();
     let around = Surroundings::new();

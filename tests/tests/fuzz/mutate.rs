@@ -13,7 +13,7 @@ fn part(random: &mut Random, len: usize) -> core::ops::Range<usize> {
     start..(start + random.below(most)).min(len)
 }
 
-/// A length or count that is likely to cause trouble.
+/// Returns a false length or count that is likely to cause trouble.
 fn lie(random: &mut Random, truth: u64) -> u64 {
     match random.below(9) {
         0 => 0,

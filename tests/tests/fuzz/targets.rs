@@ -28,7 +28,7 @@ use headrace_tests::random::Random;
 use crate::corpus::{Corpus, Kind, OTHERS};
 use crate::messages::{Said, said};
 
-/// Vehicles and mappings that the readers need.
+/// Vehicle configurations that the readers under test need.
 pub(crate) struct Surroundings {
     vehicle: VehicleConfig,
     /// Vehicles with devices that send data. The sensor numbers of the second vehicle begin at `OTHERS`.
@@ -89,7 +89,7 @@ impl Surroundings {
         Self { vehicle: read(VEHICLE), vehicles }
     }
 
-    /// One [`Taker`] for each sensor, which states the stream that the sensor's data comes from. In tables and ROS
+    /// One [`Taker`] for each sensor. It states the stream that contains the sensor's data. In tables and ROS
     /// recordings this is the stream with the sensor's name, and in other files the only stream.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
@@ -111,7 +111,8 @@ impl Surroundings {
             .collect()
     }
 
-    /// Feeds from a mapping of the given topics. Only the topics of profiling heads use stamps.
+    /// Maps the given topics to sensors; returns the feeds. Only topics of profiling heads take their times from header
+    /// stamps.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {
@@ -123,7 +124,7 @@ impl Surroundings {
     }
 }
 
-/// Tries a file with any content.
+/// Gives a file with arbitrary content to its reader.
 ///
 /// Errors: a description of the fault that the reader showed.
 pub(crate) fn try_one(
@@ -150,7 +151,7 @@ pub(crate) fn try_one(
     if !silent || !is_vouched_for(bytes) {
         return Ok(());
     }
-    // The broken file may also contain parts of other logs, but it must contain all messages of one intact log.
+    // The log reports no loss. So it must contain all messages of one intact log; it may also contain parts of others.
     let holds =
         |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
     if corpus.said.iter().any(holds) {
@@ -160,7 +161,8 @@ pub(crate) fn try_one(
     }
 }
 
-/// Whether every checksum is present. A checksum of zero is a missing one, so a changed byte can't be detected.
+/// Whether every checksum is present. A checksum of zero counts as missing; without one, a changed byte can't be
+/// detected.
 fn is_vouched_for(log: &[u8]) -> bool {
     let mut rest = &log[8..];
     while let Some((head, behind)) = rest.split_first_chunk::<9>() {
@@ -182,7 +184,7 @@ fn is_vouched_for(log: &[u8]) -> bool {
     true
 }
 
-/// Number of items that the reader gets from a file.
+/// Number of items (messages, sensors or readings) that the reader gets from an intact file.
 pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     match kind {
         Kind::Log => said(bytes).unwrap().0.len() as u64,
@@ -208,7 +210,8 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let mut said = Ok(());
     while !rest.is_empty() {
         let (now, later) = rest.split_at((1 + random.below(24)).min(rest.len()));
-        // The next piece usually follows at once, but sometimes after a silence or with an earlier timestamp.
+        // The next piece of the device's bytes usually follows at once, but sometimes after a silence or with an
+        // earlier timestamp.
         at = match random.below(40) {
             0 => at + DurNs::from_millis(3_600_000),
             1 => MonoNs(at.0.saturating_sub(1_000_000_000)),
@@ -284,7 +287,8 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
 /// Imports a file into a log, and checks that the log is intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // No importer reads these kinds, except ROS recordings, so all of them are tried as such.
+        // Among these kinds of file, only ROS recordings have an importer. So the fuzzer imports files of all these
+        // kinds as ROS recordings.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());
@@ -306,7 +310,7 @@ fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     written(kind, Input::new("file", Cursor::new(bytes.to_vec()), format), around)
 }
 
-/// A table of pressure and cable chainage, or of a head.
+/// Reads a table with pressure and cable chainage, or with the angles and ranges of a head.
 fn table(bytes: &[u8], around: &Surroundings) -> Option<Csv> {
     let columns = |columns: &[[&str; 4]]| {
         let head = "time_column = \"t\"\nutc = true\n".to_owned();

@@ -5,11 +5,11 @@ use crate::records::{
     record_head, schema, text, zstd,
 };
 
-/// A log with its expected message.
+/// A bomb log, with the text that a replay of it must report.
 pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
-    /// Words that a replay must report as a loss, because the log is damaged.
+    /// Words that the report of a replay must contain. Alternatives are separated by `|`.
     pub(crate) told: &'static str,
 }
 
@@ -33,7 +33,7 @@ fn filled<'a>(head: &'a mut Vec<u8>, opcode: u8, front: &[u8], len: u64) -> [Par
     [Part::Bytes(head), Part::Repeated(b'a', len - front.len() as u64)]
 }
 
-/// Bombs inside chunks, with their sizes after unpacking.
+/// Logs with a bomb inside a compressed chunk.
 fn chunks() -> Vec<Bomb> {
     let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
     let zeros = |len| packed_chunk(&[Part::Repeated(0, len)], (1, 2));
@@ -106,7 +106,7 @@ fn chunks() -> Vec<Bomb> {
     ]
 }
 
-/// Bombs in records outside of chunks.
+/// Logs with a bomb in a record outside of chunks.
 fn headers() -> Vec<Bomb> {
     let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
     let channels = |topic: &str, metadata: &[u8]| -> Vec<u8> {
@@ -182,7 +182,7 @@ fn headers() -> Vec<Bomb> {
     ]
 }
 
-/// Bombs with wrong offsets and sizes.
+/// Logs with a record that states a wrong offset or size.
 fn pointers() -> Vec<Bomb> {
     let some = |records: &[Vec<u8>]| log(&[&[depth()], records, &[message(1, 5, b"a")]].concat());
     let index = |count: u32| record(7, &[&[1, 0][..], &count.to_le_bytes(), &[0; 64]].concat());

@@ -1,20 +1,20 @@
-//! Hand-made MCAP records and zstd frames, because ordinary writers produce no wrong ones.
+//! Hand-made MCAP records and zstd frames, because ordinary writers can't produce invalid ones.
 //!
 //! Sources: MCAP format specification, "Records"; RFC 8878, 3.1.1.
 
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// A record.
+/// A record: opcode, length and content.
 pub(crate) fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode], (body.len() as u64).to_le_bytes().as_slice(), body].concat()
 }
 
-/// A text with its length.
+/// A string as MCAP stores it: its length, and then its bytes.
 pub(crate) fn text(text: &str) -> Vec<u8> {
     [&u32::try_from(text.len()).unwrap().to_le_bytes(), text.as_bytes()].concat()
 }
 
-/// A map with its length.
+/// A map of strings as MCAP stores it: its length in bytes, and then its entries.
 pub(crate) fn map(entries: impl Iterator<Item = (String, String)>) -> Vec<u8> {
     let body: Vec<u8> = entries.flat_map(|(key, value)| [text(&key), text(&value)].concat()).collect();
     [&u32::try_from(body.len()).unwrap().to_le_bytes(), body.as_slice()].concat()
@@ -32,7 +32,7 @@ pub(crate) fn message(channel: u16, at: u64, data: &[u8]) -> Vec<u8> {
     record(5, &[message_head(channel, at).as_slice(), data].concat())
 }
 
-/// A message's fields before its data.
+/// Fields of a message record that precede its data.
 pub(crate) fn message_head(channel: u16, at: u64) -> Vec<u8> {
     [&channel.to_le_bytes()[..], &[0; 4], &at.to_le_bytes(), &at.to_le_bytes()].concat()
 }
@@ -66,10 +66,10 @@ pub(crate) fn ended(records: &[Vec<u8>], summary: u64) -> Vec<u8> {
     [MAGIC, &header, &records.concat(), &record(15, &[0; 4]), &footer, MAGIC].concat()
 }
 
-/// A part of the data after unpacking a frame.
+/// A part of the data in a zstd frame, before compression.
 pub(crate) enum Part<'a> {
     Bytes(&'a [u8]),
-    /// One byte and its number of repetitions.
+    /// One byte value and the number of its repetitions.
     Repeated(u8, u64),
 }
 
@@ -93,7 +93,7 @@ pub(crate) fn zstd(window_log: u8, parts: &[Part<'_>]) -> Vec<u8> {
             }
         }
     }
-    // An empty last block.
+    // Header of an empty last block, which ends the zstd frame.
     frame.extend([1, 0, 0]);
     frame
 }

@@ -7,14 +7,14 @@ use headrace_geometry::time::DurNs;
 use headrace_ports::now;
 use headrace_tests::{Folder, program};
 
-/// Longest time of a run. Runs usually take seconds, so a longer run counts as one that never ends.
+/// Time limit of a run. Runs usually take seconds, so a run beyond the limit counts as one that never ends.
 const HANGS_AFTER: DurNs = DurNs::from_millis(120_000);
 
-/// Result of a run.
+/// Result of a run of the program.
 pub(crate) struct Ran {
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
-    /// Lines of stderr, except log messages.
+    /// Lines of stderr without the program's own log messages.
     pub(crate) stderr: String,
     /// All of stderr.
     pub(crate) log: String,

@@ -7,7 +7,7 @@ use crate::run::{Ran, run};
 
 const DAY_NS: u64 = 24 * 3600 * 1_000_000_000;
 
-/// Commands that read a log.
+/// Commands of the program that read a dive log.
 const READING: [&[&str]; 7] = [
     &["replay", "odd.mcap"],
     &["replay", "odd.mcap", "--smooth"],
@@ -18,10 +18,10 @@ const READING: [&[&str]; 7] = [
     &["recover", "odd.mcap", "-o", "recovered.mcap", "--force"],
 ];
 
-/// A new time, computed from a message's number and its time.
+/// Computes a message's new timestamp from the message's number and old timestamp.
 type Stamp<'a> = &'a dyn Fn(u64, u64) -> u64;
 
-/// Writes the dive with the times that `stamp` returns.
+/// Writes a copy of the short dive's log, with timestamps from `stamp`.
 fn odd(folder: &Folder, stamp: impl Fn(u64, u64) -> u64) {
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);

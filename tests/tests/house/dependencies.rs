@@ -12,7 +12,7 @@ const FOREIGN_LIBRARIES: [&str; 4] = ["hidapi", "lz4", "ring_core_0_17_14_", "zs
 /// Crates that are never built for a supported system, because only web pages need them.
 const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
 
-/// All packages in the lock file that are needed with all features.
+/// All packages in the lock file that are needed if all features are enabled.
 fn packages() -> Vec<Value> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--locked", "--all-features"])

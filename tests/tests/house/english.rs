@@ -122,7 +122,7 @@ fn documents_stay_within_their_length_limits() {
 /// Words that aren't English, or that had a meaning in this project only.
 const PRIVATE: [&str; 4] = ["meaned", "surer", "give or take", "overmuch"];
 
-/// Reason why a sentence of a comment or document needs a second reading; `None` if these rules find none.
+/// Reason why a sentence of a comment or document needs a second reading; `None` if no rule finds one.
 fn awkward(sentence: &str) -> Option<&'static str> {
     let first = sentence.split_whitespace().next().unwrap_or_default();
     if ["Who", "Whose", "Whom", "What"].contains(&first) && !sentence.trim_end().ends_with('?') {

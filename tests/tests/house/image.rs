@@ -17,7 +17,7 @@ fn program() -> Vec<u8> {
     bytes
 }
 
-/// Runs the script; `None` if Python is missing.
+/// Runs the script `deploy/blueos-image`; `None` if Python is missing.
 fn made(program: &Path, folder: &Path) -> Option<Output> {
     let script = root().join("deploy/blueos-image");
     Command::new("python3").arg(script).args([program, folder]).current_dir(root()).output().ok()

@@ -31,7 +31,7 @@ type Module = Vec<String>;
 
 #[derive(Debug, Default)]
 struct Content {
-    /// Usually one file; several files if features choose between them.
+    /// Files of the module: usually one, but several if Cargo features choose between them.
     files: Vec<PathBuf>,
     children: Vec<Module>,
     used: Vec<Used>,
@@ -191,7 +191,7 @@ impl<'a, N: Ord + Clone> Search<'a, N> {
 mod tests {
     use super::*;
 
-    /// Files of each import cycle in a crate with these files, of which the first one is the root.
+    /// Returns the files of each import cycle in a crate that has these files. The first file is the crate's root.
     fn circles(files: &[(&str, &str)]) -> Vec<String> {
         let load = |file: &Path| {
             files.iter().find(|(name, _)| Path::new(name) == file).map(|(_, text)| (*text).to_owned())

@@ -6,14 +6,14 @@ enum Token<'a> {
     Word(&'a str),
     /// `::`
     Separator,
-    /// Content of a plain string.
+    /// Content of a string literal that isn't raw.
     Text(&'a str),
     Mark(char),
 }
 
 use Token::{Mark, Separator, Text, Word};
 
-/// A module with its own file.
+/// Declaration of a module that has its own file (`mod name;`).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Declared {
     /// Names of the inline modules around the declaration, followed by the name of the module itself.
@@ -22,7 +22,7 @@ pub(crate) struct Declared {
     pub(crate) file: Option<String>,
 }
 
-/// A path that is used in a file.
+/// A path (such as `crate::a::b`) that a file imports or names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Used {
     /// Names of the inline modules around the path.
@@ -77,7 +77,7 @@ pub(crate) fn imports(text: &str) -> Imports {
                 depth += 1;
                 taken = 4;
             }
-            // The condition excludes `use<..>` in a type.
+            // The condition `!= Mark('<')` excludes `use<..>`, a capture list in a type.
             [Word("use"), next, ..] if *next != Mark('<') => {
                 let end = here.iter().position(|token| *token == Mark(';')).unwrap_or(here.len());
                 let (front, mut leaves) = (Front::of(before), Vec::new());
@@ -152,7 +152,7 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Paths of the leaves of a use tree.
+/// Collects the paths of the leaves of a `use` tree.
 fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<Vec<&'a str>>) {
     let (mut path, mut rest) = (around.to_vec(), tokens);
     while let [Word(word), Separator, behind @ ..] = rest {

@@ -24,7 +24,8 @@ const FOR_REPLAY: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// Names that the core may not use: time, randomness, files, ports, threads, environment, locks and unbounded queues.
+/// Rust paths and names that the core may not use: time, randomness, files, ports, threads, environment, locks and
+/// unbounded queues.
 const BARRED_FROM_CORE: [&str; 13] = [
     "std::fs",
     "std::net",
@@ -41,7 +42,7 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// The list of device kinds. It uses the core as devices do, and every crate of a device.
+/// The crate that lists all device kinds. It may use the core as a device's crate does, and every device's crate.
 const DEVICES: &str = "plugins/devices";
 
 /// Rust packages in the workspace `lab`.
@@ -50,7 +51,7 @@ const LAB: [&str; 4] = ["lab/cost", "lab/engine", "lab/experiments", "lab/tables
 /// The operator's page, a plugin that isn't a device.
 const PAGE: &str = "plugins/dashboard";
 
-/// Whether a package in the folder `place` may depend on a package in the folder `needed`.
+/// Whether the package in the folder `place` may depend on the package in the folder `needed`.
 fn may_need(place: &Path, needed: &Path) -> bool {
     let core = |needed: &Path| CORE.iter().position(|name| needed == Path::new("core").join(name));
     let one_of = |names: &[&str]| names.iter().any(|name| needed == Path::new("core").join(name));
@@ -94,7 +95,7 @@ fn dependencies_point_one_way() {
 }
 
 #[test]
-fn layer_rule_rejects_dependencies_that_point_back() {
+fn layer_rule_rejects_forbidden_dependencies() {
     let pairs = [
         ("core/sampling", "core/geometry", true),
         ("core/geometry", "core/sampling", false),
@@ -133,7 +134,7 @@ fn core_has_no_io_and_no_locks() {
     assert!(sources.len() > 20, "{} files", sources.len());
     for (path, text) in sources {
         for (number, line) in text.lines().enumerate() {
-            // Comments may mention these names.
+            // Comments in the core may mention the forbidden names.
             let code = line.split("//").next().unwrap_or_default();
             for barred in BARRED_FROM_CORE.iter().filter(|barred| code.contains(**barred)) {
                 said.push(format!("{}:{}: {barred}", path.display(), number + 1));
@@ -143,8 +144,8 @@ fn core_has_no_io_and_no_locks() {
     assert!(said.is_empty(), "{said:#?}");
 }
 
-/// A skip that is printed with `println!` isn't counted: Cargo hides the output of passed tests from
-/// `.ci/count-skipped`.
+/// A test must not print a skip with `println!`. Cargo hides the output of passing tests, so `.ci/count-skipped`
+/// wouldn't count it.
 #[test]
 fn skipped_tests_are_reported_only_by_the_helper() {
     // The text is split, so that this file itself isn't found.
@@ -219,7 +220,7 @@ fn readable(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every document must exist that any file refers to.
+/// Every document that a file mentions must exist.
 #[test]
 fn named_documents_exist() {
     let mut files = Vec::new();

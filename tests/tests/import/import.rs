@@ -57,7 +57,7 @@ fn refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
     assert!(!folder.path("out.mcap").exists(), "a refused file leaves no log");
 }
 
-/// Number of intact entries in a telemetry log, and number of messages for the vehicle's sensors.
+/// Expected counts for a telemetry log: intact entries, and messages for the vehicle's sensors.
 struct Telemetry {
     entries: u64,
     attitude: u64,
@@ -66,8 +66,8 @@ struct Telemetry {
 
 #[test]
 fn bluerov_telemetry_becomes_a_log_that_replays() {
-    // The counts come from `oracles/tlog.py`: attitude counts ATTITUDE and RAW_IMU, and depth counts
-    // SCALED_PRESSURE2.
+    // The counts come from `oracles/tlog.py`. `attitude` is the number of ATTITUDE and RAW_IMU messages, `depth` that
+    // of SCALED_PRESSURE2 messages.
     let trimmed = Telemetry { entries: 6499 - 4, attitude: 776 + 81, depth: 188 };
     let full_length = Telemetry { entries: 35_916 - 4, attitude: 5245 + 528, depth: 635 };
     for (path, wanted) in recordings::both(TELEMETRY, trimmed, full_length) {
@@ -265,7 +265,7 @@ fn imported_table_becomes_the_bytes_of_its_sensors() {
     let heard =
         |id: &str| sources.iter().find(|source| source["id"] == id).unwrap()["frames"].as_u64().unwrap();
     assert_eq!((heard("imu"), heard("ping_left"), heard("tether")), (12, 3, 4));
-    // Three pressures, calibrated with the constants from the sensor's memory.
+    // Three raw pressures, calibrated with the constants from the sensor's memory.
     assert_eq!(counts["depth"], heard("depth"));
     assert!(heard("depth") > 3);
     std::fs::remove_file(folder.path("out.mcap")).unwrap();
@@ -281,10 +281,10 @@ fn imported_table_becomes_the_bytes_of_its_sensors() {
     refused(&folder, &arguments[1..6], &["--map MAPPING.toml"]);
 }
 
-/// Faulty rows are reported, and no value of such a row is taken for another column's.
+/// Faulty rows are reported, and none of their values is assigned to a wrong column.
 ///
-/// Faults are truncated rows, decimal commas beside separators, and ranges beyond the setting. A byte order mark
-/// doesn't belong to the name of the first column.
+/// Faults are truncated rows, decimal commas beside separators, and ranges beyond the setting. A byte order mark is not
+/// part of the first column's name.
 #[test]
 fn rows_that_contradict_the_header_are_skipped_and_reported() {
     let folder = Folder::new();

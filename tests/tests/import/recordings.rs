@@ -19,7 +19,7 @@ use headrace_tests::recordings;
 /// Number of camera frames (component 100) with a checksum that matches no definition.
 const BAD: u64 = 4;
 
-/// Values that `oracles/tlog.py` finds in a file. Pairs are minimum and maximum; angles are in radians with the
+/// Expected values of a file, from `oracles/tlog.py`. Pairs are minimum and maximum; angles are in radians with the
 /// autopilot's signs.
 struct Wanted {
     frames: u64,
@@ -27,7 +27,7 @@ struct Wanted {
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Number of force readings, and of readings of the first pressure sensor.
+    /// Number of accelerometer readings (specific force), and number of readings of the first pressure sensor.
     forces: usize,
     mean_force_g: f64,
     /// Number of readings of the second pressure sensor.
@@ -66,7 +66,7 @@ fn both() -> Vec<(PathBuf, Wanted)> {
     recordings::both("bluerov2_ardusub_logs/small.tlog", TRIMMED, FULL_LENGTH)
 }
 
-/// Readings that one part of the decoder gets from a whole file, and the decoder afterwards.
+/// Decodes a whole telemetry file for one sensor of the autopilot. Returns the readings and the decoder.
 fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecoder) {
     let file = std::fs::read(path).unwrap();
     let meaning = DecoderSettings { part, system_id: Some(1), component_id: Some(1), latency: DurNs::ZERO };
@@ -139,7 +139,7 @@ fn check_imu(path: &Path, wanted: &Wanted) {
 
 /// Angle between the measured force and the upward direction by the latest attitude, degrees.
 ///
-/// The angle is small if the vehicle hardly moves and the axes of both sensors are right.
+/// If the vehicle hardly moves, this angle is small only if the axes of both sensors are right.
 fn up(
     attitudes: &[(MonoNs, Rot<headrace_sensor::reading::Level, headrace_geometry::frames::Sensor>)],
     at: MonoNs,

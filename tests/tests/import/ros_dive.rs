@@ -1,7 +1,7 @@
 //! Validation: a simulated dive is written as a ROS 2 recording and imported. The import gives the same bytes, times
 //! and digest.
 //!
-//! A writer in this file writes the recording.
+//! The recording is written by the code in this file.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -54,7 +54,7 @@ impl Cdr {
     }
 }
 
-/// Topic, type and CDR of a device's message; `None` for a message without content of its own.
+/// Topic, type and CDR of the ROS message for a device's message; `None` if the device's message needs none.
 type Written = Option<(String, &'static str, Cdr)>;
 
 struct Translator {
@@ -161,7 +161,7 @@ fn recording(messages: &[Message<'_>]) -> Vec<u8> {
 }
 
 #[test]
-fn imported_ros_recording_gives_the_dive_it_was_made_from() {
+fn imported_ros_recording_equals_its_original_dive() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let messages = raw_messages(&dive);
@@ -175,7 +175,7 @@ fn imported_ros_recording_gives_the_dive_it_was_made_from() {
     assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
     let imported = folder.read("out.mcap");
     let got = raw_messages(&imported);
-    // The order of messages with equal times differs, which doesn't matter, so both are sorted.
+    // Messages with equal times may be in any order, so both lists are sorted.
     let shown = |messages: &[Message<'_>]| {
         let mut all: Vec<_> = messages
             .iter()

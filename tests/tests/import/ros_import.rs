@@ -21,7 +21,8 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// A folder with recordings, tables, the vehicle file and a mapping. Each table of the mapping contains `further`.
+/// A folder with recordings, tables, the vehicle file and a mapping. In the mapping, `further` is added to the table of
+/// each topic.
 fn folder(further: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -44,7 +45,7 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message: topic, nanoseconds since 1970 (by the log's clock anchor), and bytes.
+/// A message of an imported log: topic, nanoseconds since 1970 (by the log's clock anchor), and bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -133,7 +134,7 @@ fn recordings_of_all_kinds_match_the_tables() {
 }
 
 #[test]
-fn stamps_of_another_time_base_are_reported_and_can_be_used() {
+fn stamps_in_another_time_base_are_reported_and_usable_on_request() {
     let folder = folder("");
     folder.write("header.toml", mapping("time = \"header\""));
     assert_eq!(import(&folder, "boot_time.mcap", "header.toml").code, Some(0));
@@ -242,7 +243,7 @@ fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (O
     (answer.code, answer.stderr)
 }
 
-/// Increases the number of messages in the statistics by three.
+/// Increases the number of messages stated in the file's statistics record by three.
 fn state_three_more(bytes: &mut [u8]) {
     let number = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
     // The closing magic has 8 bytes, and the footer before it has 20. The footer begins with the position of the
@@ -256,7 +257,7 @@ fn state_three_more(bytes: &mut [u8]) {
 }
 
 #[test]
-fn messages_below_the_stated_count_are_reported() {
+fn fewer_messages_than_stated_are_reported() {
     let folder = folder("");
     let (code, said) = changed(&folder, "humble.mcap", |bytes| state_three_more(bytes));
     assert_eq!(code, Some(3), "{said}");
@@ -304,7 +305,8 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", longer);
     assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
-        // Changes the number of the first definition inside a chunk. The definition at the end of the file remains.
+        // Changes the number of the first connection definition inside a chunk. The definition at the end of the file
+        // remains.
         let chunk = find(bytes, b"compression=", 0);
         let at = find(bytes, b"conn=", chunk);
         bytes[at + 5] = 99;
@@ -312,7 +314,7 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", undefined);
     assert!(code == Some(3) && said.contains("connection without an earlier definition"), "{said}");
     let twice = |bytes: &mut Vec<u8>| {
-        // Gives the second definition the same number as the first one.
+        // Gives the second connection definition the same number as the first one.
         let chunk = find(bytes, b"op=\x05", 0);
         let first = find(bytes, b"conn=", chunk);
         let second = find(bytes, b"op=\x07", find(bytes, b"op=\x07", first) + 1);

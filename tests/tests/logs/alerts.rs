@@ -181,7 +181,7 @@ fn commands_change_no_result_except_alerts() {
         }
     }
     assert_eq!(one, other);
-    // Invalid commands change nothing at all.
+    // Invalid operator commands change nothing at all.
     let mut packets = sent(&scene);
     let source = scene.vehicle.sensors.len();
     for (number, bytes) in
@@ -204,17 +204,18 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
             told.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
-    // A second alert follows after the way back, on which any speed is allowed.
+    // The second too-fast alert follows only after the way back, because any speed is allowed on the way back.
     let too_fast = raised(ListKind::TooFast);
     assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
-    // When its condition is over, the alert still shows the speed that was too fast, not a later one.
+    // After the fast stretch, the too-fast alert still shows the speed that was too fast, not a later speed.
     let fast = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
     let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };
     assert!(figures.speed_mps > 1.2 * figures.v_max_mps, "{figures:?}");
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };
-    // The alert comes 2 s after the head's last reading, plus one update. No latch time is configured.
+    // The alert for the dead head is raised 2 s after the head's last reading, plus one update. No latch time is
+    // configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
     let head = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
@@ -233,7 +234,7 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
 }
 
 #[test]
-fn dive_with_only_silent_sensors_raises_alerts_in_time() {
+fn silence_of_all_sensors_raises_one_alert_in_time() {
     let scene = scenes::scene(SCENE);
     let mut packets = sent(&scene);
     packets.retain(|packet| packet.at < after(20.0));
@@ -252,7 +253,7 @@ fn dive_with_only_silent_sensors_raises_alerts_in_time() {
     assert_eq!(dive.view().span().unwrap().1, last, "operator input counts as a sensor");
 }
 
-/// The timestamp of a command from another thread is the dive's clock.
+/// A command from another thread gets its timestamp from the dive's clock.
 #[test]
 fn commands_from_any_thread_reach_the_loop() {
     let scene = scenes::scene(SCENE);
@@ -285,7 +286,7 @@ fn commands_from_any_thread_reach_the_loop() {
 }
 
 #[test]
-fn recorded_acknowledgements_replay_and_verify_as_equal() {
+fn recorded_acknowledgements_are_equal_in_replay_and_verify() {
     let scene = scenes::scene(SCENE);
     let folder = Folder::new();
     let console = SourceInfo { id: CONSOLE_ID.to_owned(), plugin: String::new(), connect: String::new() };
@@ -335,7 +336,7 @@ fn recorded_acknowledgements_replay_and_verify_as_equal() {
     let lines = folder.headrace(&["replay", "live.mcap", "--json-lines"]).stdout;
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).cloned().collect::<Vec<_>>();
-    // The voice note occurs again, now with its duration.
+    // The voice note is listed again, now with its duration.
     assert_eq!(of("note").len(), 4);
     assert!(of("alert_change").iter().any(|line| line["change"] == "acknowledged"));
     let states = of("state");

@@ -1,7 +1,7 @@
 //! The same bytes in the same order give the same digest.
 //!
-//! The digest is the same live and in replay, for any tick length and speed, and with idle or busy cores. (.ci/run
-//! compares debug and release builds.)
+//! The digest is the same live and in replay, for any tick length, at any replay speed, and with idle or busy cores.
+//! (.ci/run compares debug and release builds.)
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,7 +11,7 @@ const TICKS_MS: [&str; 6] = ["1", "5", "20", "100", "777", "60000"];
 
 /// Runs `work` while `threads` threads keep the cores busy.
 fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
-    /// Ends the busy threads, even if `work` panics.
+    /// Ends the busy threads when it is dropped, even if `work` panics.
     struct Stop<'a>(&'a AtomicBool);
     impl Drop for Stop<'_> {
         fn drop(&mut self) {
@@ -51,8 +51,7 @@ fn live_dive_and_its_replay_have_the_same_digest() {
     );
 }
 
-/// In this dive verdicts of failed sections become final, later passes clear flags, and verdicts depend on earlier
-/// verdicts.
+/// In this dive, fails become final, later passes clear flags, and verdicts depend on earlier verdicts.
 #[test]
 fn tick_length_does_not_change_failed_and_cleared_sections() {
     let folder = Folder::new();
@@ -80,7 +79,7 @@ fn each_difference_from_the_expected_report_is_named() {
     let (_, mut report) = folder.replay("dive.mcap", &["--report", "golden.json"]);
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
 
-    // A different name of the log is allowed, but any change of a hole is a difference.
+    // Only a different file name of the log is allowed; any change of a hole's diameter counts as a difference.
     report["log"]["path"] = "elsewhere.mcap".into();
     folder.write("golden.json", report.to_string());
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
@@ -96,7 +95,7 @@ fn each_difference_from_the_expected_report_is_named() {
     assert_eq!(places, ["/digest:", &section]);
 }
 
-/// A value may differ only if the golden report states a tolerance for it, and only within this tolerance.
+/// A value may differ from the golden report only within a tolerance that the golden report states for it.
 #[test]
 fn golden_report_may_state_tolerances() {
     let folder = Folder::with_dive();
@@ -133,7 +132,7 @@ fn golden_report_may_state_tolerances() {
     assert_eq!(meets(serde_json::json!({"/sections": -1}), &same), 2);
     let answer = folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]);
     assert!(answer.stderr.contains("tolerances of \"/sections\" is -1"), "{}", answer.stderr);
-    // A renewed report keeps its tolerances.
+    // A renewed golden report keeps its tolerances.
     meets(serde_json::json!({"/digest": "any"}), &other);
     folder.replay("dive.mcap", &["--expect", "golden.json", "--bless"]);
     let golden: serde_json::Value = serde_json::from_slice(&folder.read("golden.json")).unwrap();

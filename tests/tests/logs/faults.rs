@@ -1,4 +1,4 @@
-//! Media that fail during a recording, closed terminals, and the way in which these faults are reported.
+//! Disks that fail during a recording, and closed terminals. Each fault is reported.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 const DIVE: [&str; 4] = ["run", "vehicle.toml", "--source", "dive.mcap"];
 
-/// The program in a folder, started by another program such as strace.
+/// Runs the program in a folder through another program, such as strace.
 fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     let [above, options @ ..] = command else { panic!("no command") };
     let mut below = Command::new(above);
@@ -19,7 +19,7 @@ fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     below
 }
 
-/// Whether strace is available, which makes system calls of a process fail.
+/// Whether strace is available. It can make chosen system calls of a process fail.
 fn has_strace() -> bool {
     let can = Command::new("strace").args(["-o", "/dev/null", "true"]).output();
     let can = can.is_ok_and(|output| output.status.success());
@@ -29,7 +29,8 @@ fn has_strace() -> bool {
     can
 }
 
-/// Records a dive with this system fault. The dive is long enough for several syncs. Returns exit code and report.
+/// Records a dive while strace injects this fault into system calls. The dive is long enough for several syncs. Returns
+/// exit code and report.
 fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
     let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
     let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
@@ -67,7 +68,7 @@ fn single_failed_sync_is_reported_and_loses_nothing() {
     assert!(code == Some(3) && told.contains("Input/output error") && told.contains("no message"), "{told}");
     assert!(folder.path("log.part002.mcap").exists());
     all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
-    // Both parts replay under the recording's name and give the same dive as the original.
+    // Both parts of the recording replay under its name and give the same dive as the original log.
     assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
     assert_eq!(folder.replay("recovered.mcap", &[]).1["digest"], digest.as_str());
 }
@@ -104,7 +105,7 @@ fn failed_recording_is_reported_live_and_until_the_end() {
 }
 
 #[test]
-fn full_medium_leaves_a_truncated_log() {
+fn full_disk_leaves_a_truncated_log() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
@@ -185,7 +186,7 @@ fn unread_stderr_does_not_block_a_failing_recording() {
     let folder = Folder::with_dive();
     let Some(limit) = limit(&folder) else { return };
     let (reader, mut stderr) = std::io::pipe().unwrap();
-    // The pipe is full from the start.
+    // The pipe for stderr is full from the start.
     stderr.write_all(&vec![b'.'; 1 << 16]).unwrap();
     let arguments = ["-vv", "--record", "log.mcap", "--speed", "max", "--report", "report.json"];
     let mut dive = below(&folder, &["prlimit", &limit], &arguments);
@@ -196,12 +197,13 @@ fn unread_stderr_does_not_block_a_failing_recording() {
     assert!(losses(&report).contains("File too large"), "{}", losses(&report));
 }
 
-/// Waits until a dive has written to a file. An empty file doesn't count, because the program creates it as a test.
+/// Waits until a dive has written to a file. An empty file doesn't count, because the program creates one to test the
+/// folder.
 fn wait_for(path: &Path, dive: &mut Child) {
     wait_for_more(path, 0, dive);
 }
 
-/// Waits until a file is longer than `than` bytes; returns its length.
+/// Waits until a file grows beyond `than` bytes; returns the file's new length.
 fn wait_for_more(path: &Path, than: u64, dive: &mut Child) -> u64 {
     loop {
         let len = std::fs::metadata(path).map_or(0, |file| file.len());
@@ -267,7 +269,7 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
             // The program installs its signal handlers before it prints the first line.
             lines.next().unwrap().unwrap();
         } else {
-            // The first write contains only the header, so the test also waits for later writes.
+            // The first write to the log contains only the header, so the test also waits for later writes.
             wait_for(&folder.path("log.mcap"), &mut dive);
             std::thread::sleep(Duration::from_secs(1));
         }
@@ -276,7 +278,7 @@ fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
             assert!(dive.try_wait().unwrap().is_none(), "{name} has ended the dive");
         }
         signal(end, &dive);
-        // Nobody reads the output any more, as if the terminal were closed.
+        // From here on, nobody reads the output, as if the terminal had been closed.
         drop(lines);
         // Exit code 1: nothing was inspected.
         assert_eq!(ended(dive), Some(1), "{end}");
@@ -311,8 +313,8 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        // Each sync makes the file longer, twice a second. After four syncs the file certainly contains data that can
-        // be lost.
+        // Twice a second, a sync makes the file longer. After four syncs, the file certainly contains data whose loss
+        // can be detected.
         (0..4).fold(0, |len, _| wait_for_more(&log, len, &mut dive));
         take();
         let output = dive.wait_with_output().unwrap();
@@ -329,7 +331,7 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(report["digest"], digest.as_str());
         assert!(losses(&report).contains(words), "{words}: {}", losses(&report));
-        // The second part has the rest of the data and states the loss before it.
+        // The second part of the recording has the rest of the data and states the loss before it.
         let (code, rest) = folder.replay("log.part002.mcap", &[]);
         assert!(code == Some(3) && losses(&rest).contains(words), "{code:?}: {}", losses(&rest));
         assert!(rest["log"]["messages"].as_u64() > Some(1000), "{}", rest["log"]);

@@ -1,7 +1,7 @@
 //! Logs from any MCAP writer replay to the same digest as the headrace log of the same dive.
 //!
-//! Such a log has only the devices' data on /raw/ channels, in any compression, chunking and order. It has no vehicle
-//! file, no metadata, no ticks and no /sent/ channels.
+//! Such a log has only the devices' data on /raw/ channels, with any compression, chunk size and order of messages. It
+//! has no vehicle file, no metadata, no ticks and no /sent/ channels.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -87,7 +87,7 @@ fn sequence_publish_time_and_channel_ids_are_ignored() {
 }
 
 #[test]
-fn other_channels_are_skipped() {
+fn channels_without_device_data_are_skipped() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");

@@ -1,4 +1,4 @@
-//! Golden logs of hard situations. Each log replays to its stored report and to its reviewed text.
+//! Golden logs of hard situations. Each log replays to its stored report and its stored, reviewed text.
 //!
 //! `tests/golden/make` makes the logs of new scenes and renews reports.
 

@@ -13,7 +13,7 @@ fn replay(folder: &Folder, log: &str) -> Answer {
     folder.headrace(&[&["replay", log], &WITH_VEHICLE[..]].concat())
 }
 
-/// Lines of a replay's output that concern the log itself.
+/// Lines of a replay's output with losses ("LOST") and notes about the log.
 fn told(answer: &Answer) -> String {
     let odd = answer.stdout.lines().filter(|line| line.contains("LOST") || line.contains("note"));
     odd.fold(String::new(), |all, line| all + line.trim() + "\n")
@@ -74,7 +74,7 @@ fn messages_too_late_to_be_ordered_are_counted() {
     let mut bytes = folder.read("lying.mcap");
     let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
     let (one, later) = (&chunks[chunks.len() / 2], &chunks[chunks.len() / 2 + 2]);
-    // The test makes the chunk header state a later start than the true one.
+    // The test makes the chunk's header state a start time later than the true one.
     let place = usize::try_from(one.chunk_start_offset).unwrap() + 9;
     bytes[place..][..8].copy_from_slice(&later.message_start_time.to_le_bytes());
     bytes[place + 8..][..8].copy_from_slice(&later.message_end_time.to_le_bytes());
@@ -93,7 +93,7 @@ fn attached_vehicle_file_with_an_unknown_plugin_is_refused() {
     let answer = folder.headrace(&["replay", "foreign.mcap"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
     insta::assert_snapshot!(answer.stderr, @r#"headrace: foreign.mcap/vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50; did you mean "bar100"?"#);
-    // With another vehicle file the log can be read, whatever plugin its channels name.
+    // With another vehicle file, the log can be read even if its channels name an unknown plugin.
     assert_eq!(replay(&folder, "foreign.mcap").code, Some(0));
 }
 

@@ -19,7 +19,7 @@ use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// Stops of a playback: time, tick, digest, and whether playback was at the end.
+/// Records each stop of a playback: time, tick number, digest, and whether playback was at the end of the log.
 #[derive(Default)]
 struct Stops(Vec<(MonoNs, u64, u64, bool)>);
 
@@ -49,7 +49,7 @@ fn armed(vehicle: &VehicleConfig) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// Result of a finished dive.
+/// Result of a replayed dive.
 #[derive(Debug, PartialEq)]
 struct Outcome {
     digest: u64,
@@ -63,12 +63,12 @@ impl Outcome {
     }
 }
 
-/// A headrace log replays in the recorded order of consumption, which can differ from the order of receive times. A
-/// log without ticks replays in time order.
+/// A headrace log replays its packets in the order in which the live loop consumed them. This order can differ from
+/// that of the receive times. A log without ticks replays in time order.
 #[test]
-fn headrace_log_replays_in_consumed_order_and_others_by_time() {
+fn headrace_log_replays_in_order_of_consumption_and_other_logs_by_time() {
     let folder = Folder::new();
-    // Source and receive time of each packet in recorded order.
+    // Source and receive time of each packet, in the order in which the packets are recorded.
     let recorded = [(2, 3_000), (0, 1_000), (1, 2_000), (1, 2_500), (0, 2_200)];
     for (ticks, wanted) in [(true, [2, 0, 1, 1, 0]), (false, [0, 1, 0, 1, 2])] {
         let mut app = App::new(vehicle().mission());
@@ -90,7 +90,7 @@ fn headrace_log_replays_in_consumed_order_and_others_by_time() {
         folder.write("order.mcap", bytes);
         let mut player = Player::open(&files_of(&[folder.path("order.mcap")]).unwrap()).unwrap();
         player.connect(dive.sources());
-        // Sources of the packets in the order in which the loop consumes them.
+        // Source of each packet, in the order in which the loop consumes the packets.
         let mut consumed = Vec::new();
         let mut note =
             |dive: &Loop| consumed.extend(dive.view().placed().inbox.iter().map(|(source, _)| source.0));
@@ -99,7 +99,8 @@ fn headrace_log_replays_in_consumed_order_and_others_by_time() {
     }
 }
 
-/// Executes commands and makes a snapshot after each `interval` of work. Returns the stops and the result.
+/// Plays a log with these commands, and makes a snapshot after each `interval` of computing time. Returns the stops and
+/// the result.
 fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Duration) -> (Stops, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
@@ -116,7 +117,7 @@ fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Dura
     (stops, Outcome::of(&dive, &player))
 }
 
-/// Runs a straight replay. Returns time, tick and digest at the end of each tick, and the result.
+/// Replays a log from start to end without stops. Returns time, tick number and digest after each tick, and the result.
 fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
@@ -193,7 +194,7 @@ fn playback_waits_at_the_end_for_a_seek() {
     ];
     let (stops, ended) = play(&folder, "ticks.mcap", &commands, Duration::from_millis(5));
     let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
-    // Playback stops each time when it reaches the end or is resumed there.
+    // Playback stops each time it reaches the end or is resumed there.
     let expected = [
         at(before, false),
         at(last, false),
@@ -209,8 +210,8 @@ fn playback_waits_at_the_end_for_a_seek() {
     assert_eq!(ended, outcome);
 }
 
-/// Damages one byte in each of three chunks of a log. Two of these chunks are adjacent, in the middle; the third
-/// comes later.
+/// Damages one byte in each of three chunks of a log. Two of these chunks are adjacent and in the middle of the log;
+/// the third one comes later.
 fn damage(folder: &Folder, log: &str) {
     let mut bytes = folder.read(log);
     let mut chunks = Vec::new();
@@ -223,7 +224,7 @@ fn damage(folder: &Folder, log: &str) {
         at += 9 + usize::try_from(len).unwrap();
     }
     for number in [chunks.len() / 2, chunks.len() / 2 + 1, chunks.len() * 3 / 4] {
-        // The byte lies after the chunk's header.
+        // The damaged byte lies after the chunk's header.
         bytes[chunks[number] + 100] ^= 0x55;
     }
     folder.write(log, bytes);
@@ -315,10 +316,10 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
     program.wait_with_output().unwrap()
 }
 
-/// Judging by other targets uses the whole log. Beside an unfinished replay, these figures would belong to another
-/// dive.
+/// Other targets are judged in a second replay of the whole log. An unfinished replay covers less of the dive, so the
+/// figures wouldn't be comparable.
 #[test]
-fn unfinished_replay_is_not_judged_by_other_targets() {
+fn unfinished_replay_is_not_compared_with_other_targets() {
     let folder = logs();
     let arguments = ["ticks.mcap", "--speed", "1x", "--target", "0.5,0.3", "--report", "left.json"];
     let answer = interactive(&folder, &arguments, "pause\nseek 12s\nend\n");
@@ -329,7 +330,7 @@ fn unfinished_replay_is_not_judged_by_other_targets() {
 }
 
 #[test]
-fn lines_on_standard_input_pause_step_and_seek() {
+fn commands_on_standard_input_pause_step_and_seek() {
     let folder = logs();
     let lines = "pause\nseek 12s\nstep 3\nback 5s\nstop\nahead 0:02\nspeed max\ngo\n";
     let answer = interactive(&folder, &["ticks.mcap", "--speed", "1x"], lines);

@@ -1,5 +1,4 @@
-//! Damaged logs and full disks. Checks exit codes and messages, and that the remaining log replays to the same
-//! digest.
+//! Damaged logs and full disks. Checks exit codes and messages, and that the recovered log replays to the same digest.
 
 use std::process::Command;
 
@@ -26,7 +25,7 @@ fn recover(folder: &Folder, log: &str, output: &str) -> (Option<i32>, Value) {
 fn damaged_log_and_its_recovery_have_the_same_digest() {
     let (folder, whole) = recorded();
     let mut spotted = whole.clone();
-    // The damage is that of a medium that loses a block.
+    // The zeroed bytes simulate a disk that loses a block of 4096 bytes.
     spotted[whole.len() / 2..][..4096].fill(0);
     for (name, bytes) in [("cut", &whole[..whole.len() * 2 / 3]), ("spotted", &spotted)] {
         let (log, fixed) = (format!("{name}.mcap"), format!("{name}-fixed.mcap"));
@@ -91,7 +90,7 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
                 assert!(report["log"]["losses"][0].is_string(), "case {case}");
                 lost += 1;
             }
-            // In this case, the vehicle file is damaged or is after the cut.
+            // Exit code 2: the vehicle file in the log is damaged, or the cut removes it.
             Some(2) => assert!(answer.stderr.contains("no vehicle file"), "case {case}: {}", answer.stderr),
             code => panic!("case {case}: {code:?}: {}", answer.stderr),
         }
@@ -99,13 +98,13 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
     assert!(lost > 20, "{lost} of 40");
 }
 
-/// Records the short dive on a disk of this size, and then moves the log to another disk; `None` if the disk can't be
-/// made.
+/// Records the short dive on a disk of this size, and then moves the log to another disk. Returns `None` if the small
+/// disk can't be created.
 fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)> {
     std::fs::create_dir_all(folder.path("disk")).unwrap();
     let program = headrace_tests::program();
     let program = program.get_program().to_str().unwrap();
-    // The shell has a private mount, which ends with the shell.
+    // The small disk is a private mount of the shell, and ends with the shell.
     let script = format!(
         "mount -t tmpfs -o size={kilobytes}k none disk || exit 99
         '{program}' run vehicle.toml --source dive.mcap --record disk/log.mcap --speed max --json > report.json 2> said.txt
@@ -132,7 +131,7 @@ fn nearly_full_disk_drops_echoes_and_full_disk_ends_the_recording() {
         let losses = report["log"]["losses"].to_string();
         assert!(losses.contains(words), "{losses}");
         assert!(said.contains("MB left"), "a warning while the dive goes on: {said}");
-        // The recorded part is readable and states the loss.
+        // The part of the dive that was recorded is readable, and the log states the loss.
         let (code, replayed) = folder.replay("small.mcap", &[]);
         let losses = replayed["log"]["losses"].to_string();
         assert!(code == Some(3) && losses.contains("echo returns out"), "{code:?}: {losses}");

@@ -1,5 +1,4 @@
-//! A dive recorded in several parts gives the same results as a dive in one log when it is replayed, verified or
-//! recovered, and also after a kill.
+//! A dive recorded in several parts is replayed, verified and recovered like a dive in one log, also after a kill.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -8,7 +7,7 @@ use std::time::Duration;
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Number of kills.
+/// Number of dives that the test kills while they are recorded.
 const KILLS: u64 = 12;
 
 fn record(folder: &Folder, further: &[&str]) -> Value {
@@ -40,7 +39,7 @@ fn dive_in_parts_replays_and_verifies_as_one() {
     assert!(names(&report).len() >= 3 && names(&report)[..3] == expected, "{:?}", names(&report));
     assert_eq!(names(&whole), [""; 0]);
 
-    // The recording can be named by its name, by its folder, or by its files in any order.
+    // A command accepts the recording's name, its folder, or its files in any order.
     let mut files = names(&report);
     files.reverse();
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
@@ -86,7 +85,8 @@ fn dive_in_parts_replays_and_verifies_as_one() {
 #[test]
 fn live_report_lists_the_parts_of_the_recording() {
     let folder = Folder::with_dive();
-    // Devices may or may not exist at these addresses. In either case, the data is too little for a second part.
+    // Devices may or may not exist at the vehicle file's addresses. In either case, the data is too little for a second
+    // log part.
     let arguments =
         ["run", "vehicle.toml", "--record", "live.mcap", "--rotate", "1GiB", "--for", "1", "--json"];
     let answer = folder.headrace(&arguments);
@@ -148,7 +148,7 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
         };
         assert_eq!(told["differences"], Value::Array(Vec::new()), "{name}: {told}");
         let lost = told["losses"].as_array().unwrap();
-        // Only the present part and one that has just begun may have lost data.
+        // After a kill, only the log part that was being written and a part that had just begun may have lost data.
         assert!(lost.len() <= 2, "{name}: {told}");
         assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {told}");
         same += told["same_records"].as_u64().unwrap();
@@ -163,7 +163,7 @@ fn part_named_twice_is_read_once() {
     let folder = Folder::with_dive();
     record(&folder, &["--record", "a.mcap", "--rotate", "5s"]);
     let digest = folder.digest("a.mcap", &[]);
-    // After an error, the first part has the name of the recording.
+    // If writing a part fails, the first part may have the plain name of the recording.
     std::fs::rename(folder.path("a.part001.mcap"), folder.path("a.mcap")).unwrap();
     let mut names: Vec<String> = std::fs::read_dir(folder.path(""))
         .unwrap()
@@ -176,7 +176,7 @@ fn part_named_twice_is_read_once() {
     for further in [&names[1..], &["a.part002.mcap"], &["./a.part002.mcap", "a.mcap"]] {
         assert_eq!(folder.digest("a.mcap", further), digest, "{further:?}");
     }
-    // If two files claim to be the same part, both are refused and named.
+    // If two files claim to be the same part, the error names both.
     std::fs::copy(folder.path("a.part002.mcap"), folder.path("b.mcap")).unwrap();
     let answer = folder.headrace(&["replay", "a.mcap", "b.mcap"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stdout);

@@ -27,8 +27,8 @@ const COMMANDS: [&str; 7] = [
     r#"{"do":"nothing"}"#,
 ];
 
-/// All packets of a scene's devices. Every third packet of a byte stream is cut in two. So at any moment, some frame
-/// is incomplete.
+/// All packets of a scene's devices. Every third packet of a byte stream is cut in two, so that a snapshot often falls
+/// within a frame.
 pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
     let mut simulation = Simulation::new(scene).unwrap();
     let mut all = Vec::new();
@@ -43,7 +43,7 @@ pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
         for bytes in [&bytes[..cut], &bytes[cut..]].into_iter().filter(|bytes| !bytes.is_empty()) {
             all.push(Packet { source, at, bytes: bytes.to_vec() });
         }
-        // Adds operator commands.
+        // Adds operator commands between the packets of the devices.
         if all.len() % 97 == 0 {
             let command = COMMANDS[all.len() / 97 % COMMANDS.len()].as_bytes().to_vec();
             all.push(Packet { source: scene.vehicle.sensors.len(), at, bytes: command });
@@ -64,7 +64,7 @@ fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
     (dive, ports)
 }
 
-/// Runs a loop on packets, with ticks after some of them.
+/// Feeds packets to a loop, with a tick after every 23 packets.
 fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     for some in packets.chunks(23) {
         for packet in some {
@@ -81,7 +81,7 @@ fn goes_on_from_anywhere(scene: &Scene) {
     let packets = packets(scene);
     let (mut whole, mut other) = (armed(&scene.vehicle), armed(&scene.vehicle));
     let mut saved = whole.0.save().unwrap();
-    // The length of a stretch differs from every period in the dive.
+    // The number of packets between two saves is no multiple of any period in the dive.
     let stretch = packets.len() / 17 + 1;
     for (number, stretch) in packets.chunks(stretch).enumerate() {
         run(&mut whole, stretch);
@@ -105,7 +105,7 @@ fn goes_on_from_anywhere(scene: &Scene) {
     assert!(reports[0].dive.samples_valid > 100);
 }
 
-/// The dive goes back and forth, so that sections fail, their verdicts become final, and later passes clear them.
+/// The dive goes back and forth. Sections fail, fails become final, and later passes clear them.
 pub(crate) const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.197\n\
     [[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.4\n[[trajectory.legs]]\ndistance_m = 7\nspeed_mps = -0.3\n";
 
@@ -117,7 +117,7 @@ const DBC: &str = "dbc = \"sbg_ellipse.dbc\"\naxes = \"frd\"\nsignals.rate = [\"
     signals.force = [\"AccX\", \"AccY\", \"AccZ\"]\nsignals.quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"]\n\
     signals.rate_valid = { signal = \"ImuStatus\", mask = 0x2E1 }\nsignals.sample_time = \"ImuTime\"";
 
-/// A dive of the usual test vehicle with changes to the vehicle file.
+/// A dive of the small test vehicle, with its vehicle file modified by `change`.
 fn small_vehicle(change: impl Fn(&str) -> String) -> Scene {
     let vehicle = change(headrace_tests::VEHICLE);
     let load = |name: &str| match name {
@@ -148,7 +148,7 @@ fn snapshot_with_autopilot_and_velocity_log_resumes_identically() {
     goes_on_from_anywhere(&small_vehicle(|_| headrace_tests::other_vehicle()));
 }
 
-/// A loop refuses the state of another vehicle.
+/// A loop refuses to restore the saved state of another vehicle.
 #[test]
 fn snapshot_of_another_vehicle_is_refused() {
     let two = small_vehicle(str::to_owned);

@@ -1,6 +1,6 @@
 //! Replays on several threads, and loops that share a navigation, give the same ticks as one thread, bit for bit.
 //!
-//! The ticks are the same for every kind of end of the feed.
+//! The ticks are the same whichever way the feed ends.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -29,14 +29,14 @@ use crate::snapshots::{EFFECTS, LEGS, Packet, packets};
 
 const THREADS: [usize; 3] = [1, 2, 3];
 
-/// Kinds of ends of a feed.
+/// End of the test's feed of packets: normal, with an error, or by a panic.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
-    /// After its last packet.
+    /// The feed ends regularly after its last packet.
     Last,
-    /// With an error at this packet.
+    /// The feed ends with an error at this packet.
     Error(usize),
-    /// By a panic at this packet.
+    /// The feed ends by a panic at this packet.
     Panic(usize),
 }
 
@@ -71,8 +71,8 @@ impl PacketSource for Feed {
     }
 }
 
-/// A scene with four heads and back-and-forth motion. Sections fail, their verdicts become final, and later passes
-/// clear them. An operator gives commands.
+/// A scene with four heads and back-and-forth motion. Sections fail, fails become final, and later passes clear them.
+/// An operator gives commands.
 fn scene() -> Scene {
     scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{LEGS}{EFFECTS}"))
 }
@@ -89,7 +89,7 @@ fn armed(vehicle: &VehicleConfig, plugin: Option<&dyn Plugin>) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// Digest of all public data of a loop after a tick.
+/// Hash of all data that a loop publishes in a tick.
 fn of_tick(dive: &Loop) -> u64 {
     let mut hasher = DefaultHasher::new();
     let inbox = &dive.view().placed().inbox;
@@ -105,7 +105,7 @@ fn of_tick(dive: &Loop) -> u64 {
     hasher.finish()
 }
 
-/// Result of a dive on a number of threads: each tick, the kind of end, the final report and the final state.
+/// Result of a dive on some number of threads: hash of each tick, error at the end, report and final state.
 #[derive(PartialEq)]
 struct Dived {
     ticks: Vec<u64>,
@@ -120,7 +120,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     let (mut ticks, tick) = (Vec::new(), DurNs::from_millis(tick_ms));
     let mut note = |dive: &Loop| ticks.push(of_tick(dive));
     let driven = match threads {
-        // Zero threads means the plain `drive`, without the function under test.
+        // Zero threads select the plain function `drive`, which is the reference for the tested `drive_on`.
         0 => drive(&mut dive, &mut feed, Pace { tick, speed: None }, &mut note),
         threads => drive_on(threads, &mut dive, &mut feed, tick, &mut note),
     };
@@ -129,7 +129,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     Dived { ticks, error, report, state }
 }
 
-/// Final report, and the state before the dive was finished.
+/// Saves the state, and then finishes the dive. Returns report and state.
 fn ended(dive: &mut Loop) -> (Value, Vec<u8>) {
     let state = dive.save().unwrap();
     dive.finish(&mut |_, _| ());
@@ -197,7 +197,7 @@ fn panicking_thread_is_an_error_and_never_blocks() {
     assert!(caught.is_err());
 }
 
-/// An outlet that has a backlog at times and makes the loop hold packets back.
+/// An outlet that falls behind at times, so that the loop must hold packets back.
 #[derive(Clone, Default)]
 struct Behind(Arc<AtomicU64>);
 
@@ -215,7 +215,8 @@ impl Outlet for Behind {
     }
 }
 
-/// A plugin with a system in the placer.
+/// A plugin that adds a system to the placer (the part of the loop that places pings) and counts the packets that the
+/// system sees.
 struct Placing;
 
 #[derive(Resource, Default)]
@@ -259,7 +260,7 @@ fn loop_waits_for_slow_outlets_and_plugins_see_every_packet() {
     }
 }
 
-/// A split loop refuses to be saved or split again.
+/// A loop that is split among threads refuses to be saved or split again.
 #[test]
 fn split_loop_cannot_be_saved_or_split_again() {
     let scene = scene();
@@ -280,7 +281,7 @@ fn loops_that_share_a_navigation_give_the_same_results_as_alone() {
     let asked = [(0.3, 0.25), (0.5, 0.25), (0.8, 1.0), (1.2, 0.5)];
     let vehicle = |(target_m, section_m): (f64, f64)| {
         let mut vehicle = scene.vehicle.mission();
-        (vehicle.target_m, vehicle.section_m) = (target_m, section_m);
+        (vehicle.target.max_hole_m, vehicle.section_m) = (target_m, section_m);
         vehicle
     };
     let loops = || -> Vec<Loop> {

@@ -1,11 +1,11 @@
-//! Trimmed logs. Without a cut they contain the same dive, with a cut they keep the verdicts inside, and anonymous
-//! ones contain no names.
+//! Trimmed logs. Without a cut, they contain the same dive. With a cut, they keep the verdicts of the remaining
+//! stretch. Anonymous logs contain no names.
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 use serde_json::Value;
 
-/// The dive takes two minutes at a steady speed, so that it has inner sections.
+/// The dive takes two minutes at a steady speed, so that it has sections that aren't affected by its ends.
 const LONG: &str = r#"name = "long dive"
 vehicle = "vehicle.toml"
 
@@ -33,7 +33,7 @@ fn trim(folder: &Folder, output: &str, further: &[&str]) -> Value {
     serde_json::from_str(&answer.stdout).unwrap()
 }
 
-/// Start and verdict of each section within a stretch.
+/// Start chainage and verdict of each section that starts between two chainages.
 fn within(report: &Value, from_m: f64, to_m: f64) -> Vec<(f64, String)> {
     let sections = report["sections"].as_array().unwrap().iter();
     let inside = sections.filter_map(|section| {
@@ -52,7 +52,7 @@ fn trim_without_a_cut_keeps_the_dive_and_its_results() {
         [("copy.mcap", &[][..]), ("echoless.mcap", &["--drop-echoes"]), ("public.mcap", &["--anonymise"])]
     {
         let told = trim(&folder, name, further);
-        // Alerts contain people's names.
+        // Alerts contain people's names, so an anonymous log leaves them out.
         let leaves_out = told["results_left_out"].as_u64().unwrap() > 0;
         assert_eq!((told["cut"].as_u64(), leaves_out), (Some(0), name == "public.mcap"), "{told}");
         assert_eq!(folder.digest(name, &[]), digest, "{name}");
@@ -86,7 +86,7 @@ fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
         assert!(answer.stdout.contains("this log is an extract"), "{}", answer.stdout);
     }
-    // A removed part is reported only if data existed there.
+    // The log states a cut at its start or end only if data was removed there.
     for (name, further, said, unsaid) in [
         ("later.mcap", ["--from", "20s"], "earlier data was cut off", "later data was cut off"),
         ("earlier.mcap", ["--to", "20s"], "later data was cut off", "earlier data was cut off"),
@@ -139,7 +139,8 @@ fn anonymous_log_has_no_name_address_comment_or_time_of_day() {
     folder.simulate("scene.toml", "plain.mcap");
     folder.record("plain.mcap", "live.mcap", &[]);
     let told = trim(&folder, "public.mcap", &["--anonymise"]);
-    // Attachments and metadata aren't compressed: the file's bytes contain their text. Messages are searched unpacked.
+    // Attachments and metadata aren't compressed, so their text is searched in the file's bytes. Messages are searched
+    // after decompression.
     let answer = folder.headrace(&["recover", "public.mcap", "-o", "again.mcap"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let log = folder.read("public.mcap");

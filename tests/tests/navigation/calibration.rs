@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Two heads and all sensors for the position. Beam widths are small, because the simulated beams are rays here.
+/// A vehicle with two heads and all sensors for the position. Beam widths are small, because these scenes simulate
+/// beams as rays.
 fn vehicle(front: &str, aft: &str, zero_at_m: f64) -> String {
     let pings = [("left", "0, 90"), ("right", "0, -90"), ("up", "-90, 0"), ("down", "90, 0")];
     let pings = pings.map(|(id, angles)| {
@@ -52,12 +53,13 @@ zero_at_m = {zero_at_m}
     )
 }
 
-/// Mounts as stated in the file.
+/// The vehicle file that headrace reads. The simulated vehicle may have other mounts.
 fn filed() -> String {
     vehicle("position_m = [0.1, 0, 0]", "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 180]", 0.0)
 }
 
-/// Stationary for twelve seconds, then thirty seconds of motion with yaw, roll and pitch.
+/// A dive with thirty seconds of motion with yaw, roll and pitch. If `stand` is set, the vehicle first stands still for
+/// twelve seconds.
 fn scene(stand: bool, effects: &str) -> String {
     let mut scene =
         "name = \"calibration\"\nvehicle = \"true.toml\"\n[trajectory]\nkind = \"waypoints\"\n".to_owned();
@@ -95,7 +97,8 @@ fn found<'a>(report: &'a Value, of: &str, what: &str) -> &'a Value {
         .unwrap_or_else(|| panic!("{of} {what}: {report:#}"))
 }
 
-/// Checks that the latency is right to three of its standard deviations and to `most_ms`.
+/// Checks that the latency found by `calibrate` differs from the truth by at most three reported standard deviations,
+/// and by less than `most_ms`.
 #[track_caller]
 fn assert_latency(report: &Value, of: &str, truth_ms: f64, most_ms: f64) {
     let row = found(report, of, "latency");
@@ -107,7 +110,8 @@ const LATE_UNIT: &str =
     "line_delay = { sensors = [\"imu\"], latency_ms = 80 }\noutliers = { share = 0.08 }\n";
 const LATE_HEAD: &str = "line_delay = { sensors = [\"front\"], latency_ms = 50 }\n";
 
-/// The errors are a rotated head, a reversed head, a wrong zero of the counter, and a late inertial unit.
+/// The wrong settings are a rotated head, a reversed head, a wrong zero of the cable counter, and the latency of the
+/// inertial unit.
 #[test]
 fn calibrate_finds_wrong_settings_and_proposes_corrections() {
     let front = "position_m = [0.1, 0, 0.04]\nangles_deg = [4, 0, 0]";
@@ -178,7 +182,8 @@ fn calibrate_finds_only_the_late_head() {
     let answer = folder.headrace(&["calibrate", "dive.mcap", "--json"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let report: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // The vehicle file accepts only latencies below 32 ms for a head, because a head answers before its next ping.
+    // A head answers before its next ping, so its latency in the vehicle file must be below 32 ms. The latency found
+    // here is longer, so no line is proposed.
     let untold = report["untold"].as_array().unwrap();
     let why = untold.iter().find(|row| row["of"] == "front" && row["what"] == "latency").unwrap()["why"]
         .as_str()
@@ -194,8 +199,8 @@ fn calibrate_finds_only_the_late_head() {
     assert_eq!(report["untold"][0]["of"], "water");
 }
 
-/// If all walls seem too near or too far, no other setting may be changed to explain it. The matching speed of sound
-/// is reported, because either it or the wall is wrong.
+/// All walls seem too near or too far. No other setting may be changed to explain this. The speed of sound that
+/// explains it is reported, because either this setting or the wall is wrong.
 #[test]
 fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     for (share, says) in
@@ -213,7 +218,7 @@ fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     }
 }
 
-/// A log without a stationary phase gives no mounts and no zeros. A very short log gives no result at all.
+/// Without a stationary phase in the log, no mount and no zero is found. In a very short log, nothing is found.
 #[test]
 fn calibrate_without_a_stationary_phase_says_so() {
     let folder = folder(false, &filed(), "");

@@ -8,7 +8,7 @@ use headrace_tests::field::{Figures, POSE, TURN_S, field, figures, nees, rms, sh
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence, Track, dive, filter};
 
-/// Number of seeds. The bounds below hold for this number of dives.
+/// Number of simulated dives, each with its own seed. The bounds below are valid for this number.
 const SEEDS: u64 = 20;
 /// Distance that the vehicle covers in one turn of its head, m.
 const T_X_M: f64 = TURN_S * 0.197;
@@ -21,11 +21,11 @@ fn mean_of(all: &[Figures], pick: Pick) -> f64 {
     rms(all.iter().map(pick))
 }
 
-/// Results of one dive: with the filter, without the filter, and the errors of its holes.
+/// Results of one simulated dive: with the filter, without the filter, and the errors of the reported holes.
 struct Dives {
     filter: Track,
     without: Figures,
-    /// Error of each section's hole with its reported standard deviation, m.
+    /// For each section, the error of its hole and the hole's reported standard deviation, m.
     holes: Vec<(f64, f64)>,
 }
 
@@ -39,7 +39,7 @@ fn dives(seed: u64) -> Dives {
     Dives { filter, without, holes }
 }
 
-/// Returns the error of each section's hole with its reported standard deviation, m.
+/// Returns the error of each section's hole, and the hole's reported standard deviation, m.
 fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     let pairs = ours.report.sections.iter().filter_map(|ours| {
         let same = |other: &f64| (other - ours.start_m).abs() < 1e-6;
@@ -49,20 +49,21 @@ fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     pairs.collect()
 }
 
-/// Vehicle file for this inertial unit, which has high noise.
+/// The shipped vehicle file `name`, with the gyro and accelerometer biases of an inertial unit with high noise.
 fn told(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
     let unit = "[navigation]\ngyro_bias_degps = 0.2\ngyro_bias_time_s = 300\naccel_bias_mps2 = 0.02";
     Ok(file.replace("[navigation]", unit).into_bytes())
 }
 
-/// The goal is 0.9. With a noisy unit, the walls correct the attitude only partly. Neighbouring passes then have less
-/// yaw error in common than the filter assumes.
+/// Smallest allowed share of sections whose hole error is within two standard deviations if heads are far apart along
+/// the hull. The goal is 0.9. With a noisy unit, the walls correct the attitude only partly. Neighbouring passes then
+/// have less yaw error in common than the filter assumes.
 const LEAST_APART: f64 = 0.8;
 
-/// If heads are apart along the hull, neighbouring passes are made at quite different times.
+/// If heads are mounted far apart along the hull, they pass neighbouring lines on the wall at quite different times.
 #[test]
-fn hole_errors_of_heads_apart_along_the_hull_are_within_reported_bounds() {
+fn hole_errors_of_separately_mounted_heads_are_within_reported_bounds() {
     let mut all = Vec::new();
     for (seed, slack) in [(1, "reach_m = 0.03, period_s = 10"), (2, "reach_m = 0.05, period_s = 30")] {
         let text = format!(
@@ -77,7 +78,7 @@ fn hole_errors_of_heads_apart_along_the_hull_are_within_reported_bounds() {
         let scene = scenes::seeded(&text, &told, Some(seed));
         let ours = dive(&scene, filter(&scene), Silence::default());
         let errors = hole_errors(&ours, &tracking::true_dive(&scene));
-        // Sections at the ends have no neighbours on one side.
+        // Sections at the ends of the dive are left out, because they have no neighbours on one side.
         all.extend(errors.iter().skip(12).rev().skip(12).copied());
     }
     holes_within_their_bounds(&all, LEAST_APART);
@@ -101,7 +102,8 @@ fn filter_is_accurate_and_consistent_in_field_dives() {
 /// Checks the filter's errors. Lateral and vertical errors are at most 5 cm, and the lateral error is at most a third
 /// of that without the filter.
 ///
-/// The displacement during a turn must be right to 2 % of T_x or 3 cm, averaged over the dives.
+/// Averaged over the dives, the error of the displacement during a turn must be below 3 cm or 2 % of T_x, whichever is
+/// larger.
 fn accuracy(all: &[Dives]) {
     let ours: Vec<Figures> = all.iter().map(|dives| figures(&dives.filter)).collect();
     let theirs: Vec<Figures> = all.iter().map(|dives| dives.without).collect();
@@ -128,8 +130,8 @@ fn accuracy(all: &[Dives]) {
     assert!(mean_of(&ours, |f| f.turn_m) < limit_m, "{:.4} m a turn", mean_of(&ours, |f| f.turn_m));
 }
 
-/// Checks the NEES of the pose. Its average over the dives must be within the 95 % bounds in three of four epochs.
-/// Its mean must be right to a seventh.
+/// Checks the NEES of the pose. Its average over the dives must be within the 95 % bounds in three of four epochs. Its
+/// mean over all epochs must be at most 6.9; the ideal is 6.
 fn consistent_estimates(all: &[Dives]) {
     let epochs = all.iter().map(|dives| dives.filter.epochs.len()).min().unwrap();
     let runs = all.len() as f64;
@@ -155,9 +157,9 @@ fn consistent_estimates(all: &[Dives]) {
 
 /// Checks the NIS of each kind of sensor.
 ///
-/// The mean must be one to within a fifth, because the filter learns the noise. The average over ten seconds and all
-/// dives must be within the 95 % bounds at least a third of the time. Sensors with less noise than assumed may be
-/// below the bounds. These are sensors with rounding treated as noise, and a compass without steel nearby.
+/// The mean must be within 0.2 of one, because the filter learns the noise. The average over ten seconds and all dives
+/// must be within the 95 % bounds at least a third of the time. A sensor with less noise than assumed may be below the
+/// bounds. Such sensors are those whose rounding is treated as noise, and a compass without steel nearby.
 fn consistent_innovations(all: &[Dives]) {
     for (name, sources, both_sides) in [
         ("head", 0..1, true),
@@ -205,8 +207,8 @@ fn add_to_bins(bins: &mut [(f64, u64)], track: &Track, source: usize) {
     }
 }
 
-/// Checks that D is within two standard deviations of the true value in `least` to 99 % of the sections. For the true
-/// value, the same returns are at their true places.
+/// Checks that D is within two standard deviations of its true value in a share of `least` to 0.99 of the sections. The
+/// true value is D with the same returns at their true places.
 fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
     let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
@@ -217,10 +219,11 @@ fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     assert!((least..=0.99).contains(&within), "{within}");
 }
 
-/// Simulates a dive with a silent sensor.
+/// Simulates a dive with silent sensors.
 ///
-/// Returns whether each error of each epoch is within three standard deviations, the largest ratio of an error to its
-/// standard deviation, and the fraction of pings without a fix.
+/// Returns three results. The first one tells for each error of each epoch whether it is within three standard
+/// deviations. The others are the largest ratio of an error to its standard deviation, and the fraction of pings
+/// without a fix.
 fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     let scene = field(seed, 40.0);
     let track = dive(&scene, filter(&scene), silence);
@@ -231,8 +234,8 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
 }
 
-/// Each sensor is lost temporarily in one dive and permanently in another. The error must stay within its reported
-/// bounds.
+/// Each sensor is silent for a while in some dives, and until the end in another. The errors must stay within their
+/// reported bounds.
 #[test]
 fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
     for (name, sources) in [

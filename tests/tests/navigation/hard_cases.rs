@@ -35,12 +35,12 @@ fn way() -> String {
     text
 }
 
-/// Largest errors of fixes, and numbers of fixes in unusual attitudes.
+/// Largest errors of the fixes, and numbers of fixes in unusual attitudes.
 #[derive(Debug, Default)]
 struct Errors {
     turn_rad: f64,
-    /// Largest error while the hull is within 30 degrees of the tunnel's axis, in either direction, m. `anywhere_m`
-    /// is the largest error at any angle.
+    /// Largest position error while the hull is within 30 degrees of the tunnel's axis, in either direction, m.
+    /// `anywhere_m` is the largest position error at any angle of the hull.
     along_axis_m: f64,
     anywhere_m: f64,
     upside_down: u32,
@@ -71,10 +71,10 @@ fn errors(track: &Track) -> Errors {
     found
 }
 
-/// Beams that look along the tunnel graze the wall, so that few of them measure the position. In such attitudes the
-/// error exceeds the filter's standard deviation.
+/// In some attitudes, the beams look along the tunnel and only graze the wall. Few of them then measure the position,
+/// and its error exceeds the filter's standard deviation.
 #[test]
-fn fix_stays_right_over_the_top_and_at_180_degrees() {
+fn fix_is_accurate_beyond_90_degrees_of_pitch_and_at_180_degrees_of_yaw() {
     let way = way();
     let scene = scenes::scene_from(SCENE, &|name| {
         if name == "way.csv" { Ok(way.clone().into_bytes()) } else { scenes::vehicle_file(name) }

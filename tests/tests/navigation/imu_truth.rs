@@ -23,14 +23,14 @@ use headrace_tests::recordings;
 use nalgebra_of_peers as peers;
 
 const NAME: &str = "imu_broad/derived_12_undisturbed_slow_translation_C_95Hz.csv.gz";
-/// Names of the columns that the test reads; the full-length recording has more.
+/// Names of the columns that the test reads. The full-length recording has further columns.
 const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy", "qz", "movement"];
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const GRAVITY_MPS2: f64 = 9.81;
 const SAMPLE_S: f64 = 0.0105;
 /// Number of samples between updates of the error state. As in the filter, the time between them is about 0.1 s.
 const EPOCH: usize = 10;
-/// Number of samples per second.
+/// Number of inertial samples per second in the recording.
 const SECOND: usize = 95;
 /// Usual speed of a hand, m/s. It is the prior for the velocity, which nothing measures.
 const HAND_MPS: f64 = 0.5;
@@ -40,7 +40,7 @@ const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;
 
-/// A sample in the axes of the body. The axes of the tunnel are east, north and up.
+/// An inertial sample in the axes of the body. The tunnel's axes stand for east, north and up.
 #[derive(Clone, Copy)]
 struct Sample {
     rate_radps: Vec3<Body>,
@@ -75,14 +75,14 @@ fn mean(vectors: impl Iterator<Item = Vec3<Body>>) -> Vec3<Body> {
     sum.scaled(1.0 / count)
 }
 
-/// Size of the bounding box around vectors.
+/// Diagonal of the smallest axis-parallel box around these vectors.
 fn spread(vectors: impl Iterator<Item = Vec3<Body>> + Clone) -> f64 {
     let first = vectors.clone().next().unwrap().0;
     let (low, high) = vectors.fold((first, first), |(low, high), v| (low.inf(&v.0), high.sup(&v.0)));
     (high - low).norm()
 }
 
-/// Initial attitude of every filter, levelled by the mean force of the first second.
+/// Initial attitude of every filter. Roll and pitch come from the mean force of the first second.
 fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
     let force = mean(samples.iter().take(SECOND).map(|sample| sample.force_mps2));
     let roll = math::atan2(force.y(), force.z());
@@ -90,7 +90,7 @@ fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
     Rot::from_roll_pitch_yaw(roll, pitch, 0.0)
 }
 
-/// Errors of a filter, degrees.
+/// Attitude errors of a filter, degrees.
 #[derive(Debug, Clone, Copy)]
 struct Off {
     inclination_rms: f64,
@@ -99,7 +99,7 @@ struct Off {
     drift: f64,
 }
 
-/// Runs a filter over all samples.
+/// Runs an attitude filter over all samples; returns its errors.
 fn judge(samples: &[Sample], mut filter: impl FnMut(&Sample) -> Rot<Tunnel, Body>) -> Off {
     let (mut squares, mut count, mut most) = (0.0, 0.0, 0.0_f64);
     let (mut first, mut drift) = (None, 0.0);
@@ -122,7 +122,7 @@ fn judge(samples: &[Sample], mut filter: impl FnMut(&Sample) -> Rot<Tunnel, Body
     }
 }
 
-/// Navigation of an inertial unit without other sensors, made of the filter's own components.
+/// Navigation by an inertial unit alone, built from headrace's filter components.
 struct Alone {
     settings: Settings,
     state: State,
@@ -215,7 +215,7 @@ fn ours(samples: &[Sample]) -> Off {
 type PeerVector = peers::Vector3<f64>;
 type PeerRotation = peers::UnitQuaternion<f64>;
 
-/// Judges a filter of the `ahrs` crate, whose vector types are converted.
+/// Computes the errors of a filter from the `ahrs` crate. Converts its vector types.
 fn judge_peer(samples: &[Sample], mut step: impl FnMut(PeerVector, PeerVector) -> PeerRotation) -> Off {
     let vector = |v: Vec3<Body>| PeerVector::new(v.x(), v.y(), v.z());
     judge(samples, |sample| {
@@ -239,10 +239,10 @@ fn mahony(samples: &[Sample], kp: f64, ki: f64) -> Off {
     judge_peer(samples, |rate, force| *filter.update_imu(&rate, &force).unwrap())
 }
 
-/// A filter's name and its errors.
+/// Name of an attitude filter, and its errors.
 type Judged = (String, Off);
 
-/// The filter with the smallest inclination error.
+/// The attitude filter with the smallest inclination error.
 fn best(many: impl Iterator<Item = Judged>) -> Judged {
     many.min_by(|(_, a), (_, b)| a.inclination_rms.total_cmp(&b.inclination_rms)).unwrap()
 }
@@ -271,7 +271,7 @@ fn say(name: &str, off: &Off) {
     println!("{name:<60} {:>6.3} {:>7.3} {:>8.2}", off.inclination_rms, off.inclination_max, off.drift);
 }
 
-/// The same samples with the gyro bias removed, which is the mean rate during the rest before the motion.
+/// The same samples without the gyro bias. The bias is the mean rate during the rest before the motion.
 fn unbiased(samples: &[Sample]) -> Vec<Sample> {
     let rest = samples.iter().take_while(|sample| !sample.moving);
     let bias = mean(rest.map(|sample| sample.rate_radps));

@@ -27,7 +27,7 @@ fn autopilot_sensors_and_a_velocity_log_are_fused() {
     folder.simulate("scene.toml", "dive.mcap");
     let (code, report) = folder.replay("dive.mcap", &[]);
     assert_eq!(code, Some(0), "{}", report["log"]["losses"]);
-    // Numbers of readings in 40 s at the rates in the sensors' tables.
+    // Expected numbers of readings in 40 s, from the rates in the sensors' tables.
     for (id, readings) in [
         ("imu", 12_000),
         ("depth", 400),

@@ -12,8 +12,7 @@ const LEG: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[traj
 /// Replays a four-head dive of 12 m without the data of `source` between two times, seconds on the source's clock.
 fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
-    // The simulation omits the bodies of the heads. So nothing is hidden, and the speed of the paper meets the
-    // target.
+    // The simulated heads have no bodies that could hide the wall. So the paper's speed meets the target.
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197")
         .replace("[navigation]", &format!("[navigation]\nway = \"{way}\""));
@@ -41,7 +40,7 @@ fn failed(report: &Value) -> Vec<&Value> {
 }
 
 #[test]
-fn tether_loss_without_a_filter_is_a_lost_position_and_raises_no_false_flag() {
+fn tether_loss_without_a_filter_fails_sections_with_position_lost() {
     let report = without("direct", "tether", 25.0, 31.0);
     assert!(report["dive"]["samples_rejected"]["no_fix"].as_u64().unwrap() > 500);
     let failed = failed(&report);

@@ -9,8 +9,8 @@ use headrace_simulator::START;
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence};
 
-/// Root mean square of the ratio of yaw errors to their standard deviations, and the largest standard deviation,
-/// radians.
+/// Returns the root mean square of the yaw error divided by its standard deviation, and the largest standard deviation
+/// of yaw, radians.
 ///
 /// The figures cover all seeds, and the time from 15 to 30 s after the launch.
 fn yaw(rough: &str) -> (f64, f64) {
@@ -52,8 +52,8 @@ fn stationary_vehicle_at_a_rough_wall_keeps_a_consistent_heading_sd() {
     assert!(ratio < 1.0 && largest_sd_rad.to_degrees() < 0.8, "{ratio}, {largest_sd_rad}");
 }
 
-/// The fallen vault begins with slopes of some centimetres, which look like a change of height. With these seeds, an
-/// earlier filter followed the slopes.
+/// The edge of the fallen vault is a slope of some centimetres, which looks like a change of height. With these seeds,
+/// an earlier filter followed the slope.
 #[test]
 fn fallen_vault_does_not_bias_the_estimate() {
     let text = include_str!("../../../deploy/scenes/collapse.toml").replace("../vehicles/", "");

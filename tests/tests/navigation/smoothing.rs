@@ -17,11 +17,11 @@ use headrace_tests::tracking::{self, Epoch, Silence, Track, dive, filter};
 use headrace_vehicle::NavigationConfig;
 
 const SEEDS: u64 = 3;
-/// Capacity for the filter's steps in a dive of ten minutes.
+/// Capacity of the journal of filter steps, enough for a dive of ten minutes.
 const STEPS: usize = 1 << 13;
 
 struct Smoothed {
-    /// Track from the filter.
+    /// Track of a dive with the filter's positions.
     filter: Track,
     /// Track of a dive with the smoothed positions.
     dive: Track,
@@ -55,23 +55,25 @@ fn smoothed(scene: &Scene, silence: &Silence) -> Smoothed {
 
 type Pick = fn(&Figures) -> f64;
 
-/// Allowed ratio of the smoothed error along the tunnel to the filter's. The error is due to cable slack, which no
-/// other sensor observes.
+/// Allowed ratio of the smoothed error along the tunnel to the error of the filter. The error is due to cable slack,
+/// which no other sensor observes.
 ///
-/// The scene's slack is a spline without components faster than its period, and differs from the model of slack. So
-/// smoothing need not reduce this error.
+/// In the scene, slack follows a spline without components faster than its period. This differs from the filter's model
+/// of slack, so smoothing need not reduce the error.
 const SLACK: f64 = 1.25;
 
 struct Dives {
     smoothed: Smoothed,
-    /// Error of each section's hole with its reported standard deviation, m: filtered, and smoothed.
+    /// For each section, the error of its hole and the reported standard deviation, m. The first list is for filtered
+    /// positions, the second one for smoothed positions.
     holes: [Vec<(f64, f64)>; 2],
 }
 
-/// Dives with a configured slack time of 8 s, with which a quarter of the slack remains after a turn.
+/// Dives with a configured slack time of 8 s. The model then assumes that a quarter of the slack remains after a turn.
 ///
-/// A smoother depends more on its model than a filter does. The filter tolerates a slack time of 15 s, with which
-/// more than half remains. But with the smoother, D is then within two sigma in only 88.9 % of the sections.
+/// A smoother depends more on its model than a filter does. The filter also works with a slack time of 15 s, so that
+/// more than half of the slack remains. But with the smoother, D is then within two standard deviations in only 88.9 %
+/// of the sections.
 fn dives(seed: u64) -> Dives {
     let scene = field_with(seed, 65.0, &SETTINGS.replace("slack_time_s = 15", "slack_time_s = 8"), "");
     let smoothed = smoothed(&scene, &Silence::default());
@@ -102,7 +104,7 @@ fn smoothing_reduces_errors_and_stays_consistent() {
     let by_filter: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.filter)).collect();
     let smoothed: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.dive)).collect();
     println!("| rms over {SEEDS} dives | filter | smoothed |\n|---|---|---|");
-    // The last number of a row is the allowed ratio of the smoothed error to the filter's.
+    // The last number of a row is the largest allowed ratio of the smoother's error to the filter's error.
     let rows: [(&str, Pick, f64); 8] = [
         ("across, m", |f| f.across_m, 0.5),
         ("up, m", |f| f.up_m, 0.5),
@@ -143,8 +145,8 @@ fn smoothing_reduces_errors_and_stays_consistent() {
     }
 }
 
-/// The shipped vehicle has wide settings. With them, smoothing drops no fix that the filter had, and increases no
-/// error.
+/// The shipped vehicle file assumes large errors. With these settings, smoothing loses no fix of the filter, and
+/// increases no error.
 #[test]
 fn smoothing_increases_no_error_of_the_shipped_vehicle() {
     for seed in 1..=2 {
@@ -170,11 +172,11 @@ fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64)
 }
 
 #[test]
-fn smoothing_bridges_a_silence_from_both_sides() {
+fn smoothing_bridges_a_silence_with_readings_from_before_and_after() {
     let scene = field(3, 33.0);
     let from_s = 80.0;
-    // The silence of all sonars is short: without walls the estimate is dropped after half a minute, and then nothing
-    // after the silence could help.
+    // The silence of all sonars is short. Without walls, the filter drops its estimate after half a minute, and then
+    // the readings after the silence couldn't help.
     for (name, sources, errors, to_s) in [
         ("the tether", vec![7], vec![0], from_s + 60.0),
         ("all sonars", vec![0, 1, 2, 3, 4], vec![1, 2], from_s + 10.0),
@@ -226,7 +228,8 @@ fn smoothed_track_is_split_at_a_lost_estimate() {
     assert!(track.epochs.iter().all(|epoch| epoch.factors.is_sound()));
 }
 
-/// The short dive at three times its length, with noise, steel, and far more slack than the filter assumes.
+/// Effects for a dive three times as long as the usual short dive: sensor noise, steel that disturbs the compass, a
+/// drifting pilot, and far more cable slack than the filter assumes.
 const NOISE: &str = "
 [effects]
 imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.002, attitude_deg = 0.5 }

@@ -1,4 +1,4 @@
-//! Data sent to viewers. These are the loop's own results, either all of them or the changes since a lost connection.
+//! Data sent to viewers. A new viewer gets all results of the loop, and a viewer that reconnects gets the changes.
 
 use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer};
@@ -21,7 +21,7 @@ fn replayed_with(folder: &Folder, further: &[&str]) -> (Serving, Viewer) {
     (serving, viewer)
 }
 
-/// First and last time of the log.
+/// First and last time of the log that the viewer can play back, s.
 fn span_s(viewer: &Viewer) -> [f64; 2] {
     ["from_s", "to_s"].map(|key| viewer.state["playback"][key].as_f64().unwrap())
 }
@@ -110,7 +110,7 @@ fn dive_is_compared_with_a_second_target() {
         assert!((shown_m - summed_m).abs() < 1e-6, "{key}: {shown_m}, {summed_m}");
         apart_m += (shown_m - reported_m).abs() / 2.0;
     }
-    // The page judges the holes of this dive by the second target, but the report replays the dive for it. The two
+    // For the second target, the page judges the holes of this dive again, but the report replays the dive. The results
     // differ at the ends of the covered stretch.
     let way_m = report["coverage_extent"]["length_m"].as_f64().unwrap();
     assert!(
@@ -126,10 +126,9 @@ fn dive_is_compared_with_a_second_target() {
 fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
     let folder = Folder::with_dive();
     let (serving, mut lost) = replayed(&folder);
-    // A seek back starts another instance with fewer sections. The connection is lost afterwards, while the dive goes
-    // on.
+    // A seek back restarts the dive with fewer sections. Afterwards the connection is lost, while the dive goes on.
     let [from_s, to_s] = span_s(&lost);
-    // The time is late in the dive, so that a part of the tunnel has final verdicts.
+    // The seek leads to a time late in the dive, when a part of the tunnel has final verdicts.
     let middle_s = to_s - 0.1 * (to_s - from_s);
     lost.send(&json!({"do": "play", "command": "pause"}));
     lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
@@ -166,7 +165,7 @@ fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
 }
 
 #[test]
-fn samples_arrive_by_chainage_and_survive_seeks() {
+fn samples_are_sent_for_a_range_of_chainages_and_follow_seeks() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let count = || {
@@ -180,7 +179,7 @@ fn samples_arrive_by_chainage_and_survive_seeks() {
     assert!(whole > 1000, "{whole}");
     let [from_s, to_s] = span_s(&viewer);
     let middle_s = f64::midpoint(from_s, to_s);
-    // Without the pause, playback would go on from there faster than states are sent.
+    // Without the pause, playback would go on after the seek, and faster than states are sent.
     viewer.send(&json!({"do": "play", "command": "pause"}));
     viewer.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
     viewer.until("the jump back", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
@@ -245,7 +244,8 @@ fn other_programs_can_read_widgets_state_schema_and_metrics() {
     let icon = extras["widgets"][0]["iconUrl"].as_str().unwrap();
     let (status, picture) = serving.ask("GET", &icon[icon.find("/assets").unwrap()..], &[], "");
     assert!(status == 200 && picture.contains("<svg"), "{icon}: {status}");
-    // The dive goes on to the end of the log meanwhile, and then both sides have its last state.
+    // While the test asks, the dive goes on to the end of the log. Then both the page's server and the viewer have the
+    // last state.
     loop {
         let (status, answer) = serving.ask("GET", "/state.json", &[], "");
         let body = answer.split("\r\n\r\n").nth(1).unwrap();

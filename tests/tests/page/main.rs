@@ -1,5 +1,4 @@
-//! The operator's page over real sockets. Checks its data, its access rights, and that the page doesn't influence the
-//! dive.
+//! Tests the operator's page over real sockets: its data and access rights, and that it doesn't influence the dive.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]

@@ -24,7 +24,7 @@ use crate::address::ANY;
 
 const TOKENS: &str = "operator = operator-0123456789abcdef\nviewer = viewer-0123456789abcdef\n";
 const TOKEN: &str = "Authorization: Bearer viewer-0123456789abcdef";
-/// Longest wait for an answer.
+/// Longest time to wait for the server's answer.
 const WITHIN: Duration = Duration::from_mins(2);
 
 type Secured = StreamOwned<ClientConnection, TcpStream>;
@@ -45,7 +45,7 @@ fn serving(folder: &Folder) -> Serving {
     Serving::start(folder, &[&["replay", "dive.mcap", ANY], files.as_slice()].concat())
 }
 
-/// A connection of a client. The client trusts either the test's certificate or no certificate.
+/// Opens the connection of a TLS client. The client trusts either the test's certificate or no certificate.
 fn secured(address: &str, trusts: bool) -> Secured {
     let mut roots = RootCertStore::empty();
     if trusts {
@@ -99,7 +99,7 @@ fn tls_page_requires_a_token() {
 }
 
 #[test]
-fn feed_works_over_tls() {
+fn viewer_feed_works_over_tls() {
     let folder = Folder::with_dive();
     let serving = serving(&folder);
     let address = &serving.address;

@@ -43,8 +43,8 @@ fn stalled_viewer_is_dropped_and_counted_and_others_are_served() {
         let line = figures.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.unwrap().parse::<u64>().unwrap()
     };
-    // Each seek sends the whole dive again, which fills the socket buffer of the stalled viewer. Ten seconds later,
-    // the viewer is dropped.
+    // After each seek, the server sends the whole dive again. This fills the socket buffer of the stalled viewer. Ten
+    // seconds later, the viewer is dropped.
     let to_s = viewer.state["playback"]["to_s"].as_f64().unwrap();
     for jump in 0..600 {
         let to_s = to_s - f64::from(jump % 2) * 2.0;

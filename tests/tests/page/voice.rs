@@ -1,4 +1,4 @@
-//! Voice notes. The loop keeps the note and the log keeps the recording, and each works without the other.
+//! Voice notes. The loop keeps the note, and the log keeps its sound recording. Each works without the other.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -16,8 +16,8 @@ const OPERATOR: &str = "Authorization: Bearer operator-0123456789abcdef";
 const WEBM: &str = "Content-Type: audio/webm;codecs=opus";
 const LOG: &str = "headrace-demo/dive.mcap";
 
-/// A recording that has all checked properties of a browser's recording. Its content is random, so it can't be
-/// compressed.
+/// Returns a sound recording with all properties of a browser's recording that are checked. Its content is random, so
+/// it can't be compressed.
 fn webm(seed: u64, bytes: usize) -> Vec<u8> {
     let mut random = Random(seed);
     let noise = (4..bytes).map(|_| random.byte());
@@ -159,7 +159,8 @@ fn voice_note_has_its_start_time_and_its_bytes_in_the_log() {
         folder.headrace(&["export", "silent.mcap", "--html", "silent.html"]);
         folder.read("silent.html").len()
     });
-    // In the page, the recording is base64, then compressed, and then base64 again.
+    // In the exported page, the voice recording is encoded as base64, then compressed, and then encoded as base64
+    // again.
     assert!(spoken > silent + audio.len(), "{spoken} and {silent} bytes: the page doesn't contain the voice");
 }
 
@@ -321,7 +322,7 @@ fn voice_note_is_in_the_log_part_of_its_time() {
     speak(7, &audio[0]);
     // No device is connected, so the dive records nothing but operator commands.
     while !folder.path("parts/dive.part002.mcap").exists() {
-        // This is the largest rate that an operator is allowed.
+        // The test sends commands as fast as the page allows an operator to send them.
         let (status, answer) = serving.ask("POST", "/actions/silence", &[], "{}");
         assert!([200, 429].contains(&status), "{answer}");
     }

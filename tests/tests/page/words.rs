@@ -1,4 +1,4 @@
-//! The page's table of words is the program's, and has every code of the live state.
+//! The page's table of words equals the program's table, and has every code of the live state.
 
 use headrace_monitor::page_words::table;
 use headrace_tests::root;
@@ -11,7 +11,7 @@ const RENEW: &str = "HEADRACE_RENEW_WORDS";
 
 /// Rewrite the table with `HEADRACE_RENEW_WORDS=1 cargo test -p headrace_tests --test page words`.
 #[test]
-fn page_has_the_words_of_the_program() {
+fn displayed_words_of_the_page_equal_those_of_the_program() {
     let path = root().join(TABLE);
     if std::env::var_os(RENEW).is_some() {
         std::fs::write(&path, table()).unwrap();
@@ -22,7 +22,7 @@ fn page_has_the_words_of_the_program() {
 }
 
 #[test]
-fn table_of_words_has_every_code_of_the_schema() {
+fn displayed_words_of_the_page_cover_every_code_of_the_schema() {
     let schema: Value =
         serde_json::from_str(include_str!("../../../docs/reference/live-state.schema.json")).unwrap();
     let table = table();

@@ -17,12 +17,12 @@ use headrace_vehicle::VehicleConfig;
 use serde_json::Value;
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
-/// Number of requests without an answer after which a device counts as silent.
+/// Number of probe requests without an answer after which the test treats a device as silent.
 const TRIES: u32 = 30;
 const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"slow\"\nrange_m = 10\nhead_id = 0x12";
 const PING: &str = "plugin = \"ping1d\"\ndevice_id = 7";
 
-/// A vehicle file with these sensors, each given as an address and the keys of its table.
+/// Returns a vehicle file with these sensors. Each sensor is given by the keys of its table and its address.
 fn vehicle_text(sensors: &[(&str, String)]) -> String {
     let mut text =
         include_str!("../../../deploy/vehicles/pipe.toml").split("[[sensors]]").next().unwrap().to_owned();
@@ -42,7 +42,7 @@ fn emulator(keys: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head: None, site: Site::default(), polled: false })
 }
 
-/// A device on a line. It runs until this value is dropped.
+/// An emulated device on a port. It runs until this value is dropped.
 struct Device {
     connect: Connect,
     stopping: Arc<AtomicBool>,
@@ -50,7 +50,7 @@ struct Device {
 }
 
 impl Device {
-    /// Starts a device. `answer` gets the bytes of the host and returns the reply.
+    /// Starts an emulated device. `answer` gets the bytes that the host sent, and returns the device's reply.
     fn new(carrier: Carrier, mut answer: impl FnMut(&[u8]) -> Vec<Vec<u8>> + Send + 'static) -> Self {
         let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let (connect, stopping) = (stand.connect().clone(), Arc::new(AtomicBool::new(false)));
@@ -105,7 +105,7 @@ fn asked(device: &Device) -> Answer {
     probe(&device.connect, &mut probes()).unwrap()
 }
 
-/// Identity of a device. The request is repeated if the machine is too busy for an answer in time.
+/// Identity that a device states when probed. The probe is repeated if the machine is too busy for an answer in time.
 fn identity(device: &Device) -> Option<String> {
     (0..TRIES).find_map(|_| match asked(device) {
         Answer::Is(identity) => Some(identity),
@@ -131,7 +131,8 @@ fn devices_on_real_ports_are_identified() {
             ),
         ] {
             let device = Device::emulated(carrier, keys);
-            // The device is probed twice, because a probe must leave the line unchanged.
+            // The device is probed twice, because a probe must leave the line in a state in which another probe
+            // succeeds.
             for _ in 0..2 {
                 let identity = identity(&device).unwrap_or_else(|| panic!("{carrier:?}: {words}: no answer"));
                 assert!(identity.starts_with(words), "{carrier:?}: {identity}");

@@ -1,6 +1,6 @@
 //! Devices on real ports with faulty lines: unplugged, garbled, stalled, or connected to the wrong device.
 //!
-//! Every frame that a device sent whole is used. After the fault the device is used again without help. The fault is
+//! Every frame that arrives complete is used. After the fault, the device is used again without help. The fault is
 //! reported in words, and no other sensor is disturbed.
 
 use std::os::unix::fs::PermissionsExt as _;
@@ -12,7 +12,7 @@ use headrace_tests::garbling::{EachFrame, Garbled, flipped, of_head, of_ping, th
 use headrace_tests::random::Random;
 use headrace_tests::rig::{COUNTER, DEPTH, HEAD, PING, Rig, Sensor};
 
-/// A sensor whose line is sound.
+/// A sensor on a line without faults, which other sensors' faults must not disturb.
 fn healthy() -> Sensor {
     Sensor { text: COUNTER, end: End::udp(), fault: Box::new(Healthy) }
 }
@@ -21,14 +21,15 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// Statuses of a sound sensor that appear only because the machine is busy. The tests ignore them.
+/// Beginnings of statuses that a sensor without faults has only because the machine is busy. The tests ignore these
+/// statuses.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
     "wrong: falls behind because replies are lost",
     "silent: the line is open, but no frame has arrived yet",
 ];
 
-/// Statuses of a sensor without repetitions. They are the same on a busy machine and on an idle one.
+/// Distinct statuses of a sensor as text, except "running" and those due to a busy machine.
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {
@@ -42,7 +43,7 @@ fn words(said: &[String]) -> String {
     all.join("\n")
 }
 
-/// Unplugs a device in the middle of an answer, waits until it is reported missing, plugs it in, and waits until it
+/// Unplugs a device when the next request arrives, waits until it is reported missing, plugs it in, and waits until it
 /// is used again. Does this twice and returns the statuses.
 fn unplugged_and_plugged_in(text: &'static str, end: End, name: &str) -> String {
     let folder = Folder::new();
@@ -141,7 +142,7 @@ fn device_plugged_in_later_is_used() {
     "#);
 }
 
-/// An echosounder and a head on lines that are garbled at first and sound later, beside a sensor that must not be
+/// Runs an echosounder and a head on lines that are garbled at first and sound later. A third sensor must not be
 /// disturbed.
 fn garbled(change: fn(&mut Random, &[u8]) -> Vec<u8>) {
     let folder = Folder::new();
@@ -177,7 +178,8 @@ fn lost_bytes_lose_only_their_own_frames() {
     garbled(thinned);
 }
 
-/// Garbage between frames. It contains frame headers that promise more bytes.
+/// A line that inserts garbage between frames. The garbage ends with the header of a longer frame, whose bytes never
+/// come.
 fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     let mut random = Random(seed);
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
@@ -194,7 +196,8 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // The headers in the garbage promise a profile of 1200 strengths and a return of 500 points.
+    // The frame headers in the garbage announce an echosounder profile of 1200 strengths and a head's return of 500
+    // points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -213,8 +216,8 @@ fn bursts_of_garbage_lose_no_frame() {
     ended.untroubled(2);
 }
 
-/// Stalls in the middle of every third frame. The stall is shorter than the usual pause, longer than it, or lasts for
-/// ever.
+/// A device that stalls in the middle of every third frame. The stall is shorter than the usual pause between frames,
+/// is longer, or lasts for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -282,7 +285,7 @@ fn two_answers_to_one_request_are_two_readings() {
     assert_eq!(depth.withheld, 0, "the calibration is whole before the first measurement: {depth:?}");
 }
 
-/// A device that claims to be another one until its fault ends.
+/// A device that claims to be another device until its fault ends.
 struct Disguised(fn(&mut Vec<u8>));
 
 impl Fault for Disguised {
@@ -344,7 +347,7 @@ fn wrong_device_is_reported_and_the_right_one_used_later() {
     "#);
 }
 
-/// Sends garbage as fast as the line accepts it.
+/// A device that sends garbage as fast as the line accepts it.
 struct Babbling(Random);
 
 impl Fault for Babbling {
@@ -397,7 +400,7 @@ fn silent_device_is_reported_and_used_when_it_returns() {
     "#);
 }
 
-/// Loses the host's first requests.
+/// A line that loses the host's first requests.
 struct DeafAtFirst(usize);
 
 impl Fault for DeafAtFirst {
@@ -410,7 +413,8 @@ impl Fault for DeafAtFirst {
     }
 }
 
-/// Each device waits for an answer that doesn't arrive, and sends nothing while the other device waits.
+/// The drivers of both devices share the line. While one of them waits for an answer that never arrives, the other one
+/// sends nothing.
 #[test]
 fn two_devices_on_one_line_start_although_first_answers_are_lost() {
     let end = End::tcp();

@@ -41,7 +41,7 @@ fn report(folder: &Folder) -> Value {
     serde_json::from_slice(&folder.read("report.json")).unwrap()
 }
 
-/// A dive on a local port with a device and a foreign sender.
+/// Runs a dive on a local port with a device and a foreign sender.
 ///
 /// The first frames come from another system. The device sends after the host has sent to it. Returns the report and
 /// the number of recorded pressures.
@@ -66,7 +66,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     let (answer, report) = thread::scope(|scope| {
         scope.spawn(|| {
             until_end(&|| {
-                // Sending fails until the port is open.
+                // The device's datagrams fail until `headrace run` has opened the port.
                 device.send_to(&[heartbeat(1), pressure(1, TRUE_HPA)].concat(), place).unwrap_or_default();
                 let heard = device.recv(&mut [0; 300]).is_ok_and(|count| count > 0);
                 known.fetch_or(heard, Ordering::Relaxed);
@@ -92,7 +92,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
         ended.store(true, Ordering::Relaxed);
         dived
     });
-    // A depth sensor alone can't give a position.
+    // A dive with only a depth sensor has no position, so it exits with 1.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     assert!(answer.stdout.contains("on the line of depth came from other devices"), "{}", answer.stdout);
     let log = folder.read("dive.mcap");
@@ -119,7 +119,7 @@ fn open_port_accepts_only_the_first_autopilot() {
     }
 }
 
-/// Statuses of two sensors with these values of `connect`.
+/// Last statuses of two heads with these addresses (values of `connect`).
 fn two(folder: &Folder, connects: [&str; 2]) -> Vec<Value> {
     let sensor = |(id, connect): (&str, &str)| {
         format!("\n[[sensors]]\nid = \"{id}\"\nconnect = \"{connect}\"\n{HEAD}")

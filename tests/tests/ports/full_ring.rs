@@ -1,4 +1,4 @@
-//! A full ring loses packets, and the number of lost packets is exact.
+//! A full ring drops packets, and the reported number of dropped packets is exact.
 
 use std::net::UdpSocket;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ impl Decoder for Nothing {
     }
 }
 
-/// Delivers received packets and counts them.
+/// A driver that passes on received packets and counts them.
 struct Counting(Arc<AtomicU64>);
 
 impl Driver for Counting {
@@ -65,7 +65,7 @@ impl Driver for Counting {
 }
 
 #[test]
-fn exactly_the_packets_without_room_are_counted() {
+fn every_packet_dropped_by_a_full_ring_is_counted() {
     let profile = shapes::circle(3.0).unwrap();
     let navigation = DirectNavigation::new(profile.clone(), Site::default());
     let mut app = App::new(Mission::new(profile, 1.0));
@@ -84,8 +84,8 @@ fn exactly_the_packets_without_room_are_counted() {
         driver: Box::new(Counting(count.clone())),
     };
     let supervisor = Supervisor::start(vec![connection], None).unwrap();
-    // No tick empties the ring in this time. Datagrams aren't received if the port isn't open yet or the kernel drops
-    // them.
+    // The loop doesn't tick here, so nothing empties the ring. The test sends until 20 datagrams have arrived, because
+    // some are lost before the port is open, or in the kernel.
     let device = UdpSocket::bind("127.0.0.1:0").unwrap();
     while count.load(Ordering::Acquire) < 20 {
         device.send_to(&[7; 1000], place).unwrap();

@@ -15,7 +15,7 @@ use headrace_tether_hid::report::REFERENCE_DESCRIPTOR;
 use hidapi::{DeviceInfo, HidApi, HidDevice};
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, StandardId};
 
-/// Longest wait for expected data.
+/// Longest time that a test waits for expected data.
 const LONG: Duration = Duration::from_secs(10);
 /// Time to wait for data that must not arrive.
 const SHORT: Duration = Duration::from_millis(100);
@@ -32,7 +32,7 @@ fn ip_link(words: &str) {
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface for this test. It is removed when it is dropped.
+/// A virtual CAN interface for this test. The interface is removed when this value is dropped.
 struct Interface(&'static str);
 
 impl Interface {
@@ -66,7 +66,7 @@ fn refused(read: std::io::Result<CanFrame>) -> (Option<i32>, ErrorKind) {
     (error.raw_os_error(), error.kind())
 }
 
-/// Result of reading from a socket without data.
+/// Kind of the error that a read returns because no frame arrives in `SHORT`.
 fn silence(socket: &CanSocket) -> ErrorKind {
     socket.set_read_timeout(SHORT).unwrap();
     let (_, kind) = refused(socket.read_frame());
@@ -82,12 +82,12 @@ fn frame_carries_the_kernel_receive_time() {
     let (sender, stamped, plain) = (vcan.socket(), vcan.socket(), vcan.socket());
     stamped.set_recv_timestamp(true).unwrap();
 
-    // Whether the timestamp of a frame precedes its reading. The kernel begins to stamp frames a moment after this is
-    // enabled, and earlier frames get the time of reading.
+    // Whether a frame's timestamp is earlier than the time of reading it. The kernel begins to stamp frames only a
+    // moment after stamping is enabled. Until then, frames get the time of reading.
     let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();
-        // If one socket has received the frame, the kernel has also received it for the other socket.
+        // Once one socket has received the frame, the kernel has also received it for the other socket.
         assert_eq!(plain.read_frame().unwrap().data(), [number, 2, 3]);
         let received_by = SystemTime::now();
         thread::sleep(Duration::from_millis(5));
@@ -105,7 +105,7 @@ fn frame_carries_the_kernel_receive_time() {
 
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
-fn can_reader_gets_one_error_at_down_and_frames_after_up() {
+fn can_reader_gets_one_error_on_interface_down_and_frames_after_up() {
     let vcan = Interface::up("vcan6");
     let (sender, reader) = (vcan.socket(), vcan.socket());
 
@@ -160,7 +160,7 @@ fn uhid() -> File {
     File::options().read(true).write(true).open(PATH).unwrap_or_else(|error| panic!("{PATH}: {error}"))
 }
 
-/// A report in the reference layout with this count.
+/// An HID report of a cable counter in the reference layout, with this count.
 fn report(count: i32) -> Vec<u8> {
     let mut report = vec![1, 42, 1];
     report.extend(count.to_le_bytes());
@@ -219,7 +219,7 @@ fn counter_is_found_by_its_serial_number_and_read() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn unread_reports_keep_the_first_63() {
+fn unread_hid_reports_keep_the_first_63() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0003");
     let (reader, _) = open(&mut api, "HR-0003");
@@ -237,7 +237,7 @@ fn unread_reports_keep_the_first_63() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn unplugged_counter_is_an_error_and_returns_under_another_number() {
+fn unplugged_counter_is_an_error_and_returns_under_another_device_number() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0004");
     let (reader, first_path) = open(&mut api, "HR-0004");
@@ -256,7 +256,7 @@ fn unplugged_counter_is_an_error_and_returns_under_another_number() {
     println!("HID: opening an absent device: {missing:?}");
     drop(reader);
 
-    // Before the counter returns, another counter is plugged in and takes its number.
+    // Before the counter is plugged in again, another counter takes its device number.
     let _other = plug(uhid(), "HR-0005");
     let (_other_reader, other_path) = open(&mut api, "HR-0005");
     assert_eq!(other_path, first_path);
@@ -274,7 +274,7 @@ fn last_report_of_an_unplugged_counter_is_lost() {
     let mut device = plug(uhid(), "HR-0006");
     let (reader, _) = open(&mut api, "HR-0006");
     device.report(&report(1)).unwrap();
-    // Closing the device counts as unplugging.
+    // Closing the emulated device counts as unplugging.
     drop(device);
     let error = read(&reader).unwrap_err();
     println!("HID: a report waited, the device went: {error:?}");

@@ -1,7 +1,7 @@
 //! The CAN and HID drivers on a real kernel, with emulated devices.
 //!
-//! All sent data is decoded. Interfaces and counters may disappear. They are used again when they return, while the
-//! other sensor goes on. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
+//! All sent data is decoded. If an interface or counter disappears, the other sensor goes on. A returning interface or
+//! counter is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
 //! --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
 
 use std::cell::{Cell, RefCell};
@@ -29,11 +29,11 @@ use serde_json::Value;
 const IMU: usize = 0;
 const TETHER: usize = 1;
 
-/// Longest wait for expected data.
+/// Longest time that a test waits for expected data.
 const LONG: DurNs = DurNs::from_millis(20_000);
 /// A line that is silent for this time has no more data.
 const SETTLED: DurNs = DurNs::from_millis(200);
-/// Number of messages sent at once, fewer than the kernel buffers for a counter.
+/// Number of messages sent at once. It is smaller than the number of reports that the kernel buffers for a counter.
 const BURST: usize = 20;
 
 const COUNTER: &str = "hid:1209:0001:HR-0001";
@@ -69,7 +69,7 @@ fn ip_link(words: &str) {
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface for this test. It is removed when it is dropped.
+/// A virtual CAN interface for this test. The interface is removed when this value is dropped.
 struct Interface(&'static str);
 
 impl Interface {
@@ -114,7 +114,7 @@ struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// Starts the rehearsal. `change` may wrap the driver of each sensor.
+    /// Starts supervisor and loop with these addresses of the sensors. `change` may wrap the driver of each sensor.
     fn new(connects: [&str; 2], change: &dyn Fn(usize, Box<dyn Driver>) -> Box<dyn Driver>) -> Self {
         let scene = scenes::scene_from(WAY, &|_| Ok(TWO_SENSORS.as_bytes().to_vec()));
         let vehicle = &scene.vehicle;
@@ -135,7 +135,7 @@ impl Rehearsal {
         Self { supervisor, dive, said: Vec::new(), simulation, messages: [VecDeque::new(), VecDeque::new()] }
     }
 
-    /// Next message of the sensor.
+    /// Next message that the simulated sensor sends.
     fn next_message(&mut self, source: usize) -> Vec<u8> {
         loop {
             if let Some(message) = self.messages[source].pop_front() {
@@ -148,7 +148,7 @@ impl Rehearsal {
         }
     }
 
-    /// Runs the loop until `ended` returns true or the time is over. Returns the last result of `ended`.
+    /// Runs the loop until `ended` returns true or the time limit is reached. Returns the last result of `ended`.
     fn run(&mut self, time: DurNs, ended: &dyn Fn(&Loop, &[Status]) -> bool) -> bool {
         let until = now() + time;
         let has_ended = Cell::new(false);
@@ -187,7 +187,7 @@ impl Rehearsal {
         self.dive.decoder_counts()[source].good_frames
     }
 
-    /// Runs until no more data of a sensor arrives; returns the number of frames.
+    /// Runs the loop until no more data of a sensor arrives; returns the number of decoded frames.
     fn settle(&mut self, source: usize) -> u64 {
         loop {
             let good = self.good(source);
@@ -258,7 +258,7 @@ fn unchanged(_: usize, driver: Box<dyn Driver>) -> Box<dyn Driver> {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn every_frame_and_every_report_is_decoded() {
+fn every_can_frame_and_every_hid_report_is_decoded() {
     let _vcan = Interface::up("vcan1");
     let (mut imu, mut tether) = (EmulatedPort::can("vcan1").unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan1", COUNTER], &unchanged);
@@ -333,7 +333,8 @@ fn late_read_does_not_change_a_frame_timestamp() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // The tolerance is needed because two clocks are compared, and are read at different moments.
+    // The tolerance is needed because the stamps come from another clock, and the two clocks can't be read at the same
+    // moment.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
         assert!(
@@ -364,7 +365,8 @@ fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
             Phase::Closed,
             "opening vcan3: the interface is down; sudo ip link set vcan3 up",
         );
-        // Meanwhile messages of the unit are lost. The second outage is longer than the silence timeout.
+        // During the outage, messages of the inertial unit are lost. The second outage is longer than the silence
+        // timeout.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
         if round == 1 {
@@ -385,7 +387,7 @@ fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn unit_on_a_down_interface_is_read_once_it_is_up() {
+fn inertial_unit_on_a_down_interface_is_read_once_the_interface_is_up() {
     let vcan = Interface::up("vcan4");
     ip_link("set vcan4 down");
     let mut rehearsal = Rehearsal::new(["can:vcan4", COUNTER], &unchanged);
@@ -415,7 +417,7 @@ fn replugged_can_adapter_is_used_again() {
     rehearsal.send(IMU, &mut imu, 3);
     rehearsal.exactly(TETHER, &mut tether, 60);
     let vcan = Interface::up("vcan6");
-    // The unit's end existed before the new interface, and continues to work.
+    // The inertial unit's end of the line existed before the new interface, and continues to work.
     rehearsal.call(IMU, &mut imu);
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");
@@ -428,7 +430,7 @@ fn replugged_can_adapter_is_used_again() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn replugged_counter_is_used_again_under_another_number() {
+fn replugged_counter_is_used_again_under_another_device_number() {
     let _vcan = Interface::up("vcan7");
     let (mut imu, mut tether) = (EmulatedPort::can("vcan7").unwrap(), counter("HR-0001"));
     let first = path("HR-0001");

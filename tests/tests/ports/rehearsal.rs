@@ -1,5 +1,5 @@
-//! A rehearsal: `emulate` and `run` in two processes, connected by pseudoterminals, TCP and UDP. The dive is compared
-//! with the replay of its scene.
+//! A rehearsal: `emulate` and `run` in two processes, connected by pseudoterminals, TCP and UDP. The live dive is
+//! compared with a simulation of the same scene.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
@@ -118,7 +118,7 @@ fn replay(folder: &Folder, log: &Path, name: &str) -> (Option<i32>, Value) {
     (done.unwrap().code(), report(&folder.path(name)))
 }
 
-/// Sections by the chainage of their start, as text in metres with three decimals.
+/// Sections of a report. The key is the chainage of the section's start, as text in metres with three decimals.
 fn sections(report: &Value) -> BTreeMap<String, &Value> {
     let sections = report["sections"].as_array().unwrap().iter();
     sections.map(|section| (format!("{:9.3}", section["start_m"].as_f64().unwrap()), section)).collect()
@@ -126,17 +126,18 @@ fn sections(report: &Value) -> BTreeMap<String, &Value> {
 
 /// Allowed difference between a hole in the live dive and in the replay of its scene, m.
 const APART_M: f64 = 0.12;
-/// Target of the scene, m. `CONFIDENCE_SD` is its confidence as a number of standard deviations.
+/// Target of the scene, m. `CONFIDENCE_SD` is the number of standard deviations by which a hole must be below the
+/// target to pass.
 const TARGET_M: f64 = 0.7;
 const CONFIDENCE_SD: f64 = 2.0;
 
-/// Whether the margin of a passed section is less than [`APART_M`].
+/// Whether a section passes with a margin below [`APART_M`].
 fn is_near(section: &Value) -> bool {
     let of = |key: &str| section[key].as_f64().unwrap_or(f64::NAN);
     section["verdict"] == "pass" && TARGET_M - of("hole_m") - CONFIDENCE_SD * of("hole_sd_m") < APART_M
 }
 
-/// Differences between sections of the live dive and of the replay, without the last 0.7 m.
+/// Differences between the sections of the live dive and those of the replay. The last 0.7 m of the dive are ignored.
 ///
 /// At the end, the last updates and turns decide how far the dive reaches and whether its last section is judged.
 fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value>) -> Vec<String> {
@@ -152,8 +153,8 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
             continue;
         };
         let hole_m = |section: &Value| section["hole_m"].as_f64().unwrap_or(f64::NAN);
-        // Different phases between the heads change a hole by some millimetres at most. But if the machine stalls for
-        // a quarter of a second, the hole truly becomes larger.
+        // In the two dives, the heads have slightly different phases, which changes a hole by some millimetres at most.
+        // But if the machine stalls for a quarter of a second, the hole truly becomes larger.
         let apart_m = (hole_m(ours) - hole_m(theirs)).abs();
         if apart_m > APART_M {
             different.push(format!("{start} m: holes are {apart_m:.3} m apart"));
@@ -201,13 +202,13 @@ fn rehearse(distance_m: f64, keeps_time: bool) {
     assert_eq!(again["sections"], live["sections"]);
 }
 
-/// The vehicle moves for forty seconds.
+/// In this rehearsal, the vehicle moves for forty seconds.
 #[test]
 fn recorded_rehearsal_replays_to_the_displayed_results() {
     rehearse(3.6, false);
 }
 
-/// The vehicle moves for three minutes.
+/// In this rehearsal, the vehicle moves for three minutes.
 #[test]
 #[ignore = "takes three minutes and more; .ci/run does it"]
 fn three_minute_rehearsal_gives_the_sections_of_the_scene_replay() {

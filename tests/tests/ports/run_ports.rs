@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use crate::rehearsal::Running;
 
-/// Sensors with invalid lines. Each line has a different fault.
+/// Sensors with invalid addresses. Each address has a different fault.
 const WRONG: [(&str, &str, &str); 7] = [
     ("no_colon", HEAD, "192.168.0.5"),
     ("no_port", HEAD, "tcp:192.168.0.5"),
@@ -26,7 +26,7 @@ const WRONG: [(&str, &str, &str); 7] = [
     ("empty", COUNTER, ""),
 ];
 
-/// Sensors whose lines don't exist.
+/// Sensors whose ports don't exist.
 const ABSENT: [(&str, &str, &str); 4] = [
     ("adapter", HEAD, "serial:/dev/serial/by-id/usb-headrace-none"),
     ("usb", HEAD, "serial:usb:1209:fffe:none"),
@@ -57,7 +57,7 @@ const RUN: [&str; 7] = ["run", "vehicle.toml", "--no-record", "--report", "repor
 /// Arguments of a run without a time limit.
 const RUN_UNTIL: [&str; 2] = ["vehicle.toml", "--no-record"];
 
-/// Whether the first sensor has given readings and was reported as running.
+/// Whether the report's first sensor has more than ten readings and the status "running".
 fn first_runs(report: &Value) -> bool {
     let first = &report["sources"][0];
     let status = first["line"]["status"].as_str().unwrap_or_default();
@@ -91,7 +91,7 @@ fn wrong_or_missing_ports_are_reported_while_the_dive_goes_on() {
     let sensors: Vec<_> = [("head", HEAD, place.as_str())].into_iter().chain(WRONG).chain(ABSENT).collect();
     folder.write("vehicle.toml", vehicle(&sensors[..=WRONG.len()]));
     let (answer, wrong) = folder.dive_until(&RUN_UNTIL, first_runs);
-    // A head alone can't give a position.
+    // A dive with only a head has no position, so it exits with 1.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     let few: Vec<_> = sensors[..1].iter().chain(&ABSENT).copied().collect();
     folder.write("vehicle.toml", vehicle(&few));
@@ -188,8 +188,8 @@ fn blocked_pipe_at_any_byte_does_not_keep_a_dive_from_ending() {
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let whole = folder.headrace(&RUN).stdout.len();
     assert!((200..PIPE).contains(&whole), "{whole} bytes");
-    // In the first case the pipe is full from the start. In the last case it becomes full in the middle of the
-    // summary.
+    // In the first case the pipe is full from the start. In the other cases it becomes full within the output, in the
+    // last case within the summary.
     let lines = [0, whole - 150, whole - 100, whole - 50, whole - 10].map(|room| ("", room));
     let json = ["--json", "--json-lines"].map(|how| (how, 0));
     let runs = lines.into_iter().chain(json).map(|(how, room)| {
@@ -230,7 +230,7 @@ fn unavailable_required_sensor_ends_the_dive() {
     "#);
 }
 
-/// Reports that are too short, as from a counter by another maker.
+/// A device whose HID reports are too short, like those of a counter by another maker.
 struct Short;
 
 impl Fault for Short {
@@ -268,7 +268,7 @@ fn live_log_has_sent_bytes_and_replays_to_the_same_digest() {
     let recorded = ["vehicle.toml", "--record", "dive.mcap", "--require", "all"];
     let (answer, live) = folder.dive_until(&recorded, first_runs);
     drop(devices);
-    // A dive without an inertial unit has no position.
+    // A dive without an inertial unit has no position, so it exits with 1.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     let (code, replayed) = folder.replay("dive.mcap", &[]);
     assert_eq!((code, &replayed["digest"]), (Some(1), &live["digest"]));

@@ -10,17 +10,17 @@ use headrace_tests::Folder;
 
 use super::rehearsal::{Running, headrace, interrupt, report, scene};
 
-/// Default length of a soak, minutes.
+/// Default duration of a soak test, minutes.
 const MINUTES: f64 = 10.0;
-/// Interval between two samples; faults have the same interval.
+/// Interval between two samples of the process's resources.
 const LOOK: Duration = Duration::from_secs(5);
 const LOOKS_A_FAULT: usize = 7;
-/// Duration of a freeze.
+/// Duration of each freeze of a device.
 const FREEZE: Duration = Duration::from_millis(1_500);
-/// Number of samples at the start that don't count for files and threads.
+/// Number of resource samples at the start that are left out of the checks of open files and threads.
 const WARM_UP: usize = 12;
 
-/// Resources of a process.
+/// Resources that a process uses at a moment.
 #[derive(Debug, Clone, Copy)]
 struct Look {
     resident_kib: f64,
@@ -38,7 +38,7 @@ fn look(pid: u32) -> Option<Look> {
     };
     let stat = std::fs::read_to_string(format!("{proc}/stat")).ok()?;
     let words: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    // User time and system time are the 12th and 13th word after the name.
+    // In `/proc/PID/stat`, user time and system time are the 12th and 13th word after the process name.
     let cpu_ticks = words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?;
     let files = std::fs::read_dir(format!("{proc}/fd")).ok()?.count();
     Some(Look { resident_kib: field("VmRSS:")?, files, threads: field("Threads:")?, cpu_ticks })
@@ -104,8 +104,8 @@ fn soak_neither_leaks_nor_drops() {
     let resident: Vec<f64> = warm.iter().map(|look| look.resident_kib / 1024.0).collect();
     let tenths: Vec<String> =
         (0..=10).map(|tenth| format!("{:.1}", resident[tenth * (resident.len() - 1) / 10])).collect();
-    // Only the second half counts. Rings, lists and sections are allocated at the start of the dive, but their memory
-    // becomes resident only when it is first used.
+    // Memory growth is checked only in the second half of the soak test. Rings, lists and sections are allocated at the
+    // start of the dive, but their memory becomes resident only when it is first used.
     let later = &resident[resident.len() / 2..];
     let (first, last) = (warm[0], warm[warm.len() - 1]);
     // Linux counts CPU time in ticks of 10 ms.

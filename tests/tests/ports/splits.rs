@@ -1,6 +1,7 @@
-//! From the device to readings without ports. Splits and delays of a lossless stream change no reading and no time.
+//! All steps from a device's bytes to readings, without ports. If no byte is lost, splits and delays change no reading
+//! and no time.
 //!
-//! The time of a reading is the time of the part that contains the first byte of its frame.
+//! A reading gets the time at which the first byte of its frame arrived.
 
 use headrace_config::Document;
 use headrace_devices::KINDS;
@@ -17,7 +18,7 @@ use headrace_vehicle::VehicleConfig;
 const START: MonoNs = MonoNs(1_000_000_000);
 const FRAMES: usize = 60;
 
-/// Devices with byte streams.
+/// Sensor tables of devices that send byte streams, which can be split anywhere.
 const STREAMS: [&str; 7] = [
     "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\n",
     "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\nreturns = \"imx\"\n",
@@ -27,14 +28,15 @@ const STREAMS: [&str; 7] = [
     "plugin = \"a50\"\n",
     "plugin = \"mavlink\"\npart = \"imu\"\nsystem_id = 1\n",
 ];
-/// Devices on carriers that keep messages whole. Their messages can only be late.
+/// Sensor tables of devices on carriers (such as CAN) that keep messages whole. Their messages can be late, but not
+/// split.
 const MESSAGES: [&str; 3] = [
     "plugin = \"imu_can\"\npreset = \"xsens_mti600\"\n",
     "plugin = \"bar100\"\n",
     "plugin = \"tether_hid\"\ncounts_per_metre = 2000\n",
 ];
 
-/// Collects the messages that a driver delivers.
+/// Collects the packets that a driver delivers to the loop.
 #[derive(Default)]
 struct Delivered(Vec<(MonoNs, Vec<u8>)>);
 
@@ -71,7 +73,7 @@ fn told<M: Measurement>(device: &mut dyn Emulator<M>, mut feel: impl FnMut(&mut 
     frames
 }
 
-/// Frames of the device.
+/// Frames that the emulated device sends.
 fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     let setup = EmulatorSetup {
         start: START,
@@ -101,7 +103,8 @@ fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     }
 }
 
-/// Readings from these parts of a stream through driver and decoder. The driver is woken at its deadlines.
+/// Passes these parts of a stream through driver and decoder; returns the readings. The driver is woken at its
+/// deadlines.
 fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let mut driver = device.driver(&DriverSetup { begun: START, head: None });
     let mut wire = Delivered::default();
@@ -120,7 +123,7 @@ fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     readings
 }
 
-/// Readings from these parts through the decoder alone, as in a foreign log.
+/// Passes these parts through the decoder alone, as for a foreign log; returns the readings.
 fn decoded(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let (mut decoder, mut readings) = (device.specification().decoder, Vec::new());
     for (received, bytes) in parts {
@@ -140,14 +143,14 @@ fn wake_until(driver: &mut dyn Driver, at: MonoNs, wire: &mut dyn Wire) {
     }
 }
 
-/// Delay of a part. It is usually that of a good line, but sometimes that of a bridge, a slow network, or a network
-/// that fails for seconds.
+/// Draws the delay of one part of a stream. It is usually that of a good line, and sometimes that of a serial bridge,
+/// of a slow network, or of a network that fails for seconds.
 fn delay(random: &mut Random) -> DurNs {
     let ms = [1, 1, 3, 20, 66, 66, 120, 250, 1500, 4000];
     DurNs::from_millis(ms[random.below(ms.len())])
 }
 
-/// Each whole frame at the time of the part that contains its first byte.
+/// Each complete frame, with the receive time of the part that contains the frame's first byte.
 fn whole<'a>(frames: &'a [Vec<u8>], parts: &[(MonoNs, &[u8])]) -> Vec<(MonoNs, &'a [u8])> {
     let mut ends = Vec::new();
     for (at, part) in parts {
@@ -182,7 +185,8 @@ fn splits_and_delays_of_a_stream_do_not_change_readings_or_times() {
             let (mut parts, mut rest, mut at) = (Vec::new(), stream.as_slice(), START);
             while !rest.is_empty() {
                 let (now, later) = rest.split_at((1 + random.below(longest)).min(rest.len()));
-                // Not every single byte is followed by a long pause, because that would take hours.
+                // If the parts are single bytes, only some of them get a long delay, because the data would otherwise
+                // last for hours.
                 at = at
                     + if longest > 2 || random.one_in(50) {
                         delay(&mut random)

@@ -25,7 +25,7 @@ fn marked<T>(work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// System calls between the marks, and the number of marked parts.
+/// System calls that occur between the marking calls in the trace, and the number of marked intervals.
 fn calls(trace: &str) -> (Vec<&str>, usize) {
     let (mut within, mut calls, mut parts) = (None, Vec::new(), 0);
     for line in trace.lines() {
@@ -39,8 +39,8 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
             within = None;
             parts += 1;
         } else if within == Some(thread)
-            // Lines with signals don't count, nor do the ends of interrupted calls. One of these may belong to a
-            // mark.
+            // Lines with signals don't count. The end of an interrupted call doesn't count either, because the call may
+            // be a mark.
             && !call.starts_with("---")
             && !call.starts_with("<... ")
         {
@@ -68,7 +68,7 @@ fn tick_of_a_running_loop_makes_no_system_call() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
     let trace = std::fs::read_to_string(&trace).unwrap();
     let (calls, ticks) = calls(&trace);
-    // The traced work makes this call on purpose, to prove that the trace shows calls.
+    // The traced work calls `getuid` on purpose, to prove that the trace shows system calls.
     assert!(calls.len() == 1 && calls[0].starts_with("getuid("), "in {ticks} ticks: {calls:#?}");
     assert!(ticks > 1000, "{ticks} ticks");
 }

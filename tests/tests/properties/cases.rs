@@ -5,14 +5,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use headrace_geometry::math;
 use headrace_tests::random::Random;
 
-/// Number of cases of a subject in ordinary tests, and seed of the first case.
+/// Number of random cases of each subject in ordinary tests; the second constant is the seed of the first case.
 const FEW: u64 = 3000;
 const SEED_OF_FEW: u64 = 20_260_901;
 /// Default number of cases in a long run, for all subjects together.
 const MANY: u64 = 10_000_000;
 const SUBJECTS: u64 = 5;
 
-/// Random values of a case.
+/// Source of a test case's random values.
 pub(crate) struct Case(Random);
 
 impl Case {
@@ -52,7 +52,7 @@ impl Case {
     }
 }
 
-/// Whether an error is a number within its bound.
+/// Whether an error is at most its bound; false if the error isn't a number.
 pub(crate) fn within(error: f64, bound: f64) -> bool {
     error <= bound
 }
@@ -80,14 +80,14 @@ fn failing(subject: &str, seed: u64, count: u64, property: Property<'_>) -> Vec<
     found
 }
 
-/// Checks a property with a few cases.
+/// Checks a property with a few thousand random cases.
 #[track_caller]
 pub(crate) fn few(subject: &str, property: Property<'_>) {
     let found = failing(subject, SEED_OF_FEW, FEW, property);
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Checks a property with the subject's share of the cases in a long run.
+/// Checks a property in a long run, with this subject's share of the cases.
 #[track_caller]
 pub(crate) fn many(subject: &str, property: Property<'_>) {
     let number = |name: &str| {
@@ -103,7 +103,7 @@ pub(crate) fn many(subject: &str, property: Property<'_>) {
     println!("{subject}: {count} cases hold");
 }
 
-/// The property contains a planted fault, which must be found and reported with its seed.
+/// The property has a planted fault. The run must find it and report its seed.
 #[test]
 fn failing_case_is_reported_and_repeatable() {
     let rare = |case: &mut Case| if case.below(500) == 7 { Err("seven".to_owned()) } else { Ok(()) };

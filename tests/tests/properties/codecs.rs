@@ -1,5 +1,5 @@
-//! Device bytes with changes, losses and insertions. All readings are finite and don't depend on splits, and the
-//! counts add up.
+//! Device bytes with changed, lost and inserted bytes. All readings are finite. They don't depend on the split of the
+//! bytes into packets, and the counts add up.
 
 use headrace_config::Document;
 use headrace_devices::KINDS;
@@ -35,7 +35,8 @@ fn lines() -> [Lines; 2] {
     })
 }
 
-/// All parts have the same time, so that readings can't depend on the times at which bytes arrive.
+/// All parts of the byte stream have the same receive time, so that readings can't depend on the times at which bytes
+/// arrive.
 const AT: MonoNs = MonoNs(1_000_000_000);
 
 fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
@@ -89,14 +90,14 @@ fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
 }
 
 #[test]
-fn byte_splits_do_not_change_finite_readings() {
+fn readings_are_finite_and_do_not_depend_on_byte_splits() {
     let lines = lines();
     few("codecs", &|case| decoding(case, &lines));
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn byte_splits_do_not_change_finite_readings_in_a_long_run() {
+fn readings_are_finite_and_do_not_depend_on_byte_splits_in_a_long_run() {
     let lines = lines();
     many("codecs", &|case| decoding(case, &lines));
 }

@@ -1,4 +1,4 @@
-//! A factored covariance after random steps. It stays a valid covariance, and each measurement follows the scalar
+//! Random steps on a factored covariance. It stays a valid covariance, and each measurement changes it by the scalar
 //! formula.
 
 use headrace_fusion::filter::factors::Factors;
@@ -7,8 +7,8 @@ use headrace_geometry::math;
 use crate::cases::{Case, few, many};
 
 const N: usize = 6;
-/// Relative tolerance. Dependent variances of 1e-10 and 1e+10 have factors with a ratio of 1e10. In two million
-/// cases, four errors were over 1e-9, and the largest was 3e-8.
+/// Relative tolerance of variances. Correlated errors with variances of 1e-10 and 1e+10 give factors with a ratio of
+/// 1e10. In two million cases, four errors were over 1e-9, and the largest was 3e-8.
 const SHARE: f64 = 1e-6;
 
 fn row(case: &mut Case) -> [f64; N] {
@@ -72,7 +72,8 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 }
             }
             3 => {
-                // Each error drives the error before it, as velocity drives position.
+                // Each state error grows by dt times the next state error, as a position error grows by dt times the
+                // velocity error.
                 let dt = case.of_any_size(-9, 2).abs();
                 p.shear(|column, len| {
                     for i in 0..len.saturating_sub(1) {

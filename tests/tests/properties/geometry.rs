@@ -1,12 +1,12 @@
-//! Rays in random cross-sections, compared with the plain formula for each edge.
+//! Hits of rays on the walls of random cross-sections, compared with the formula for each edge.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use crate::cases::{Case, few, many, within};
 
-/// Tolerance, m. On edges of a micrometre, hits are exact to some nanometres. The test for the side of a ray on which
-/// an edge's end lies loses digits, and the error is then comparable with the edge's length.
+/// Tolerance, m. On edges of a micrometre, hits are exact to some nanometres. To find the side of the ray on which an
+/// edge's end lies, the program subtracts nearly equal numbers. The error is then comparable with the edge's length.
 const OFF_M: f64 = 1e-8;
 
 /// Corners of a polygon that is star-shaped about (0, 3), with repeated points, slivers, corners and straight runs.
@@ -32,8 +32,8 @@ fn points(case: &mut Case) -> Vec<Yz> {
         .collect()
 }
 
-/// Finds the first edge that a ray meets, where each edge is extended slightly. Returns the distance in ray lengths,
-/// and the sine of the angle between ray and edge.
+/// Finds the first edge that a ray meets. Each edge is extended slightly. Returns the distance in ray lengths, and the
+/// sine of the angle between ray and edge.
 fn meets(points: &[Yz], origin: Yz, ray: Yz) -> Option<(f64, f64)> {
     let cross = |a: Yz, b: Yz| a[0] * b[1] - a[1] * b[0];
     let edges = points.iter().zip(points.iter().cycle().skip(1));
@@ -111,7 +111,8 @@ fn rays(case: &mut Case) -> Result<(), String> {
     inverses(case, &profile)
 }
 
-/// Converts an arc length to a place and back, both in a polygon and in a shape of arcs.
+/// Converts an arc length to a place on the wall and back, in a polygon and in a shape made of arcs. Checks that the
+/// direction from the reference point stays the same.
 fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
     let width_m = case.between(0.5, 12.0);
     let shape = match case.below(3) {
@@ -123,8 +124,8 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
         let arc_m = case.unit() * profile.perimeter_m();
         let place = profile.point_at(arc_m);
         let back = profile.point_at(profile.arc_of(place));
-        // Directions are compared instead of arc lengths: all points of an edge that points at the reference point
-        // share one direction.
+        // Directions are compared instead of arc lengths, because all points of an edge towards the reference point
+        // have the same direction.
         let [to, from] =
             [place, back].map(|at| [at[0] - profile.reference()[0], at[1] - profile.reference()[1]]);
         let turned_rad = math::atan2(to[0] * from[1] - to[1] * from[0], to[0] * from[0] + to[1] * from[1]);
@@ -136,12 +137,12 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
 }
 
 #[test]
-fn rays_match_the_plain_formula() {
+fn ray_hits_match_the_formula_for_each_edge() {
     few("geometry", &rays);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn rays_match_the_plain_formula_in_a_long_run() {
+fn ray_hits_match_the_formula_for_each_edge_in_a_long_run() {
     many("geometry", &rays);
 }

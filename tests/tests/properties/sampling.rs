@@ -1,5 +1,5 @@
-//! The paper's equations for random arguments. The result is a finite number that the inverse equation confirms, or a
-//! named error.
+//! The paper's equations with random arguments. Each result is a named error, or a finite number that the inverse
+//! equation confirms.
 
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
 use headrace_sampling::head::Turn;
@@ -9,7 +9,7 @@ use headrace_sampling::spacing::{self, Spiral};
 
 use crate::cases::{Case, few, many, within};
 
-/// A random number. It is rarely a sensible argument.
+/// A random argument of an equation. It is often zero, negative, extreme, infinite or not a number.
 fn any(case: &mut Case) -> f64 {
     match case.below(12) {
         0 => 0.0,
@@ -42,7 +42,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
     ];
     for (number, told) in told.into_iter().enumerate() {
         match told {
-            // Infinite results are allowed only if an argument is extremely large or small.
+            // An equation may return infinity only if an argument is extremely large or small.
             Ok(value)
                 if value.is_finite() || [a, b, c].iter().any(|x| x.abs() > 1e100 || x.abs() < 1e-100) => {}
             Ok(value) => return Err(format!("equation {number} of {a:e} {b:e} {c:e} {m}: {value}")),
@@ -54,7 +54,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("a turn of {a:e} {b:e}"));
     }
 
-    // The steps add up to the distance along the wall, even if the last step ends near 90 degrees.
+    // The steps T_y along the wall add up to the distance along the wall, even if the last step ends near 90 degrees.
     let last = 1 + case.count_below(400);
     let end_rad = FRAC_PI_2 * (1.0 - case.power_of_ten(-9.0, -0.1));
     let theta = end_rad / f64::from(last);
@@ -71,7 +71,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("step {last} of {theta:e} at {h}: {tangent} is not the footprint {footprint}"));
     }
 
-    // At the speed for a target, the spacing equals the target, even if T_y is close to the target.
+    // At the speed that is computed for a target, the spacing T equals the target, even if T_y is close to the target.
     let target = case.between(0.1, 3.0);
     let t_y = target * (1.0 - case.power_of_ten(-15.0, 0.0));
     let (gap_s, ping_s) = (case.between(0.1, 30.0), case.between(0.001, 0.1));
@@ -89,7 +89,8 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err("a speed where there is none".to_owned());
     }
 
-    // The advance of a turn is the sum of the advances of its pings, with one step per turn or with thousands.
+    // The vehicle's advance in a turn is the sum of its advances in the turn's pings, with one step per turn or with
+    // thousands.
     let steps = 1 + case.count_below(3000);
     let turn = Turn::new(TAU / f64::from(steps), ping_s).map_err(|why| why.to_string())?;
     let spiral = Spiral::new(speed, turn, 1.0).map_err(|why| why.to_string())?;
@@ -97,7 +98,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("{steps} steps: {} and {}", spiral.pitch_m(), spiral.advance_m()));
     }
 
-    // A start angle lies within the turn. The inverse computation, for the other end of the hull, gives the phase
+    // A start angle lies within one turn. The inverse computation, with the opposite turning rate, gives the phase
     // again.
     let (phase, rate) = (case.between(0.0, TAU), case.between(0.1, 3.0));
     let (x, v) = (case.between(-2.0, 2.0), case.power_of_ten(-9.0, 1.0));
@@ -113,12 +114,12 @@ fn equations(case: &mut Case) -> Result<(), String> {
 }
 
 #[test]
-fn equations_give_an_invertible_number_or_an_error() {
+fn random_inputs_give_an_error_or_a_result_that_inverts_to_the_input() {
     few("sampling", &equations);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn equations_give_an_invertible_number_or_an_error_in_a_long_run() {
+fn random_inputs_give_an_error_or_a_result_that_inverts_to_the_input_in_a_long_run() {
     many("sampling", &equations);
 }

@@ -1,8 +1,9 @@
 //! The advice is right: simulated vehicles that follow it meet the target, and those that are a tenth faster miss it.
 //!
-//! Heads that are apart along the hull start in phase for the speed that the advice gives for their mode. They keep
-//! turning in the same way when the pilot drives at another speed.
+//! Heads that are apart along the hull start in phase for the advised speed of their mode. They keep their turn times
+//! and start phases when the pilot drives at another speed.
 
+use headrace_coverage::Verdict;
 use std::fmt::Write as _;
 
 use headrace_geometry::time::DurNs;
@@ -13,17 +14,17 @@ use headrace_tests::advised::{Advised, dive};
 use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
-/// Chainage at which dives begin, and length of the judged part, m.
+/// Chainage at which dives begin; the second constant is the length of the part that the test evaluates. Both are in m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// If the median hole exceeds this fraction of the predicted T, a speed increase by a tenth must make sections fail.
+/// Cases whose median hole exceeds this fraction of the predicted T must fail sections at a tenth more speed.
 const NEAR: f64 = 0.95;
-/// Number of updates in which a vehicle comes to a stop.
+/// Number of advice updates at the end of a dive that the test ignores, because the vehicle is stopping.
 const BRAKING: usize = 15;
-/// Oscillation of a vehicle that a pilot steers.
+/// Simulator effect: the heading oscillates by 10 degrees, as if a pilot steered.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
 
-/// A vehicle on its way along the tunnel.
+/// A test case: a vehicle with its mode, target, offset and heading in the tunnel.
 #[derive(Clone, Copy)]
 struct Case {
     what: &'static str,
@@ -33,7 +34,7 @@ struct Case {
     target_m: f64,
     aside_m: f64,
     yaw_deg: f64,
-    /// Source that sends nothing.
+    /// Id of a source that sends nothing during the dive, if any.
     dumb: Option<&'static str>,
     effects: &'static str,
     filter: bool,
@@ -84,7 +85,8 @@ const SWINGING: [Case; 6] = [
 ];
 
 impl Case {
-    /// Length at either end of the dive in which sections aren't judged, m, because not all heads have passed there.
+    /// Length of the stretch at either end of the dive where the test ignores sections, m. Not all heads have passed
+    /// these stretches.
     fn ends_m(&self) -> f64 {
         1.2 * self.target_m + 1.0 + 8.0 * self.yaw_deg.to_radians()
     }
@@ -132,7 +134,7 @@ impl Case {
         alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
-    /// Advised speed during a dive, and results of dives at this speed and at a tenth more.
+    /// Advised speed during a dive, and results of one dive at this speed and one at a tenth more.
     fn followed(&self) -> Followed {
         let planned_mps = self.planned_mps();
         let v_max_mps = self.dive(planned_mps, planned_mps).median(v_max_mps);
@@ -149,13 +151,13 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// Results of the part between the ends.
+/// Results in the part of a dive that the test evaluates, which excludes the ends.
 struct Judged {
     failing: f64,
     passing: f64,
     /// Predicted T at the driven speed, m; median of all updates.
     predicted_t_m: f64,
-    /// Ratio of holes to the predicted T: median and largest over the sections.
+    /// Ratio of the hole diameter to the predicted T: median and maximum over the sections.
     holes: [f64; 2],
 }
 
@@ -166,7 +168,7 @@ impl Judged {
         let sections: Vec<_> =
             dive.report.sections.iter().filter(|section| within(section.start_m, section.end_m)).collect();
         assert!(sections.len() >= 39, "{}: {} sections", case.what, sections.len());
-        let share = |verdict: &str| {
+        let share = |verdict: Verdict| {
             sections.iter().filter(|section| section.verdict == verdict).count() as f64
                 / sections.len() as f64
         };
@@ -174,8 +176,8 @@ impl Judged {
         holes.sort_by(f64::total_cmp);
         let predicted_t_m = dive.median(|beat| beat.advice.predicted_t_m.unwrap());
         Self {
-            failing: share("fail"),
-            passing: share("pass"),
+            failing: share(Verdict::Fail),
+            passing: share(Verdict::Pass),
             predicted_t_m,
             holes: [holes.len() / 2, holes.len() - 1].map(|k| holes[k] / predicted_t_m),
         }
@@ -232,7 +234,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
                 ));
             }
         }
-        // If fewer sections fail, their holes are smaller than predicted. No hole may be larger than predicted.
+        // In the cases below `NEAR`, holes are smaller than predicted, and fewer sections fail. In no case may a hole
+        // be larger than predicted.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -242,8 +245,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// Sections are missed at a speed a third above the advice. The speed for repeating them must be near the advice,
-/// because both numbers are on one screen.
+/// The vehicle misses sections because it is a third faster than advised. The speed for repeating them must be near the
+/// advised speed, because one screen shows both.
 #[test]
 fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
@@ -302,8 +305,8 @@ fn advice_compensates_lost_returns() {
     let mut broken = Vec::new();
     for case in &LOSSY {
         let sound_mps = Case { effects: "", ..*case }.planned_mps();
-        // The loop knows the losses only some turns after they began. The vehicle is slow, so that it hasn't moved
-        // far by then.
+        // The loop detects the losses only some turns after they began. This vehicle is slow, so it hasn't moved far by
+        // then.
         let v_max_mps = case.dive(sound_mps, 0.5 * sound_mps).median(v_max_mps);
         let dives = [v_max_mps, sound_mps].map(|speed_mps| case.dive(sound_mps, speed_mps));
         let [at, as_before] = [0, 1].map(|k| Judged::of(case, &dives[k]));
@@ -326,7 +329,7 @@ fn advice_compensates_lost_returns() {
                 case.what, as_before.passing
             ));
         }
-        // The speed for repeating sections must be near the present limit, because both are on one screen.
+        // The speed advised for repeating sections must be near the present speed limit, because one screen shows both.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!(
                 "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",
@@ -335,7 +338,7 @@ fn advice_compensates_lost_returns() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // Single lost returns have little effect.
+    // Lost returns that are isolated have little effect on the advice.
     let few = Case { effects: "missing_returns = { share = 0.05 }\n", ..VITA1 };
     let [sound_mps, mps] = [VITA1, few].map(|case| case.dive(0.1, 0.1).median(v_max_mps));
     assert!((0.85..0.99).contains(&(mps / sound_mps)), "{mps} of {sound_mps}");
@@ -352,7 +355,7 @@ fn advice_states_that_a_lower_speed_does_not_help() {
         assert!(matches!(dive.settled()[0].advice.remedy, Some(Remedy::Mode(_))));
         assert!(Judged::of(&coarse, &dive).failing > 0.98, "{speed_mps} m/s");
     }
-    // The target is met in the alternative mode.
+    // In the alternative mode that the advice names, the vehicle meets the target.
     let Some(Remedy::Mode(mode)) = coarse.dive(0.1, 0.1).settled()[0].advice.remedy else { panic!() };
     let finer = Case { mode: mode.as_str().to_owned().leak(), ..coarse };
     assert!(finer.followed().at.failing <= 0.02, "{mode:?}");
@@ -364,7 +367,7 @@ fn advice_states_that_a_lower_speed_does_not_help() {
 }
 
 #[test]
-fn filter_uncertainty_lowers_the_advice_by_its_margin_only() {
+fn filter_lowers_the_advised_speed_only_by_its_position_margin() {
     for case in [Case { mode: "slow", target_m: 5.0, ..VITA1 }, TWO, Case { target_m: 0.9, ..FOUR }] {
         let direct_mps = case.dive(0.15, 0.15).median(v_max_mps);
         let filtered = Case { filter: true, ..case }.dive(0.15, 0.15);
@@ -385,7 +388,7 @@ fn a_minute(beats: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry) 
 #[test]
 fn advice_in_the_field_changes_slowly_enough_to_read() {
     let text = include_str!("../../../deploy/scenes/vita1-field.toml").replace("../vehicles/", "");
-    // At this speed the target is met half of the time.
+    // At this speed, about half of the updates meet the target.
     let shorter = text.replace("distance_m = 130\nspeed_mps = 0.16", "distance_m = 50\nspeed_mps = 0.197");
     assert_ne!(text, shorter);
     let scene = scenes::scene(&shorter);
@@ -395,7 +398,7 @@ fn advice_in_the_field_changes_slowly_enough_to_read() {
     let jumps = a_minute(&beats[10..], jumps);
     let reasons = a_minute(&beats[10..], |a, b| a.advice.reason != b.advice.reason);
     let forecasts = a_minute(beats, |a, b| a.advice.will_exceed != b.advice.will_exceed);
-    let target_m = scene.vehicle.target_m;
+    let target_m = scene.vehicle.target.max_hole_m;
     let over = |beat: &AdviceEntry| beat.advice.predicted_t_m > Some(target_m);
     let crossings = a_minute(beats, |a, b| over(a) != over(b));
     println!(

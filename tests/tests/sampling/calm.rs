@@ -6,7 +6,8 @@ use headrace_simulator::position_error_model;
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::Outing;
 
-/// The allowed differences are a tenth for the position errors, and a twentieth for the speed.
+/// The position errors from `plan` and from the live advice may differ by a fifth. The advised speed may be up to 7 %
+/// below the planned one.
 #[test]
 fn plan_and_live_position_errors_agree() {
     for vehicle in [VEHICLES[0], VEHICLES[1], VEHICLES[3], VEHICLES[5]] {
@@ -57,7 +58,7 @@ fn advised_speeds_match_the_largest_passing_speeds() {
     assert!(ratios.iter().all(|ratio| (0.899..1.001).contains(ratio)), "{ratios:?}");
 }
 
-/// The vehicle is driven at several speeds near the advised one, which must not change the advice.
+/// The driven speeds are near the advised one, and must not change the advice.
 #[test]
 fn advice_does_not_depend_on_the_driven_speed() {
     let outing = Outing::steady(VEHICLES[3], 1);

@@ -1,4 +1,4 @@
-//! The table of ideal scenes, from scene to bytes to log to report.
+//! The table of ideal scenes. The tests cover all steps from scene to bytes, log and report.
 //!
 //! It covers the modes SLOW to FASTEST with 1, 2 and 4 phase-shifted heads at 0.197 m/s. All heads are at the centre
 //! of the circle in the `ceran` profile. The mean distance between passes must be v T / s within 0.5 %. The largest
@@ -89,7 +89,7 @@ fn ideal_scenes_match_the_table() {
                 100.0 * hole_off,
                 100.0 * t_x_off
             );
-            // The table has three decimals.
+            // The holes in the table have three decimals.
             if (hole_m - expected_m).abs() > 0.001 * expected_m + 0.0005 || t_x_off.abs() > 0.005 {
                 writeln!(misses, "{mode} x {heads}: hole {hole_m} m, T_x {t_x_m} m").unwrap();
             }

@@ -1,7 +1,7 @@
 //! Interleaving of several heads by the paper's §5. The tests step the heads ping by ping along a straight tunnel.
 //!
-//! They collect the chainages at which each head looks at an angle. The positions come from each head's program
-//! alone, so no layout formula is tested with another one.
+//! They collect the chainages at which each head looks at a given angle. Each head is stepped by its own ping-by-ping
+//! schedule (`HeadProgram`). So the test doesn't check the layout formulas with the same formulas.
 
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math::{PI, TAU, floor_to_i64};
@@ -21,12 +21,13 @@ const SAME_RAD: f64 = 1e-9;
 const SAME_M: f64 = 1e-7;
 /// Number of pings in a turn, divisible by 2 to 6 sectors.
 const STEPS: u32 = 120;
-/// Directions of the heads: all forward, alternating, the first forward and all others aft, and all aft.
+/// Directions in which the heads face: all forward; forward and aft in turn; the first forward and all others aft; all
+/// aft.
 const FACINGS: [fn(usize) -> bool; 4] = [|_| false, |k| k % 2 == 1, |k| k > 0, |_| true];
 
 const SPEEDS_MPS: [f64; 3] = [0.1, 0.197, 0.8];
 
-/// Heads along a hull. All of them are on the axis and turn in the same direction.
+/// A set of heads mounted along a hull. All heads are on the hull's axis and turn in the same direction.
 #[derive(Debug, Clone)]
 struct Rig {
     hull_m: Vec<f64>,
@@ -64,7 +65,8 @@ impl Rig {
         self.hull_m.iter().zip(&self.aft).map(spec).collect()
     }
 
-    /// A dive at `speed_mps` with heads laid out for `planned_mps`. It is some turns longer than the hull.
+    /// Simulates a dive at `speed_mps` with heads laid out for `planned_mps`. The dive is longer than the hull by some
+    /// turns.
     fn dive(&self, layout: HeadLayout, planned_mps: f64, speed_mps: f64) -> Dive {
         let [back_m, front_m] = ends(&self.hull_m);
         let ping_m = speed_mps * self.ping_s();
@@ -87,7 +89,7 @@ impl Rig {
     }
 }
 
-/// Least and greatest value.
+/// Smallest and largest of the values.
 fn ends(of: &[f64]) -> [f64; 2] {
     [of.iter().copied().fold(f64::MAX, f64::min), of.iter().copied().fold(f64::MIN, f64::max)]
 }
@@ -97,7 +99,7 @@ fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// Angles of a head at its pings. They are not reduced to one turn.
+/// Angles of a head at its pings, counted on over several turns (not reduced to one turn).
 fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     let mut step_rad = if program.growing { step_rad } else { -step_rad };
     let Some((least, size)) = program.sector else {
@@ -124,7 +126,8 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which the head looks at a body angle. A turning point at this angle counts once.
+    /// Chainages at which the head looks at an angle of the body frame. If the head turns back at this angle, it counts
+    /// once.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();
@@ -139,7 +142,7 @@ impl Track {
         found
     }
 
-    /// Body angle at a chainage.
+    /// Angle of the head in the body frame when the head is at a chainage.
     fn body_at(&self, chainage_m: f64) -> f64 {
         let n = (chainage_m - self.x_m) / self.ping_m;
         let whole = usize::try_from(floor_to_i64(n)).unwrap();
@@ -149,12 +152,13 @@ impl Track {
 
 struct Dive {
     tracks: Vec<Track>,
-    /// First and last chainage common to all heads.
+    /// First and last chainage that all heads have passed, m.
     shared_m: [f64; 2],
 }
 
 impl Dive {
-    /// All passes over a body angle within the common chainages, in order.
+    /// Chainages at which any head passes an angle of the body frame, in order, within the chainages that all heads
+    /// have passed.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let mut all: Vec<f64> = self.tracks.iter().flat_map(|track| track.passes(angle)).collect();
         all.retain(|&m| m > self.shared_m[0] - SAME_M && m < self.shared_m[1] + SAME_M);
@@ -162,7 +166,7 @@ impl Dive {
         all
     }
 
-    /// Checks that the passes over an angle are `apart_m` apart from one end to the other.
+    /// Checks that all passes over an angle are evenly spaced, `apart_m` apart.
     fn assert_even(&self, angle: f64, apart_m: f64) {
         let (all, [first, last]) = (self.passes(angle), self.shared_m);
         assert!(all.len() > 3 && all[0] - first < apart_m + SAME_M, "{all:?} from {first}");
@@ -184,15 +188,15 @@ impl Dive {
         }
     }
 
-    /// Checks that only head `k` passes the angles of its own sector, and that it does so at two alternating
-    /// distances.
+    /// Checks that only head `k` passes the angles of its sector, and that the distances between its passes alternate
+    /// between two values.
     fn assert_two_distances(&self, k: usize, pitch_m: f64) {
         let heads = self.tracks.len();
         for share in [0.0, 0.03, 0.25, 0.4, 0.5, 0.75, 0.9, 1.0] {
             let angle = TAU * (k as f64 + share) / heads as f64;
             let mut own = self.tracks[k].passes(angle);
             if [0.0, 1.0].contains(&share) {
-                // At a turning point, two passes coincide.
+                // Where a head turns back, two of its passes coincide.
                 own = own.iter().flat_map(|&m| [m, m]).collect();
             } else {
                 let by = |track: &&Track| !track.passes(angle).is_empty();
@@ -245,7 +249,7 @@ fn phase_shifted_heads_pass_each_angle_at_equal_distances() {
 }
 
 #[test]
-fn heads_in_sectors_sweep_in_phase_at_two_alternating_distances() {
+fn heads_in_sector_layout_sweep_in_phase_with_alternating_pass_distances() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;
@@ -259,7 +263,7 @@ fn heads_in_sectors_sweep_in_phase_at_two_alternating_distances() {
             dive.assert_in_step(1e-7);
             for k in 0..heads {
                 dive.assert_two_distances(k, pitch_m);
-                // At the border of two sectors, both heads turn round, half a sweep apart.
+                // At the border of two sectors, both heads turn back. They do so at evenly spaced chainages.
                 dive.assert_even(TAU * (k + 1) as f64 / heads as f64, pitch_m / heads as f64);
             }
             // With other distances, a head may reach the end of its sector up to one ping early or late.
@@ -271,10 +275,10 @@ fn heads_in_sectors_sweep_in_phase_at_two_alternating_distances() {
     }
 }
 
-/// The cases are steps of 2.4 degrees in quarters of a turn, and steps of 0.9 degrees in thirds. The shorter last
-/// step makes the sweep longer than 2 T / s.
+/// The cases are steps of 2.4 degrees in sectors of 90 degrees, and steps of 0.9 degrees in sectors of 120 degrees. The
+/// last step of a sector is shorter, and makes the sweep longer than 2 T / s.
 #[test]
-fn sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
+fn heads_in_sectors_not_divisible_by_the_angular_step_are_in_phase_within_two_pings() {
     for (steps, heads, turn_s) in [(150, 4, 4.8), (400, 3, 8.0)] {
         let rig = Rig { steps, ..Rig::new(&hulls(heads)[2], |_| false, turn_s) };
         rig.dive(SectorOffset, 0.1, 0.1).assert_in_step(2.0 * rig.step_rad());
@@ -282,7 +286,7 @@ fn sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
 }
 
 #[test]
-fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
+fn algorithm_1_gives_a_head_the_angle_of_the_lead_head_at_the_same_chainage() {
     for (of, (behind_m, speed_mps)) in (2..=6_usize)
         .flat_map(|of| [(0.0, 0.3), (0.3, 0.197), (1.102, 0.5), (3.7, 0.4), (-0.6, 0.197)].map(|at| (of, at)))
     {
@@ -290,7 +294,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
         let program = HeadProgram { start_rad: 0.0, growing: true, sector: Some((0.0, size)) };
         let ping_m = speed_mps * rig.ping_s();
         let lead = Track { x_m: 0.0, ping_m, body: walk(&program, rig.step_rad(), 8 * STEPS) };
-        // The chainages begin where both heads have been, and are 1.37 pings apart.
+        // The tested chainages begin where both heads have been, and are 1.37 pings apart.
         for now_m in (0..150).map(|n| 3.8 + f64::from(n) * 1.37 * ping_m) {
             let state = |m: f64| (lead.body_at(m), lead.body_at(m + SAME_M) > lead.body_at(m));
             let ((angle_rad, growing), (along, outward)) = (state(now_m), state(now_m - behind_m));
@@ -301,7 +305,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
                 let off = wrapped(body - along - number as f64 * size);
                 assert!(off.abs() < 1e-8, "{sector:?} {off} off, lead at {angle_rad} {growing}");
                 assert!((0.0..TAU).contains(&got.angle_rad), "{got:?}");
-                // At a turning point, both directions are right.
+                // Where a head turns back, both directions of motion are right.
                 if along > 1e-5 && along < size - 1e-5 {
                     assert_eq!(got.growing, outward != reversed, "{sector:?}, lead {angle_rad} {growing}");
                 }
@@ -311,13 +315,14 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
 }
 
 #[test]
-fn gaps_of_a_faster_vehicle_differ_by_the_phase_errors() {
+fn pass_gaps_above_the_planned_speed_differ_by_the_phase_errors() {
     let (turn_s, planned_mps, speed_mps) = (8.0, 0.197, 0.25);
     let pitch_m = speed_mps * turn_s;
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
-            // Delay of a head at a place in addition to its phase, turns: x / (v T) - x / (v' T).
+            // Delay of a head at position x along the hull, in addition to its planned phase, in turns: x / (v T) - x /
+            // (v' T).
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {
@@ -333,7 +338,8 @@ fn gaps_of_a_faster_vehicle_differ_by_the_phase_errors() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        // The seed is fixed, because one start in a million is so close to a step that rounding decides its ping.
+        // The random seed is fixed, because one start angle in a million is so close to a step that rounding decides
+        // which ping reaches it.
         cases: 100, failure_persistence: None, rng_seed: RngSeed::Fixed(881), ..ProptestConfig::default()
     })]
 
@@ -343,9 +349,9 @@ proptest! {
         rig.dive(PhaseShift, speed_mps, speed_mps).assert_even(angle, apart_m);
     }
 
-    /// The speed differs from the planned one, so that the gaps differ from each other.
+    /// The speed differs from the planned one, so that the gaps between passes differ from each other.
     #[test]
-    fn shifting_or_reversing_all_heads_does_not_change_the_gaps(
+    fn shifting_or_reversing_all_heads_does_not_change_the_pass_gaps(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]),
         shift_m in -3.0..3.0, speed_mps in 0.05..1.0, angle in 0.0..TAU,
     ) {
@@ -359,7 +365,7 @@ proptest! {
     }
 
     #[test]
-    fn schedule_agrees_with_stepping_each_program(
+    fn schedule_angles_match_stepping_each_head_ping_by_ping(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]), speed_mps in 0.05..1.0,
     ) {
         let schedule = Schedule::new(&rig.specs(), layout, speed_mps).unwrap();
@@ -385,8 +391,8 @@ fn sector_of_12_5_steps_ends_with_a_half_step_and_pings_each_end_once() {
     let out = (0..13).map(|n| 7.2 * f64::from(n));
     let sweep: Vec<f64> = out.clone().chain(out.map(|degrees| 90.0 - degrees)).collect();
     for (n, degrees) in (0..1000).zip(sweep.iter().cycle()) {
-        // A ping's angle must hold from its exact nanosecond to a microsecond before the next ping, although 0.3 /
-        // 0.1 is rounded to below 3.
+        // A head must keep a ping's angle from the ping's exact nanosecond until a microsecond before the next ping.
+        // Rounding must not change this: 0.3 / 0.1 is below 3.
         for ns in [100_000_000 * n, 100_000_000 * n + 99_999_000] {
             let got = schedule.angle_rad(0, DurNs(ns)).unwrap().to_degrees();
             assert!((got - degrees).abs() < 1e-6, "{got} for {degrees} at {ns} ns");
@@ -427,7 +433,7 @@ fn impossible_layout_is_a_named_error() {
 }
 
 #[test]
-fn step_not_above_zero_is_a_named_error_in_either_layout() {
+fn step_of_zero_or_less_is_a_named_error_in_both_layouts() {
     for (layout, step_rad) in [PhaseShift, SectorOffset].into_iter().flat_map(|l| [(l, 0.0), (l, -0.1)]) {
         let head = HeadSpec { step_rad, ..Rig::new(&[0.0], |_| false, 8.0).specs()[0] };
         assert!(programs(&[head; 2], layout, 0.2).is_err(), "{layout:?} in steps of {step_rad}");
@@ -435,7 +441,7 @@ fn step_not_above_zero_is_a_named_error_in_either_layout() {
 }
 
 #[test]
-fn lead_outside_sector_0_is_a_named_error() {
+fn lead_head_outside_sector_0_is_a_named_error() {
     let sector = Sector { number: 1, of: 4, behind_m: 0.3, reversed: false };
     for angle_rad in [-0.1, 1.6, 6.2, f64::NAN] {
         let got = in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.2);

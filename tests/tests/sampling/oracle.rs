@@ -2,8 +2,8 @@
 //! (`oracles/sampling.csv`).
 //!
 //! The inputs are doubles and count as exact. So the tolerance only covers rounding in the computation. It is some
-//! units in the last place, times the condition number if the rounding of an intermediate value matters like that of
-//! an input.
+//! units in the last place. It is multiplied by the condition number if the computation magnifies the rounding of an
+//! intermediate value.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
@@ -27,7 +27,7 @@ struct Row {
 }
 
 impl Row {
-    /// Input number `i` of the row. Inputs are numbered from 1, as in the file's header.
+    /// Input number `i` of a row of `oracles/sampling.csv`. Inputs are numbered from 1, as in the file's header.
     fn i(&self, i: usize) -> f64 {
         self.inputs[i - 1]
     }
@@ -36,7 +36,7 @@ impl Row {
         u32::try_from(math::round_to_i64(self.i(i))).unwrap()
     }
 
-    /// Checks `got` against the oracle's value with an absolute tolerance.
+    /// Checks the program's result `got` against the oracle's value with an absolute tolerance.
     fn near(&self, got: f64, tolerance: f64) {
         let off = (got - self.value).abs();
         assert!(
@@ -49,24 +49,24 @@ impl Row {
         );
     }
 
-    /// Checks `got` to some units in the last place.
+    /// Checks that the program's result `got` equals the oracle's value to some units in the last place.
     fn ulps(&self, got: f64, ulps: f64) {
         self.near(got, ulps * ULP * self.value.abs());
     }
 
-    /// Relative error of `got`.
+    /// Relative error of the program's result `got`.
     fn share(&self, got: f64) -> f64 {
         (got - self.value).abs() / self.value.abs().max(f64::MIN_POSITIVE)
     }
 
-    /// Checks a place `got` on a circle of this circumference.
+    /// Checks a position `got` on a circle of circumference `modulus`.
     fn around(&self, got: f64, modulus: f64, tolerance: f64) {
         let off = math::wrap_signed(got - self.value, modulus);
         self.near(self.value + off, tolerance);
     }
 }
 
-/// Rows of the cases with these names, which must exist.
+/// Rows of `oracles/sampling.csv` for the cases with these names. Every case must exist.
 fn rows(cases: &[&str]) -> Vec<Row> {
     let mut found = Vec::new();
     for (number, line) in ROWS.lines().enumerate() {
@@ -94,9 +94,9 @@ fn condition(angle_rad: f64) -> f64 {
     1.0 + angle_rad / (FRAC_PI_2 - angle_rad).abs()
 }
 
-/// Near 90 degrees the tangent is unbounded, so the difference of two tangents would lose all digits.
+/// Near 90 degrees, tangents are very large, so a formula that subtracts two tangents would lose all digits.
 #[test]
-fn steps_near_90_degrees_match_the_oracle() {
+fn wall_steps_near_90_degrees_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
     for row in rows(&["eq6"]) {
         worst = worst.max(row.share(section::t_y2_m(row.i(1), row.i(2), row.count(3)).unwrap()));
@@ -105,7 +105,7 @@ fn steps_near_90_degrees_match_the_oracle() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// If T_y is close to the target, the difference of their squares would lose digits by cancellation.
+/// If T_y is close to the target, a formula that subtracts their squares would lose digits.
 #[test]
 fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -119,9 +119,9 @@ fn speeds_near_the_limit_match_the_oracle() {
     found_at("sampling.speed", magnified, worst, 8.0 * ULP);
 }
 
-/// At a crawl, a head makes very many turns before the vehicle reaches the former position of another head.
+/// At a crawl, a head makes very many turns until the vehicle has brought it to the place of another head.
 #[test]
-fn phases_at_a_crawl_match_the_oracle() {
+fn head_phases_at_very_low_speed_match_the_oracle() {
     let (mut worst_rad, mut turned_most) = (0.0_f64, 0.0_f64);
     for row in rows(&["eq20", "eq21"]) {
         let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
@@ -188,7 +188,7 @@ fn forward_motion_matches_the_oracle() {
 }
 
 #[test]
-fn phases_of_heads_apart_match_the_oracle() {
+fn phases_of_separately_mounted_heads_match_the_oracle() {
     for row in rows(&["eq20", "eq21"]) {
         let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
         let start = if row.case == "eq20" { start_rad } else { start_reversed_rad };

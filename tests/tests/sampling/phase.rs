@@ -12,7 +12,7 @@ const PLANNED_MPS: f64 = 0.197;
 
 /// Advice in a dive at constant speed, without the first seconds.
 ///
-/// No effect disturbs the sensors, so the speed is known without a filter. A filter would add a margin for slack.
+/// No effect disturbs the sensors, so the vehicle has no filter. A filter would add a margin for cable slack.
 fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
     let folder = Folder::new();
     let direct = "[navigation]\nway = \"direct\"\n";
@@ -33,7 +33,7 @@ fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
 }
 
 #[test]
-fn phase_error_follows_from_the_change_of_speed() {
+fn phase_error_matches_the_difference_from_the_planned_speed() {
     assert!(VEHICLE.contains("planned_speed_mps = 0.197"));
     for speed_mps in [0.12, PLANNED_MPS, 0.23, 0.35] {
         let advice = advice(speed_mps, VEHICLE);
@@ -49,7 +49,7 @@ fn phase_error_follows_from_the_change_of_speed() {
 }
 
 #[test]
-fn one_head_and_heads_in_sectors_have_no_phase_error() {
+fn single_head_and_heads_in_sector_layout_have_no_phase_error() {
     let one = include_str!("../../../deploy/vehicles/vita1.toml");
     let sectors = VEHICLE.replace("layout = \"phase_shift\"", "layout = \"sector_offset\"");
     assert_ne!(sectors, VEHICLE);
@@ -59,7 +59,7 @@ fn one_head_and_heads_in_sectors_have_no_phase_error() {
 }
 
 #[test]
-fn alternatives_are_given_for_each_mode_with_the_time_they_need() {
+fn advice_alternatives_list_every_mode_with_the_hours_that_it_needs() {
     let timed = format!("dive_hours = 12\n{VEHICLE}");
     let advice = advice(PLANNED_MPS, &timed);
     let last = advice.last().unwrap();

@@ -1,9 +1,9 @@
-//! The hole that a plan promises, compared with simulated beams.
+//! The planned hole size is an upper bound of the holes between simulated beams.
 //!
-//! Heads are stepped by their schedule and their beams are cast. Then the largest empty circle is searched. Occlusion
-//! by the vehicle is found by following each beam in small steps. The search can only underestimate, so no found
-//! circle may exceed the promise. The promise may be at most twice the found circle, because a larger one would waste
-//! the crew's time.
+//! The test steps the heads by their schedule, casts their beams, and searches the largest empty circle. To find
+//! occlusion by the vehicle, it follows each beam in small steps. The search can only underestimate the circle, so no
+//! found circle may exceed the planned size. The planned size may not be far larger than the circle either, because
+//! that would waste the crew's time.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::math::{self, PI, TAU};
@@ -19,7 +19,8 @@ const MODES: [(&str, f64, f64); 3] = [("medium", 0.6, 10.8), ("fast", 0.9, 8.0),
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
-/// A head at a place of the vehicle. It faces forward or aft, and its turn time is longer by the factor `slower`.
+/// A head mounted at `place` on the vehicle. It faces forward or aft, and its turn time is longer than that of the mode
+/// by the factor `slower`.
 fn head(place: [f64; 3], aft: bool, radius_m: f64, slower: f64) -> Head {
     let mode = |(name, step_deg, turn_s): (&'static str, f64, f64)| HeadMode {
         name,
@@ -80,13 +81,14 @@ fn straight(_: f64) -> (f64, f64) {
     (0.0, 0.0)
 }
 
-/// Step along a beam, m. It is so short that at least two steps meet the thinnest part of 5 mm.
+/// Step along a beam, m. It is so short that at least two steps hit the thinnest part of the vehicle, which is 5 mm
+/// thick.
 const STEP_M: f64 = 0.002;
 /// Largest distance between a head and a part of the vehicle, m.
 const VEHICLE_M: f64 = 1.6;
 
-/// Whether the vehicle hides the wall from a beam, found in steps along the beam. A head's own body hides nothing,
-/// nor does a box that contains the head.
+/// Whether the vehicle hides the wall from a beam. Follows the beam in steps. A head's own body hides nothing, and
+/// neither does a box that contains the head.
 fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
     let (spec, _) = &inspection.heads[number];
     let from = spec.mount.position;
@@ -117,7 +119,7 @@ fn in_box(part: &Obstacle, at: Vec3<Body>) -> bool {
     within(Vec3::x) && within(Vec3::y) && within(Vec3::z)
 }
 
-/// Samples of a dive over `length_m` as chainage and arc length.
+/// Samples of a dive over `length_m`, each as chainage and arc length, m.
 fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: Way) -> Vec<[f64; 2]> {
     let schedule = planner.schedule(mode, speed_mps).unwrap();
     let inspection = planner.inspection();
@@ -184,7 +186,7 @@ impl Wall {
         ]
     }
 
-    /// Distance to the nearest sample, m.
+    /// Distance from a point on the wall to the nearest sample, m.
     fn clear_m(&self, [x, sigma]: [f64; 2]) -> f64 {
         let [i, j] = self.cell([x, sigma]);
         let mut best = f64::INFINITY;
@@ -248,7 +250,7 @@ fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
     let speed_mps = planner.v_max_mps(number, target_m).unwrap();
     let pitch_m = speed_mps * planner.modes()[number].mode.turn.period_s();
-    // The ends are left out, because not all heads have passed there.
+    // The dive's ends are left out, because not all heads have passed there.
     let from_m = pitch_m + 6.0;
     let to_m = from_m + pitch_m;
     let samples = samples(&planner, number, speed_mps, to_m + pitch_m + 6.0, way);
@@ -256,7 +258,7 @@ fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     wall.hole_m(from_m, to_m, target_m / 8.0) / target_m
 }
 
-/// Checks that no case exceeds its promise, and that each ratio is at least `least`.
+/// Checks for each case that the ratio of the found hole to the planned one is from `least` to 1.
 fn hold(cases: Vec<(&str, Inspection, &str, f64, Way)>, least: f64) {
     let mut broken = Vec::new();
     for (what, inspection, mode, target_m, way) in cases {
@@ -270,7 +272,7 @@ fn hold(cases: Vec<(&str, Inspection, &str, f64, Way)>, least: f64) {
 }
 
 #[test]
-fn plan_bounds_the_hole_of_ideal_heads_and_sectors() {
+fn planned_hole_size_is_an_upper_bound_for_ideal_heads_and_sectors() {
     let three = || ideal(3);
     hold(
         vec![
@@ -284,7 +286,7 @@ fn plan_bounds_the_hole_of_ideal_heads_and_sectors() {
 }
 
 #[test]
-fn plan_bounds_the_hole_of_heads_on_a_real_hull() {
+fn planned_hole_size_is_an_upper_bound_with_a_real_hull() {
     let side = || vita(&[(0.551, 0.0, 0.0), (-0.551, 0.15, 0.0), (-0.551, -0.15, 0.0)]);
     let over = |z: f64| vita(&[(0.55, 0.0, z), (-0.55, 0.0, -z)]);
     hold(
@@ -312,7 +314,7 @@ fn plan_bounds_the_hole_of_heads_on_a_real_hull() {
 }
 
 #[test]
-fn plan_bounds_the_hole_of_an_askew_vehicle() {
+fn planned_hole_size_is_an_upper_bound_for_an_askew_vehicle() {
     let askew =
         |heads, degrees: f64| Inspection { yaw_rad: degrees.to_radians(), ..ceran(heads, PhaseShift) };
     hold(
@@ -331,8 +333,8 @@ fn plan_bounds_the_hole_of_an_askew_vehicle() {
 }
 
 #[test]
-fn plan_bounds_the_hole_of_a_swinging_and_drifting_vehicle() {
-    // An oscillation by 5 degrees either way in 30 s has a largest rate of 1.05 degrees a second.
+fn planned_hole_size_is_an_upper_bound_for_a_swinging_or_drifting_vehicle() {
+    // An oscillation with an amplitude of 5 degrees and a period of 30 s has a largest rate of 1.05 degrees per second.
     let swings = |yaw_deg: f64, rate_degps: f64, heads| Inspection {
         yaw_rad: yaw_deg.to_radians(),
         yaw_rate_radps: rate_degps.to_radians(),
@@ -340,8 +342,8 @@ fn plan_bounds_the_hole_of_a_swinging_and_drifting_vehicle() {
     };
     let swinging = |heads| swings(5.0, 1.05, heads);
     let swing: Way = |t| (0.0, f64::to_radians(5.0) * math::sin(TAU * t / 30.0));
-    // The oscillation is 15 degrees either way in 20 s. At its largest rate, the heading would change by 51 degrees
-    // in a turn of MEDIUM, but it changes by 30 degrees at most.
+    // The oscillation has an amplitude of 15 degrees and a period of 20 s. At its largest rate, the heading would
+    // change by 51 degrees in a turn of MEDIUM. In fact it changes by at most 30 degrees.
     let swing_wide: Way = |t| (0.0, f64::to_radians(15.0) * math::sin(TAU * t / 20.0));
     let drifting = |heads| Inspection { drift_m: 1.5, ..ceran(heads, PhaseShift) };
     hold(
@@ -356,7 +358,7 @@ fn plan_bounds_the_hole_of_a_swinging_and_drifting_vehicle() {
 }
 
 #[test]
-fn plan_bounds_the_hole_of_heads_out_of_phase_and_hidden_slivers() {
+fn planned_hole_size_is_an_upper_bound_for_unequal_turn_times_and_thin_obstacles() {
     let unequal = |slower: f64| vec![head([0.0; 3], false, 0.0, 1.0), head([0.0; 3], false, 0.0, slower)];
     let sliver = |width_m: f64| Inspection {
         hull: vec![Obstacle::Box {

@@ -3,7 +3,7 @@
 use headrace_tests::{program, root};
 use serde_json::Value;
 
-/// Vehicles on the page, with their files.
+/// Vehicles on the page `docs/why/cost`, with their vehicle files.
 const VEHICLES: [(&str, &str); 4] = [
     ("VITA 1, one head", "vita1.toml"),
     ("VITA 2, two heads", "vita2-2.toml"),
@@ -11,7 +11,7 @@ const VEHICLES: [(&str, &str); 4] = [
     ("VITA 2, four heads", "vita2-4.toml"),
 ];
 
-/// Speed and hours that `plan` gives for a mode of a vehicle.
+/// Planned speed and duration in hours that `headrace plan` prints for a mode of a vehicle.
 fn planned(file: &str, target_m: &Value, mode: &str) -> [f64; 2] {
     let vehicle = root().join("deploy/vehicles").join(file);
     let mut command = program();

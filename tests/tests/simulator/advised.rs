@@ -1,6 +1,7 @@
-//! A simulated pilot who gets advice. The pilot hurries, is shown a missed stretch, goes back, and leaves no missed
-//! section.
+//! A simulated pilot who gets advice. The pilot drives too fast, sees the missed stretch, goes back, and leaves no
+//! missed section.
 
+use headrace_coverage::Verdict;
 use headrace_simulator::{Message, Scene, Simulation};
 use headrace_tests::{scenes, truth};
 
@@ -17,7 +18,7 @@ fn simulation(scene: &Scene) -> Simulation {
     headrace_replay::simulation(scene, false).unwrap()
 }
 
-/// True chainage at each second.
+/// True chainage of the vehicle at each second of the dive.
 fn way(scene: &Scene) -> Vec<f64> {
     let mut simulation = simulation(scene);
     while simulation.next_message().is_some() {}
@@ -49,7 +50,9 @@ fn pilot_goes_back_and_leaves_no_missed_section() {
     let [left, made_good] = [scene(&format!("goes_back = false\n{HURRY}")), hurried].map(|scene| {
         let dive = truth::dive(&scene);
         let within = dive.sections.iter().map(|section| &section.report);
-        within.filter(|section| (8.0..18.0).contains(&section.start_m) && section.verdict == "fail").count()
+        within
+            .filter(|section| (8.0..18.0).contains(&section.start_m) && section.verdict == Verdict::Fail)
+            .count()
     });
     println!("failed {left} without going back, {made_good} after");
     assert!(left > 8 && made_good == 0, "{left} {made_good}");
@@ -61,7 +64,7 @@ fn pilot_keeps_to_the_advised_speed_within_tolerance() {
     let way = way(&scene);
     let report = truth::dive(&scene).report;
     let told = &report.advice;
-    // The vehicle is under way in these seconds.
+    // In these seconds of the dive, the vehicle is moving steadily.
     for (second, pair) in way.windows(2).enumerate().skip(40).take(60) {
         let speed_mps = pair[1] - pair[0];
         let about = told.iter().filter(|entry| (entry.at_s - second as f64).abs() < 12.0);

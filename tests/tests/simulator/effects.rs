@@ -1,11 +1,11 @@
-//! Only the effects that a scene names cost time, and an effect that isn't named changes no bit.
+//! A scene's dive has only the effects that the scene names. Other effects cost no time and change no bit.
 
 use std::collections::BTreeMap;
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages};
 use serde_json::Value;
 
-/// Messages of each source: time and bytes.
+/// Messages that each source sends: time and bytes.
 type Lines = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
 
 fn folder() -> Folder {
@@ -14,7 +14,7 @@ fn folder() -> Folder {
     folder
 }
 
-/// Messages of each source in the short dive with these effects.
+/// Messages that each source sends in the short dive with these simulator effects.
 fn lines(folder: &Folder, effects: &str, further: &[&str]) -> Lines {
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));
     let arguments = [&["simulate", "scene.toml", "-o", "dive.mcap"], further].concat();
@@ -97,7 +97,7 @@ fn truth_output_does_not_change_the_log() {
     let column = |name: &str| columns.iter().position(|column| *column == name).unwrap();
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     assert!(rows.iter().all(|row| row.len() == columns.len()));
-    // Every ping of the log has a row.
+    // Every ping in the log has a row in the table of the ground truth.
     let pings = rows.iter().filter(|row| row[column("source")] == "sonar_0").count();
     assert_eq!(pings, plain["/raw/sonar_0"].len());
     let number = |row: &Vec<&str>, name| row[column(name)].parse::<f64>().unwrap();
@@ -125,13 +125,15 @@ fn only_named_effects_have_systems_components_and_streams() {
     assert_eq!(effect["systems"].as_array().unwrap().len(), 1);
     assert_eq!(effect["components"][0]["sensors"], serde_json::json!(["sonar_1"]));
     assert_eq!(effect["streams"], serde_json::json!(["sonar_1"]));
-    // A base system aims a head from the pose at the start of each turn. The effect replaces this system.
+    // Without the effect, a base system aims a head from the pose at the start of each turn. The effect replaces this
+    // system.
     let moving = explained(&folder, "motion_within_turn = {}");
     assert_eq!(moving["base"].as_array().unwrap().len(), base - 1);
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));
 }
 
-/// Effects that a scene calls for are listed with their reasons. They are simulated only if the scene requests it.
+/// Effects that a scene's conditions imply are listed with their reasons. They are simulated only if the scene requests
+/// them.
 #[test]
 fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
     let folder = folder();
@@ -159,14 +161,14 @@ fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
         (fate("beam_cone"), fate("imu_bias"), fate("occlusion")),
         ("left".into(), "as named".into(), "taken".into())
     );
-    // Descriptions that no effect uses change no byte.
+    // Descriptions of water and cable that no effect uses change no byte.
     let plain = lines(&folder, "", &[]);
     let described = "\n[water]\ntemperature_degc = 4\n[[water.murk]]\nfrom_m = 1\nto_m = 9\nsilt_gpl = 3\n[cable]\nslack_m = 1\n";
     assert_eq!(lines(&folder, described, &[]), plain);
 }
 
-/// The report must show no influence for one effect, and a large one for another. The price of an effect is its CPU
-/// time.
+/// The report must show no influence for one effect and a large influence for another. It also shows the CPU time of
+/// each effect.
 #[test]
 fn explain_worth_shows_which_effects_change_the_result() {
     let folder = folder();
@@ -186,12 +188,12 @@ fn explain_worth_shows_which_effects_change_the_result() {
     assert!(lost["is_free"] == false && lost["hole_m"]["mean"].as_f64().unwrap() < -0.02, "{lost}");
     let spared = worth["spared"]["effects"].as_array().unwrap();
     assert!(spared.contains(&"imu_noise".into()) && !spared.contains(&"missing_returns".into()), "{worth}");
-    // A single seed gives no interval.
+    // With a single seed, the report can't state a confidence interval.
     let one = folder.headrace(&["simulate", "scene.toml", "--explain=worth", "--seeds", "1"]);
     assert!(one.code == Some(2) && one.stderr.contains("seeds"), "{}", one.stderr);
 }
 
-/// Checks that the program exits with code 2 and prints these words.
+/// Checks that the simulation of a scene exits with code 2 and prints these words.
 #[track_caller]
 fn refused(scene: &str, words: &[&str]) {
     let folder = folder();
@@ -302,7 +304,7 @@ fn water_temperature_corrects_a_wrong_speed_of_sound() {
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
 
-/// Whether this effect alone removes or displaces each ping of a head.
+/// For each ping of a head: whether this effect alone removes or displaces its return.
 fn touched(effect: &str) -> Vec<bool> {
     let ranges = |effects: &str| -> Vec<Option<f64>> {
         let scene = format!("{SCENE}\n[effects]\n{effects}\n");
@@ -325,8 +327,8 @@ fn random_draws_of_two_effects_are_independent() {
     let stray = touched("outliers = { share = 0.3, sensors = [\"sonar_0\"] }");
     assert!(lost.len() > 500 && (share(&lost) - 0.3).abs() < 0.1 && (share(&stray) - 0.3).abs() < 0.1);
     let both: Vec<bool> = lost.iter().zip(&stray).map(|(a, b)| *a && *b).collect();
-    // If both effects shared a random stream, the overlap would be the whole smaller set. With separate streams it is
-    // 0.09, right to five standard deviations.
+    // If both effects shared a random stream, the overlap would be the whole smaller set. With separate streams, the
+    // overlap is 0.09 to within five standard deviations.
     let sd = (0.09_f64 * 0.91 / both.len() as f64).sqrt();
     assert!((share(&both) - 0.09).abs() < 5.0 * sd + 0.01, "{}", share(&both));
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 
-/// A box of 1 m as PLY, standing on its lower face.
+/// A cube with 1 m edges as a PLY mesh, with the origin in its lower face.
 fn cuboid() -> String {
     let mut text = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
@@ -24,7 +24,7 @@ fn folder(keys: &str) -> Folder {
     folder
 }
 
-/// Values of one column of the ground truth, from rows with `value` in the column `key`.
+/// Values of the column `wanted` in the ground truth, from rows with `value` in the column `key`.
 fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> {
     let mut rows = truth.lines().skip_while(|line| line.starts_with('#'));
     let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
@@ -34,7 +34,7 @@ fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> 
 }
 
 #[test]
-fn sounder_measures_a_body_on_the_floor() {
+fn echosounder_measures_a_mesh_body_on_the_floor() {
     let folder = folder("file = \"box.ply\"\nname = \"car\"\nchainage_m = 5");
     folder.write("box.ply", cuboid());
     let arguments = ["simulate", "scene.toml", "-o", "dive.mcap", "--truth", "truth.csv"];

@@ -1,4 +1,5 @@
-//! A failed section, its surroundings, counts over both, and the drive with some factors removed.
+//! A failed section and its surroundings: ping counts over both, and the driving figures with some factors
+//! removed.
 
 use crate::cause::{Cause, Causes};
 use crate::frontier::Reach;
@@ -9,15 +10,16 @@ use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 use headrace_sampling::losses::MOST_PASSES;
 
-/// The removal of a factor helps only if it reduces the spacing to below this share.
+/// The removal of a factor is worthwhile only if it shrinks the spacing of samples below this share of the
+/// actual spacing.
 pub(super) const HELPS: f64 = 0.93;
 /// Largest hole size for which the surroundings are searched for missing samples, in multiples of the target.
 pub(super) const WIDEST: f64 = 8.0;
 
-/// A failed section and its surroundings.
+/// A failed section and its surroundings, as input for explaining the fail.
 #[derive(Debug, Clone, Copy)]
 pub struct Case<'a> {
-    /// Hole of the section.
+    /// Largest hole of the section.
     pub hole: &'a Hole,
     /// Chainages of the section's two ends, m.
     pub bounds_m: (f64, f64),
@@ -27,21 +29,22 @@ pub struct Case<'a> {
     pub swept_by_all: Option<Reach>,
     /// Stretch where samples may still land; the wall in this stretch is unknown.
     pub to_come: Option<Reach>,
-    /// Whether no head was alive at the time of the request.
+    /// Whether no head was alive (pinging) at the time of the request.
     pub none_alive: bool,
     /// Whether no head pinged in the section, and at least one head passed through it in silence.
     pub is_dark: bool,
     /// Whether the section's samples come from unrelated stretches of navigation.
     pub is_torn: bool,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
-    /// Causes of the two neighbouring sections. Among equally small sets of causes, these are preferred.
+    /// Causes of the two neighbouring sections. Among equally small sets of causes, the search prefers these.
     pub beside: [Causes; 2],
     /// Latest missing samples.
     pub lacks: &'a MissingSamples,
 }
 
-/// Counts over the sections, and the driving figures at the moment with the largest distance between passes.
+/// Ping counts over the sections round a hole, and the driving figures at the moment with the largest
+/// distance between passes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Seen {
     pub(super) pings: u32,
@@ -82,7 +85,8 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole, up to the size of the target.
+/// Whether every live head has swept the hole. For a hole larger than the target, only its central part of
+/// the target's size must have been swept.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
@@ -91,8 +95,8 @@ pub(super) fn is_passed(case: &Case<'_>) -> bool {
 
 /// Whether the pings of silent heads can't be reconstructed.
 ///
-/// True in each of three cases: the heads sweep in sectors, a silent head never pinged, or all heads were silent
-/// for longer than the list of missing samples covers.
+/// True if the silent heads sweep in sectors, if one of them never pinged, or if all heads were silent for
+/// longer than the list of missing samples covers.
 pub(super) fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
 }
@@ -111,16 +115,16 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
 }
 
-/// Whether a missing sample lies in the middle of a hole.
+/// Whether a missing sample lies in the central part of a hole.
 ///
-/// The middle is at most as large as the target, because samples from ahead may still shrink the hole.
+/// This part is at most as large as the target, because samples from ahead may still shrink the hole.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
 }
 
 impl Drive {
-    /// Largest speed that leaves time for this many passes in place of one, m/s.
+    /// Largest speed that leaves time for `passes_needed` passes in place of one, m/s.
     ///
     /// Zero if so many returns are lost that no useful speed remains.
     pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
@@ -135,10 +139,10 @@ impl Drive {
         }
     }
 
-    /// Returns the driving figures with some factors removed.
+    /// Returns the driving figures as they would have been with some factors removed.
     ///
-    /// `margin_m` is the target less a margin, m; a corrected speed is computed from it. With `all_turn`, no
-    /// head is silent or stalled.
+    /// If speed is among the removed factors, the lower speed is computed for `margin_m`: the target less a
+    /// margin, m. With `all_turn`, no head is silent or stalled.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;
@@ -173,7 +177,7 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // Advised speeds allow for wall that the vehicle hides.
+            // The advised speed is lower if the vehicle hides wall from some heads.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

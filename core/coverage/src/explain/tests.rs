@@ -28,7 +28,8 @@ fn sound() -> Drive {
     }
 }
 
-/// A wall with a lattice of samples except in some places, and the known facts about this wall.
+/// A wall with a lattice of samples except in some places, and the known facts about the drive past this
+/// wall.
 struct Wall {
     along_m: f64,
     around_m: f64,
@@ -69,7 +70,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
     let (mut store, mut lacks) = (SampleStore::new(layout), MissingSamples::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
-    // The centre between two passes is the centre of the section.
+    // The section's centre lies half way between two passes.
     let rows = count(4.0, wall.along_m);
     let x_m = |i: i64| 10.125 + (i as f64 + 0.5) * wall.along_m;
     for i in (-rows..=rows).filter(|i| x_m(*i) < wall.end_m) {
@@ -109,7 +110,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
 }
 
 #[test]
-fn each_single_cause_is_named() {
+fn fail_with_a_single_cause_names_that_cause() {
     for (cause, wall) in [
         (
             Cause::TooFast,
@@ -155,7 +156,7 @@ fn both_causes_are_named_only_if_both_are_needed() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
-    // Scattered losses enlarge the hole, but without them the section would still fail.
+    // Scattered losses enlarge the hole. Even without these losses, the section would fail.
     let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
@@ -167,11 +168,11 @@ fn both_causes_are_named_only_if_both_are_needed() {
     );
 }
 
-/// Heads slightly out of phase enlarge the hole.
+/// The heads are slightly out of phase, which enlarges the hole.
 ///
-/// Without the other two factors, the section would pass despite the phase.
+/// The section would pass in spite of the phase if the other two factors were removed.
 #[test]
-fn only_two_causes_are_named_if_removing_two_of_three_suffices() {
+fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let drive = Drive { speed_mps: 0.35, gap_s: 2.4, healthy_gap_s: 2.4, ..sound() };
     let wall =
@@ -179,11 +180,11 @@ fn only_two_causes_are_named_if_removing_two_of_three_suffices() {
     assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
 }
 
-/// A setting with a longer turn leaves passes farther apart.
+/// A range setting with a longer turn leaves passes farther apart.
 ///
 /// If this distance exceeds the target, the setting alone does not explain the fail.
 #[test]
-fn setting_is_a_cause_only_if_its_longer_turn_meets_the_target() {
+fn head_setting_is_a_cause_only_if_its_longer_turn_meets_the_target() {
     let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
     let drive = |turn: f64| Drive { other: other(turn), ..sound() };
     let far = |turn: f64| Wall {
@@ -228,7 +229,7 @@ fn cause_of_the_neighbouring_section_is_preferred_if_sufficient() {
         ..Wall::default()
     };
     assert_eq!(named(&wall(Cause::TooFast)), [Cause::TooFast]);
-    // Only factors that were present can be preferred.
+    // Only factors that were present in the section can be preferred.
     assert_eq!(named(&wall(Cause::Occluded)), [Cause::TooFast]);
 }
 
@@ -239,7 +240,8 @@ fn cause_has_the_same_word_in_text_and_json() {
     }
 }
 
-/// The fitting distance is driven in the time of all needed passes and of one ping.
+/// The largest speed that meets the target leaves time for a single pass. With losses, the same distance is
+/// driven in the time of all needed passes and one ping.
 #[test]
 fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
@@ -249,7 +251,7 @@ fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
-/// Checks the time between passes for each set of removed factors.
+/// Checks the expected time between passes for each set of removed factors.
 ///
 /// `drive` has this time as driven, as scheduled, without stalls, and at the planned speed.
 #[test]
@@ -287,8 +289,8 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
         let then = without(causes, all_turn);
         assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
     }
-    // A longer range doubles the time between passes. A finer mode takes half as long again. Both factors scale all
-    // times that depend on the turn period.
+    // A longer range doubles the time between passes, and a finer mode increases it by half. Both factors
+    // scale all times that depend on the turn period.
     for (causes, slower, finer) in [
         (&[Cause::OutOfRange][..], 2.0, 1.0),
         (&[Cause::AngularStep], 1.5, 0.5),
@@ -303,9 +305,9 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
     assert!(near(straight.swing_m, 0.0) && near(straight.t_y_m, 0.2) && near(straight.healthy_gap_s, 4.0));
 }
 
-/// With a target of 0.5 m and steps of 0.3 m along the wall, 0.4 m remain along the tunnel.
+/// With a target of 0.5 m and steps of 0.3 m along the wall, passes may be 0.4 m apart along the tunnel.
 #[test]
-fn drive_has_the_largest_fitting_speed_after_removing_the_speed_cause() {
+fn removing_the_speed_cause_lowers_the_speed_until_the_target_is_met() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
     // The vehicle drives 0.4 m in the time of one pass, 2 s, and one ping.
@@ -319,16 +321,17 @@ fn drive_has_the_largest_fitting_speed_after_removing_the_speed_cause() {
         (slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9,
         "the vehicle wasn't too fast"
     );
-    // If steps exceed the target, three tenths of the target remain along the tunnel.
+    // If steps exceed the target, passes may still be three tenths of the target apart.
     let coarse = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive };
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
 
-/// Passes 4 s apart at 0.1 m/s have the same distance as passes 2 s apart at the planned 0.2 m/s.
+/// Passes 4 s apart at 0.1 m/s have the same distance along the tunnel as passes 2 s apart at the planned 0.2
+/// m/s.
 ///
-/// The planned speed helps only if distances shrink by more than the factor `HELPS`.
+/// The planned speed helps only if it reduces this distance below the share `HELPS`.
 #[test]
-fn drive_has_the_planned_speed_after_removing_the_phase_cause_if_helpful() {
+fn removing_the_phase_cause_sets_the_planned_speed_if_that_shortens_gaps() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,

@@ -1,4 +1,4 @@
-//! A section's hole with some of the present factors removed.
+//! Computes the hole that a section would have with some of the present factors removed.
 
 use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unheard};
 use crate::cause::{Cause, Causes};
@@ -8,34 +8,37 @@ use crate::missing_samples::MissingSample;
 use crate::passage::Drive;
 use crate::store::SampleStore;
 use headrace_geometry::math;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
-/// Share of the target that the hole may use if the speed is corrected, because a plan keeps a margin.
+/// Share of the target that a hole may take up in the trial that removes the speed factor. A plan keeps the
+/// rest as a margin.
 const MARGIN: f64 = 0.85;
-/// Limits of the factor that scales the wall.
+/// Limits of the factor by which the wall is compressed or stretched.
 ///
 /// A finer step or a longer range takes longer per turn, which stretches the wall.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// Multiple of the target above which the remaining hole has a cause that is not present.
+/// If the hole exceeds this multiple of the target with all present factors removed, its cause is unknown.
 const AT_MOST: f64 = 1.3;
 /// Maximum number of halvings in the search for the hole with all missing samples put back.
 const SEARCHED: u32 = 5;
-/// If more than this share of the missing samples has remaining causes, these causes alone make a hole.
+/// Share of missing samples. If more than this share remains after some factors are removed, the remaining
+/// factors alone still cause a hole.
 const STAYS: f64 = 0.15;
-/// Maximum number of causes in a set.
+/// Maximum number of causes in a set that explains a fail.
 const MOST_NAMED: u32 = 3;
-/// Maximum number of sets tested.
+/// Maximum number of sets of causes tested per fail.
 const MOST_TRIED: u32 = 120;
 
-/// Computes holes with some of the factors removed.
+/// Computes the holes that a section would have with some factors removed.
 pub(super) struct Trial<'a> {
     case: &'a Case<'a>,
     drive: &'a Drive,
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// Factors that were present, and those of them that caused missing samples.
+    /// Factors that were present in the section, and those of them that caused missing samples.
     present: Causes,
     lacking: Causes,
     left: u32,
@@ -64,7 +67,7 @@ impl<'a> Trial<'a> {
         let lacking: Causes = lacking.into_iter().filter(|cause| present.has(*cause)).collect();
         let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
         let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
-        // Samples outside the hole don't shrink the hole if they are put back.
+        // Samples outside the hole can't shrink it when they are put back.
         let fills = |lack: &MissingSample| {
             lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
         };
@@ -74,11 +77,12 @@ impl<'a> Trial<'a> {
         Self { case, drive, seen, store, finder, present, left: MOST_TRIED, lacking, full_m, halvings }
     }
 
-    /// Smallest set of present factors without which the section would have met the target.
+    /// Smallest set of present factors without which the section would have passed.
     pub(super) fn smallest(&mut self) -> Causes {
         let silent = Causes::of(Cause::HeadSilent);
-        // If no head pinged, silence is a certain cause, and driving is none. Other causes remain possible,
-        // because even pinging heads might not have detected the wall.
+        // If no head pinged, the silence of the heads is a certain cause, and speed, step, swing and phase
+        // are not tested as causes. Other causes remain possible, because even pinging heads might not have
+        // detected the wall.
         let surely = if self.case.is_dark { silent } else { Causes::default() };
         if self.case.is_dark {
             let is_driven = |cause: &Cause| {
@@ -107,7 +111,7 @@ impl<'a> Trial<'a> {
         present
     }
 
-    /// Returns the set without `occluded` if the rest nearly suffices and wall is out of range.
+    /// Removes `occluded` from the set if the other causes nearly suffice and wall is out of range.
     ///
     /// With a longer range, heads still hide wall from each other, but other heads see that wall.
     fn less_occluded(&mut self, set: Causes) -> Causes {
@@ -116,7 +120,7 @@ impl<'a> Trial<'a> {
         if is_far && self.passes_without(rest, AT_MOST) { rest } else { set }
     }
 
-    /// Returns the single factor without which the section would have met the target.
+    /// Returns the single factor without which the section would have passed.
     ///
     /// If `surely` contains a certain factor, only that factor is tested.
     fn alone(&mut self, surely: Causes) -> Option<Causes> {
@@ -124,14 +128,15 @@ impl<'a> Trial<'a> {
             [Cause::NotPassed, Cause::HeadSilent, Cause::Phase, Cause::PositionLost].map(Causes::of);
         let is_short = self.is_short();
         let first = [
-            // If the wall was not passed, no other factor is known.
+            // If the heads have not swept the wall, nothing is known about any other factor.
             (true, not_passed),
-            // If heads never pinged, no other factor is known.
+            // If some heads never pinged, nothing is known about any other factor.
             (is_unheard(self.case, self.seen), silent),
-            // Speed is the easiest change, so it is named if the planned speed would have been enough.
+            // If the planned speed would have met the target, phase is named first: the fix is a change of
+            // speed, which is the easiest change.
             (!is_short && self.drive.is_slow_out_of_phase(1.0 / HELPS), phase),
         ];
-        // Factors that may only seem to explain the hole come last.
+        // Factors that would explain almost any hole are tested last.
         let last = [(self.is_only_adrift(), lost), (is_short, phase)];
         let present = self.present;
         let is_last = |set: &Causes| last.iter().any(|(is, last)| *is && set == last);
@@ -143,9 +148,8 @@ impl<'a> Trial<'a> {
         in_turn.filter(|set| set.is_within(present)).find(|set| self.passes_without(*set, 1.0))
     }
 
-    /// Whether a head is silent or has stalled.
-    ///
-    /// Without this head, the remaining heads are out of phase.
+    /// Whether a head is silent or stalled. The other heads then leave uneven gaps, as if they were out of
+    /// phase.
     fn is_short(&self) -> bool {
         self.present.has(Cause::HeadSilent) || self.present.has(Cause::HeadStalled)
     }
@@ -158,7 +162,7 @@ impl<'a> Trial<'a> {
         self.seen.adrift && !self.seen.unseen && !self.case.is_torn
     }
 
-    /// Returns the factors that every sufficient set contains.
+    /// Returns the factors that every set of causes must contain to explain the fail.
     ///
     /// Without any one of them, all other factors together don't suffice.
     fn needed(&mut self, present: Causes) -> Causes {
@@ -185,19 +189,19 @@ impl<'a> Trial<'a> {
         !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
     }
 
-    /// Lays out the wall with some factors removed, for the search for holes.
+    /// Lays out the wall as it would be with some factors removed, for the search for holes.
     fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &WallChanges) {
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
         let put_back = lacks
-            // The range includes samples that are mirrored later.
+            // The range includes samples that the mirroring of the wall needs later.
             .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
-            .map(|lack| [lack.x_m, lack.arc_m]);
+            .map(|lack| WallPoint { x_m: lack.x_m, arc_m: lack.arc_m });
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 
-    /// Whether all wall counts as covered if some factors are removed.
+    /// Whether all wall counts as covered once some factors are removed.
     ///
     /// True if the places of the missing samples of these factors are unknown.
     fn covers(&self, removed: Causes) -> bool {
@@ -206,9 +210,10 @@ impl<'a> Trial<'a> {
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
     }
 
-    /// Distance between neighbouring samples with some factors removed, m, from the movement alone.
+    /// Distance between neighbouring samples with some factors removed, m, computed from vehicle and head
+    /// movement alone.
     ///
-    /// Infinite if many samples are missing because of the remaining factors.
+    /// Infinite if the remaining factors cause many missing samples.
     fn stays_m(&self, removed: Causes) -> f64 {
         let Case { bounds_m, lacks, .. } = *self.case;
         let (mut all, mut stay) = (0_u32, 0_u32);
@@ -223,9 +228,9 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(then.along_m(), 0.0, then.t_y_m)
     }
 
-    /// Whether enough samples remain despite random losses, once the beams no longer swing.
+    /// Whether enough samples remain despite random losses once the beams no longer swing.
     ///
-    /// The wall is not compressed for such losses.
+    /// The compression of the wall doesn't allow for these losses.
     fn is_sampled_without(&self, removed: Causes, target_m: f64) -> bool {
         let is_lossy = self.present.less(removed).has(Cause::MissingReturns);
         if !is_lossy || !removed.has(Cause::OffAxis) {
@@ -250,7 +255,8 @@ impl<'a> Trial<'a> {
         [now, now.without(removed, MARGIN * self.case.target_m, all_turn)]
     }
 
-    /// Diameter of the hole that driving has to explain, with all missing samples put back, m.
+    /// Diameter of the hole with all missing samples put back, m. The remaining factors must explain a hole
+    /// of this size.
     ///
     /// The diameter is only as exact as the comparison with the two bounds requires.
     fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
@@ -273,9 +279,9 @@ impl<'a> Trial<'a> {
         self.full_m[1]
     }
 
-    /// Stretch where samples may still land, for which the wall is mirrored.
+    /// Stretch where samples may still land, into which the wall is mirrored.
     ///
-    /// `None` if the hole extends beyond the passed stretch, where the wall is not mirrored.
+    /// `None` if not every live head has swept the hole. The wall is then not mirrored.
     fn to_come(&self) -> Option<Reach> {
         self.case.to_come.filter(|_| is_passed(self.case))
     }
@@ -301,7 +307,8 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // The driving figures are those of a single moment, so the size of the hole limits their effect.
+        // The driving figures are those of a single moment, so the size of the hole limits the effect
+        // computed from them.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

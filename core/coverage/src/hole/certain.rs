@@ -1,17 +1,18 @@
-//! Early fail before the hole is final: an empty circle lies wholly where no more samples can land.
+//! Early fail, before the hole is final. It needs a large empty circle that lies wholly where no more samples
+//! can land.
 
 use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 
-/// Search resolution, m: a circle with a margin below this to the required radius may be missed.
+/// Resolution of the search, m. A circle that exceeds the required radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
-/// Required radius of a circle, as a function of the arc length of its centre.
+/// Required radius of an empty circle, as a function of the arc length of its centre.
 pub struct Needed<'a> {
     /// Required radius at an arc length, m.
     pub radius_m: &'a dyn Fn(f64) -> f64,
-    /// Largest required radius, m.
+    /// Largest required radius at any arc length, m.
     pub most_m: f64,
     /// Largest change of the required radius with arc length, m/m.
     pub slope: f64,
@@ -20,9 +21,9 @@ pub struct Needed<'a> {
 impl HoleFinder {
     /// Whether a circle of the required radius, centred between two chainages, is certain to remain empty.
     ///
-    /// The circle holds no sample and lies outside each of `reaches`: where samples may still land, or where not all
-    /// heads have been. The distance to the nearest sample or to the reach is 1-Lipschitz. As in the search for
-    /// holes, tiles whose bound is too small are dropped and the others are halved.
+    /// The circle holds no sample and lies outside each of `reaches`: where samples may still land, or where
+    /// some heads have not been. The distance to the nearest sample or to the reach is 1-Lipschitz. As in the
+    /// search for holes, tiles whose bound is too small are dropped and the others are halved.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle(
@@ -96,7 +97,7 @@ mod tests {
                 });
                 nearest.fold(f64::INFINITY, f64::min).min(reach_m - x_m)
             };
-            // The radius grows with arc length up to the opposite side, and then decreases.
+            // The required radius grows with arc length up to the opposite side, and then decreases.
             let radius_m = |arc_m: f64| radius_m + slope * arc_m.min(PERIMETER_M - arc_m);
             let places = (0..=25).flat_map(|i| (0..600).map(move |k| {
                 (1.0 + 0.01 * f64::from(i), 0.01 * f64::from(k))
@@ -105,7 +106,8 @@ mod tests {
             let most_m = radius_m(PERIMETER_M / 2.0);
             let needed = Needed { radius_m: &radius_m, most_m, slope };
             let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), [reach, None], &needed);
-            // The error of the grid is at most 5 mm in each direction, that of the search 1 mm.
+            // The error of the brute-force grid is at most 5 mm in each direction, and that of the search 1
+            // mm.
             prop_assert!(!found || best_m + 0.009 > 0.0, "found, there is {best_m}");
             prop_assert!(found || best_m <= 0.0022, "not found, there is {best_m}");
         }

@@ -1,4 +1,4 @@
-//! A tile divided into the Voronoi cells of its samples.
+//! A tile of wall divided into the Voronoi cells of its samples.
 //!
 //! Each share is a convex polygon. The distance from the share's sample is largest at a corner.
 
@@ -6,25 +6,25 @@
 ///
 /// With more samples, the tile is halved instead.
 pub(super) const MAX_OWNERS: usize = 24;
-/// Maximum number of corners of a share; with more corners, the tile is halved instead.
+/// Maximum number of corners of a sample's share of the tile. With more corners, the tile is halved instead.
 const MAX_CORNERS: usize = 12;
 
-/// A share of a tile.
+/// Share of a tile: the Voronoi cell of one sample, clipped to the tile.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Share {
-    /// Sample of the share, relative to the tile's centre, m.
+    /// Sample to which the share belongs, relative to the tile's centre, m.
     pub owner: (f64, f64),
-    /// Corners relative to the share's sample, where differences of nearby points are exact, m.
+    /// Corners relative to the sample of the share, where differences of nearby points are exact, m.
     corners: [(f64, f64); MAX_CORNERS],
     len: usize,
-    /// Squared distance of the farthest corner from the sample; zero for an empty share.
+    /// Squared distance of the share's farthest corner from the sample; zero for an empty share.
     pub farthest2: f64,
-    /// The farthest corner.
+    /// The corner farthest from the sample.
     pub farthest: (f64, f64),
 }
 
 impl Share {
-    /// Returns the whole tile with these half edges as the share of one sample.
+    /// Returns the share of a tile's only sample: the whole tile, whose half edges are given.
     fn whole(owner: (f64, f64), (half_x, half_arc): (f64, f64)) -> Self {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
         let (low, high) = (-owner.1 - half_arc, -owner.1 + half_arc);
@@ -36,7 +36,7 @@ impl Share {
         share
     }
 
-    /// Adds a corner; returns false if there are too many corners.
+    /// Adds a corner to the share; returns false if there are too many corners.
     fn push(&mut self, corner: (f64, f64)) -> bool {
         let Some(place) = self.corners.get_mut(self.len) else { return false };
         *place = corner;
@@ -48,7 +48,7 @@ impl Share {
         true
     }
 
-    /// Clips the share to the points nearer to its sample than to a rival.
+    /// Clips the share to the points nearer to its own sample than to another sample, the rival.
     ///
     /// Returns false if there are too many corners.
     fn clip(&mut self, rival: (f64, f64)) -> bool {
@@ -114,14 +114,15 @@ impl Division {
         self.shares.push(Share::whole(owner, half_edges));
     }
 
-    /// Returns the share with the farthest corner.
+    /// Returns the share whose corner is farthest from its sample.
     pub(super) fn worst(&self) -> Option<&Share> {
         self.shares.iter().max_by(|a, b| a.farthest2.total_cmp(&b.farthest2))
     }
 
     /// Adds the share of a sample.
     ///
-    /// Returns false if the sample already has a share or there is no room for another: the tile is too large.
+    /// Returns false if the sample already has a share, or if there is no room for another. The tile must
+    /// then be halved.
     pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
         let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
         if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {

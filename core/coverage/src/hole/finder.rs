@@ -7,16 +7,17 @@ use super::window::{Nearest, Window};
 use crate::store::SampleStore;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
+use headrace_geometry::tunnel::WallPoint;
 
-/// Maximum search radius, m: wall farther than this from any sample counts as not passed.
+/// Maximum search radius, m. Wall farther than this from every sample counts as wall that no head has swept.
 pub const FARTHEST_M: f64 = 12.0;
-/// Half diagonal below which a tile isn't halved, m.
+/// Half diagonal below which a tile isn't halved any further, m.
 ///
 /// The bound of such a tile is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
-/// Upper limit of the rounding error of a distance, m.
+/// Upper limit of the rounding error of a computed distance, m.
 const ROUNDING_M: f64 = 1e-9;
-/// Value of `owner` for a tile without a known sample.
+/// Value of `owner` for a tile whose nearest sample isn't known.
 pub(super) const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance with which a corner's bound counts as proven, m.
 const PROVEN_M: f64 = 1e-11;
@@ -30,9 +31,9 @@ pub struct Hole {
     pub least_m: f64,
     /// Upper bound of D, m; infinite if the hole is not `bounded`.
     pub most_m: f64,
-    /// Chainage of the centre, m.
+    /// Chainage of the circle's centre, m.
     pub x_m: f64,
-    /// Arc length of the centre, m.
+    /// Arc length of the circle's centre, m.
     pub arc_m: f64,
     /// Whether there are samples around the hole.
     ///
@@ -52,7 +53,7 @@ impl Hole {
             && arc_m >= 0.0
     }
 
-    /// Whether two holes differ by less than a centimetre in every respect.
+    /// Whether two holes differ by less than a centimetre in size and place.
     pub fn is_like(&self, other: &Self) -> bool {
         const LITTLE_M: f64 = 0.01;
         let grown_m = (self.diameter_m - other.diameter_m).abs();
@@ -73,33 +74,29 @@ pub(super) struct Tile {
     /// The searches for an empty circle of given size use it differently. They store the chainage and arc
     /// length of any nearby sample, with the chainage from the start of the section.
     pub(super) owner: (f64, f64),
-    /// Upper bound of f in the tile, m.
+    /// Upper bound of f, the distance to the nearest sample, in the tile, m.
     pub(super) bound_m: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Best {
     distance_m: f64,
-    x_m: f64,
-    arc_m: f64,
-    /// Largest bound of the dropped tiles, m.
+    at: WallPoint,
+    /// Largest upper bound among the dropped tiles, m.
     dropped_m: f64,
 }
 
 /// A point without a sample within the search radius.
 #[derive(Debug, Clone, Copy)]
-struct Beyond {
-    x_m: f64,
-    arc_m: f64,
-}
+struct Beyond(WallPoint);
 
-/// Search result near the centre of a tile.
+/// Result of searching for a sample near the centre of a tile.
 pub(super) enum Near {
-    /// No empty circle has its centre in the tile: one sample is within the radius of all its points.
+    /// No empty circle has its centre in the tile: one sample is within the radius of all points of the tile.
     Settled,
-    /// The nearest sample, or an equally near one.
+    /// The sample nearest to the centre, or an equally near one.
     Sample(Nearest),
-    /// No sample within reach.
+    /// No sample within the search radius.
     Nothing,
 }
 
@@ -115,7 +112,12 @@ impl Near {
 }
 
 impl Tile {
-    /// Half diagonal, m.
+    /// Centre of the tile, with the chainage from the start of the section.
+    pub(super) fn centre(&self) -> WallPoint {
+        WallPoint { x_m: self.x_m, arc_m: self.arc_m }
+    }
+
+    /// Half diagonal of the tile, m.
     pub(super) fn half_m(&self) -> f64 {
         math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
     }
@@ -146,7 +148,7 @@ impl Tile {
             return Near::Settled;
         }
         let within_m = within_m.min(owner_m + ROUNDING_M);
-        window.near_enough(self.x_m, self.arc_m, within_m, enough_m).map_or(Near::Nothing, Near::Sample)
+        window.near_enough(self.centre(), within_m, enough_m).map_or(Near::Nothing, Near::Sample)
     }
 
     /// Returns the halves of a tile. Their `owner` becomes the nearest sample, if one is within reach.
@@ -180,11 +182,11 @@ pub(super) fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item
     })
 }
 
-/// Finds the largest hole of a stretch of wall; searches share their working memory.
+/// Finds the largest hole of a stretch of wall. All searches share the working memory of this finder.
 #[derive(Debug)]
 pub struct HoleFinder {
     tolerance_m: f64,
-    /// Radius of the last hole, m: the first guess for the next search.
+    /// Radius of the last hole found, m: the first guess for the next search.
     last_m: f64,
     /// Radius of the largest circle for which the changed wall was last laid out, m.
     pub(super) laid_m: f64,
@@ -250,14 +252,14 @@ impl HoleFinder {
     ///
     /// Errors: a point has no sample within `reach_m`.
     fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
-        let mut best = Best { distance_m: 0.0, x_m: 0.0, arc_m: 0.0, dropped_m: 0.0 };
+        let mut best = Best { distance_m: 0.0, at: WallPoint::default(), dropped_m: 0.0 };
         self.tiles.clear();
-        // A good first guess saves most of the work. All tiles' centres are evaluated before any tile is divided, and
-        // the tile with the largest bound is divided first.
+        // A good first guess at the hole saves most of the work. All tiles' centres are evaluated before any
+        // tile is divided, and the tile with the largest bound is divided first.
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
-            // f is 1-Lipschitz.
+            // f is 1-Lipschitz, and the next tile's centre is one tile edge away. This bounds its search.
             within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_arc_m + 1e-6;
             self.tiles.push(tile);
         }
@@ -292,16 +294,17 @@ impl HoleFinder {
             }
             let x_m = tile.x_m + (worst.owner.0 + worst.farthest.0);
             let arc_m = tile.arc_m + (worst.owner.1 + worst.farthest.1);
-            let Some(found) = self.window.nearest(x_m, arc_m, bound_m.min(reach_m)) else {
+            let corner = WallPoint { x_m, arc_m };
+            let Some(found) = self.window.nearest(corner, bound_m.min(reach_m)) else {
                 if bound_m > reach_m {
-                    return Err(Beyond { x_m, arc_m });
+                    return Err(Beyond(corner));
                 }
-                // The owner of the share is the nearest sample, except for rounding.
-                best.take(bound_m, x_m, arc_m);
+                // The owner of the share is the nearest sample to the farthest corner, except for rounding.
+                best.take(bound_m, corner);
                 return Ok(true);
             };
             let distance_m = math::sqrt(found.distance2);
-            best.take(distance_m, x_m, arc_m);
+            best.take(distance_m, corner);
             if distance_m >= bound_m - PROVEN_M {
                 best.dropped_m = best.dropped_m.max(bound_m);
                 return Ok(true);
@@ -324,8 +327,8 @@ impl HoleFinder {
             diameter_m,
             least_m: if self.window.overfull { 0.0 } else { least_m.max(0.0) },
             most_m: 2.0 * (radius_m + fidelity.moved_m),
-            x_m: self.window.chainage_m(best.x_m),
-            arc_m: math::wrap(best.arc_m, self.window.perimeter_m()),
+            x_m: self.window.chainage_m(best.at.x_m),
+            arc_m: math::wrap(best.at.arc_m, self.window.perimeter_m()),
             bounded: true,
         };
         debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");
@@ -335,43 +338,42 @@ impl HoleFinder {
 }
 
 impl Best {
-    /// Whether the point lies in a section of this length, within the search radius of a sample.
+    /// Whether a point lies in a section of this length, within the search radius of a sample.
     fn is_within(&self, length_m: f64) -> bool {
-        let is_inside = (-ROUNDING_M..=length_m + ROUNDING_M).contains(&self.x_m);
+        let is_inside = (-ROUNDING_M..=length_m + ROUNDING_M).contains(&self.at.x_m);
         is_inside && (0.0..=FARTHEST_M + ROUNDING_M).contains(&self.distance_m)
     }
 
-    fn take(&mut self, distance_m: f64, x_m: f64, arc_m: f64) {
+    fn take(&mut self, distance_m: f64, at: WallPoint) {
         if distance_m > self.distance_m {
-            *self = Self { distance_m, x_m, arc_m, ..*self };
+            *self = Self { distance_m, at, ..*self };
         }
     }
 }
 
 /// Evaluates a tile's centre: sets its owner and bound, and updates the best point.
 fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Result<Tile, Beyond> {
-    let beyond = Beyond { x_m: tile.x_m, arc_m: tile.arc_m };
-    let found = window.nearest(tile.x_m, tile.arc_m, within_m).ok_or(beyond)?;
-    best.take(math::sqrt(found.distance2), tile.x_m, tile.arc_m);
+    let found = window.nearest(tile.centre(), within_m).ok_or(Beyond(tile.centre()))?;
+    best.take(math::sqrt(found.distance2), tile.centre());
     let owner = tile.relative(&found, window.perimeter_m());
     let (dx, darc) = (owner.0.abs() + tile.half_x_m, owner.1.abs() + tile.half_arc_m);
     let bound_m = tile.bound_m.min(math::sqrt(dx * dx + darc * darc));
     Ok(Tile { owner, bound_m, ..tile })
 }
 
-/// Cell size for a search radius, m.
+/// Cell size that suits a search radius, m.
 pub(super) fn cell_m(reach_m: f64) -> f64 {
     (reach_m / 3.0).clamp(0.05, 0.5)
 }
 
-fn unbounded(window: &Window, beyond: &Beyond) -> Hole {
+fn unbounded(window: &Window, Beyond(at): &Beyond) -> Hole {
     let diameter_m = 2.0 * FARTHEST_M;
     Hole {
         diameter_m,
         least_m: diameter_m,
         most_m: f64::INFINITY,
-        x_m: window.chainage_m(beyond.x_m),
-        arc_m: math::wrap(beyond.arc_m, window.perimeter_m()),
+        x_m: window.chainage_m(at.x_m),
+        arc_m: math::wrap(at.arc_m, window.perimeter_m()),
         bounded: false,
     }
 }

@@ -5,16 +5,18 @@
 use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
+use headrace_geometry::tunnel::WallPoint;
 
-/// Search resolution as a share of the radius: a circle larger by less than this share may be missed.
+/// Search resolution as a share of the circle's radius. A circle whose radius exceeds the required one by
+/// less than this may be missed.
 const FINE: f64 = 0.01;
 
 /// Hypothetical changes to the wall.
 #[derive(Debug, Clone, Copy)]
 pub struct WallChanges {
-    /// Factor on distances along the tunnel, above 0 and at most 1.
+    /// Factor by which distances along the tunnel are multiplied, above 0 and at most 1.
     pub along: f64,
-    /// Factor on distances around the perimeter.
+    /// Factor by which distances around the perimeter are multiplied.
     pub around: f64,
     /// Stretches whose wall counts as covered.
     pub covered: [Option<Reach>; 4],
@@ -25,7 +27,7 @@ pub struct WallChanges {
 }
 
 impl WallChanges {
-    /// No change.
+    /// Wall without any change.
     pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
     /// Distance of a chainage from wall that counts as covered or where samples may still land, m.
@@ -43,7 +45,7 @@ impl WallChanges {
 
 /// Returns a stretch and its mirror image, in ascending order.
 ///
-/// If they meet, they are joined to one stretch. A gap between them belongs to neither.
+/// If the two stretches meet, they are joined. A gap between them belongs to neither.
 fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
     let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
     if image_m[0] > to_m {
@@ -58,7 +60,7 @@ fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 
 impl HoleFinder {
     /// Lays out the wall with the changes `otherwise` and the additional samples `more`.
     ///
-    /// `more` contains chainage and arc length, m. The layout suffices for circles of up to `radius_m` centred
+    /// `more` contains further samples. The layout suffices for circles of up to `radius_m` centred
     /// between two chainages. Samples of visits from `first_visit` on count.
     ///
     /// Allocates: never.
@@ -68,7 +70,7 @@ impl HoleFinder {
         (from_m, to_m): (f64, f64),
         radius_m: f64,
         otherwise: &WallChanges,
-        more: impl Iterator<Item = [f64; 2]>,
+        more: impl Iterator<Item = WallPoint>,
     ) {
         self.laid_m = radius_m;
         let window = &mut self.window;
@@ -82,31 +84,30 @@ impl HoleFinder {
         let reach_m = radius_m + length_m;
         window.begin(perimeter_m, from_m, (-reach_m, length_m + reach_m), cell_m(radius_m));
         let mirror_m = otherwise.mirror_m();
-        let mut take = |x_m: f64, arc_m: f64| {
-            window.push((x_m - from_m) * along, arc_m * around);
+        let mut take = |WallPoint { x_m, arc_m }: WallPoint| {
+            window.push(WallPoint { x_m: (x_m - from_m) * along, arc_m: arc_m * around });
             if let Some(mirror_m) = mirror_m {
-                window.push((2.0 * mirror_m - x_m - from_m) * along, arc_m * around);
+                let x_m = (2.0 * mirror_m - x_m - from_m) * along;
+                window.push(WallPoint { x_m, arc_m: arc_m * around });
             }
         };
         let ends_m = [from_m - reach_m / along, to_m + reach_m / along];
         let stretches_m = mirror_m.map_or([Some(ends_m), None], |mirror_m| with_mirrored(ends_m, mirror_m));
         for [least_m, most_m] in stretches_m.into_iter().flatten() {
-            store.each_between(least_m, most_m, |x_m, arc_m, visit| {
+            store.each_between(least_m, most_m, |at, visit| {
                 if visit >= first_visit {
-                    take(x_m, arc_m);
+                    take(at);
                 }
             });
         }
-        for [x_m, arc_m] in more {
-            take(x_m, arc_m);
-        }
+        more.for_each(take);
         window.sort();
     }
 
     /// Whether a circle of `radius_m` centred between two chainages holds no sample.
     ///
-    /// The search uses the wall laid out by [`lay_otherwise`](Self::lay_otherwise), which must have allowed for
-    /// circles at least this large.
+    /// The search uses the wall laid out by [`lay_otherwise`](Self::lay_otherwise), which must have been
+    /// called for circles at least this large.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle_otherwise(
@@ -148,7 +149,7 @@ mod tests {
         is_in: impl Fn(u32, u32) -> bool,
         radius_m: f64,
         otherwise: &WallChanges,
-        more: &[[f64; 2]],
+        more: &[WallPoint],
     ) -> bool {
         let layout = StoreLayout { perimeter_m: 10.0, from_m: 0.0, to_m: 10.0, cell_m: 0.25, capacity: 1000 };
         let mut store = SampleStore::new(layout);
@@ -163,18 +164,18 @@ mod tests {
     }
 
     #[test]
-    fn added_samples_fill_the_hole() {
+    fn hypothetically_added_samples_fill_the_hole() {
         let gone = |i: u32, k: u32| !(i == 10 && k == 4);
         let hole_m = 0.5;
         assert!(has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[]));
         assert!(!has(gone, 1.03 * hole_m, &WallChanges::NOTHING, &[]));
-        assert!(!has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[[5.0, 2.0]]));
+        assert!(!has(gone, 0.99 * hole_m, &WallChanges::NOTHING, &[WallPoint { x_m: 5.0, arc_m: 2.0 }]));
     }
 
     #[test]
-    fn compressing_the_wall_makes_holes_smaller() {
+    fn hypothetically_compressed_wall_has_smaller_holes() {
         let all = |_, _| true;
-        // The radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
+        // The hole's radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
         for (otherwise, radius_m) in [
             (WallChanges::NOTHING, 0.3535),
             (WallChanges { along: 0.5, ..WallChanges::NOTHING }, 0.2795),
@@ -198,7 +199,8 @@ mod tests {
 
     #[test]
     fn wall_is_mirrored_into_the_stretch_not_yet_sampled() {
-        // On a compressed wall, a circle at the end of the samples extends ahead, where nothing has landed yet.
+        // On a compressed wall, a circle at the end of the samples extends ahead, into wall where nothing has
+        // landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
         let to_come = Some(Reach { from_m: 5.25, to_m: f64::INFINITY });
@@ -211,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn mirroring_a_stretch_gives_two_stretches_without_their_gap() {
+    fn mirrored_stretch_and_original_exclude_the_gap_between_them() {
         let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
             assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
         };

@@ -2,18 +2,12 @@
 
 use crate::store::SampleStore;
 use headrace_geometry::math;
+use headrace_geometry::tunnel::WallPoint;
 
-/// Maximum number of samples.
+/// Maximum number of samples in a window.
 const ROOM: usize = 1 << 20;
-/// Maximum number of cells.
+/// Maximum number of cells in a window.
 const CELLS: usize = 1 << 20;
-
-/// Sample position: chainage from the window's origin, and arc length, m.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Spot {
-    x_m: f64,
-    arc_m: f64,
-}
 
 /// The sample nearest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,13 +22,13 @@ pub(super) struct Nearest {
     pub distance2: f64,
 }
 
-/// A stretch of wall with all its samples.
+/// A window: a stretch of wall with all its samples, sorted into cells.
 #[derive(Debug)]
 pub(super) struct Window {
     perimeter_m: f64,
-    /// Chainage of the origin, m.
+    /// Chainage of the window's origin, m.
     origin_m: f64,
-    /// Distance of the first row from the origin, m.
+    /// Distance of the first row of cells from the origin, m.
     from_m: f64,
     cell_m: f64,
     column_m: f64,
@@ -44,9 +38,10 @@ pub(super) struct Window {
     columns: usize,
     /// Start index of each cell's samples, row by row, with an additional entry at the end.
     begins: Vec<u32>,
-    spots: Vec<Spot>,
-    unsorted: Vec<(u32, Spot)>,
-    /// Whether there were more samples than fit.
+    /// Samples by cell, with the chainage from the window's origin.
+    spots: Vec<WallPoint>,
+    unsorted: Vec<(u32, WallPoint)>,
+    /// Whether there were more samples than the window can hold.
     pub overfull: bool,
 }
 
@@ -70,7 +65,8 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Loads all samples between two chainages relative to `origin_m` into cells of about `cell_m`.
+    /// Loads into the window all samples between two chainages relative to `origin_m`. Cells are about
+    /// `cell_m` long.
     ///
     /// Samples of visits from `first_visit` on count.
     ///
@@ -83,9 +79,9 @@ impl Window {
         cell_m: f64,
     ) {
         self.begin(store.perimeter_m(), origin_m, (from_m, to_m), cell_m);
-        store.each_between(origin_m + from_m, origin_m + to_m, |x_m, arc_m, visit| {
+        store.each_between(origin_m + from_m, origin_m + to_m, |at, visit| {
             if visit >= first_visit {
-                self.push(x_m - origin_m, arc_m);
+                self.push(WallPoint { x_m: at.x_m - origin_m, ..at });
             }
         });
         self.sort();
@@ -103,9 +99,9 @@ impl Window {
     /// Adds a sample unless it lies outside the window.
     ///
     /// The sample's chainage is relative to the window's origin.
-    pub(super) fn push(&mut self, x_m: f64, arc_m: f64) {
+    pub(super) fn push(&mut self, spot: WallPoint) {
         let [_, per_row, per_column] = self.per_m;
-        let row = (x_m - self.from_m) * per_row;
+        let row = (spot.x_m - self.from_m) * per_row;
         if !(0.0..self.rows as f64).contains(&row) {
             return;
         }
@@ -113,11 +109,11 @@ impl Window {
             self.overfull = true;
             return;
         }
-        let cell = whole(row) * self.columns + whole(arc_m * per_column).min(self.columns - 1);
+        let cell = whole(row) * self.columns + whole(spot.arc_m * per_column).min(self.columns - 1);
         if let Some(count) = self.begins.get_mut(cell + 2) {
             *count += 1;
         }
-        self.unsorted.push((u32::try_from(cell).unwrap_or(u32::MAX), Spot { x_m, arc_m }));
+        self.unsorted.push((u32::try_from(cell).unwrap_or(u32::MAX), spot));
     }
 
     fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
@@ -144,7 +140,7 @@ impl Window {
             *begin = sum;
         }
         self.spots.clear();
-        self.spots.resize(self.unsorted.len(), Spot::default());
+        self.spots.resize(self.unsorted.len(), WallPoint::default());
         for (cell, spot) in &self.unsorted {
             let Some(next) = self.begins.get_mut(*cell as usize + 1) else {
                 debug_assert!(false, "cell {cell} is one of {} x {}", self.rows, self.columns);
@@ -164,7 +160,7 @@ impl Window {
         );
     }
 
-    /// Whether the last cell ends with the last sample, which is so if all samples lie in cells.
+    /// Whether the last cell ends with the last sample. This is true if all samples lie in cells.
     fn is_sorted(&self) -> bool {
         self.begins.iter().rev().take(2).all(|end| *end as usize == self.spots.len())
     }
@@ -174,29 +170,29 @@ impl Window {
         self.origin_m + x_m
     }
 
-    /// Perimeter, m.
+    /// Perimeter of the wall, m.
     pub(super) fn perimeter_m(&self) -> f64 {
         self.perimeter_m
     }
 
     /// Returns the sample nearest to a point within `within_m`; among equally near samples, the first found.
-    pub(super) fn nearest(&self, x_m: f64, arc_m: f64, within_m: f64) -> Option<Nearest> {
-        self.near(x_m, arc_m, within_m, -1.0)
+    pub(super) fn nearest(&self, to: WallPoint, within_m: f64) -> Option<Nearest> {
+        self.near(to, within_m, -1.0)
     }
 
     /// Returns the sample nearest to a point within `within_m`, or any sample within `enough_m`.
-    pub(super) fn near_enough(&self, x_m: f64, arc_m: f64, within_m: f64, enough_m: f64) -> Option<Nearest> {
+    pub(super) fn near_enough(&self, to: WallPoint, within_m: f64, enough_m: f64) -> Option<Nearest> {
         let enough2 = if enough_m > 0.0 { enough_m * enough_m } else { -1.0 };
-        self.near(x_m, arc_m, within_m, enough2)
+        self.near(to, within_m, enough2)
     }
 
-    fn near(&self, x_m: f64, arc_m: f64, within_m: f64, enough2: f64) -> Option<Nearest> {
+    fn near(&self, WallPoint { x_m, arc_m }: WallPoint, within_m: f64, enough2: f64) -> Option<Nearest> {
         let [per_turn, per_row, _] = self.per_m;
         let turn = libm::floor(arc_m * per_turn);
         let arc_m = arc_m - turn * self.perimeter_m;
         let mut best = Search { x_m, arc_m, limit2: within_m * within_m, enough2, found: None };
         let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
-        // The search proceeds outwards from the point's row, by one row to either side at a time.
+        // The search begins in the point's row and proceeds by one row on either side at a time.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
             if best.is_enough() {
@@ -217,12 +213,12 @@ impl Window {
         Some(Nearest { x_m: spot.x_m, arc_m: spot.arc_m, turns, distance2: best.limit2 })
     }
 
-    /// Searches a row near a point; returns false if the whole row is out of range.
+    /// Searches a row of cells near a point; returns false if the whole row is out of range.
     fn look_in_row(&self, row: usize, best: &mut Search) -> bool {
         let low = self.from_m + row as f64 * self.cell_m - best.x_m;
         let away = low.max(-(low + self.cell_m)).max(0.0);
         let width2 = best.limit2 - away * away;
-        // The margin allows for rounding of the row's edges.
+        // The margin allows for rounding of the row's edge coordinates.
         if width2 < -1e-9 {
             return false;
         }
@@ -251,13 +247,13 @@ impl Window {
         true
     }
 
-    /// Returns the samples of a range of cells in a row.
-    fn spots(&self, from: usize, to: usize) -> &[Spot] {
+    /// Returns the samples of a range of cells in a row of the window.
+    fn spots(&self, from: usize, to: usize) -> &[WallPoint] {
         let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return &[] };
         self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
     }
 
-    /// Searches a range of cells in a row, shifted by whole turns.
+    /// Searches a range of cells in a row, shifted by whole turns round the perimeter.
     fn look_at(&self, from: usize, to: usize, turns: f64, best: &mut Search) {
         let arc_m = best.arc_m - turns * self.perimeter_m;
         for spot in self.spots(from, to) {
@@ -295,12 +291,12 @@ struct Search {
     limit2: f64,
     /// Squared distance below which the search stops, m2.
     enough2: f64,
-    found: Option<(Spot, f64)>,
+    found: Option<(WallPoint, f64)>,
 }
 
 impl Search {
-    /// Keeps a sample if it is nearer than the one found, and returns whether it is.
-    fn takes(&mut self, spot: &Spot, turns: f64, distance2: f64) -> bool {
+    /// Keeps a sample if it is nearer than the nearest one found so far, and returns whether it is.
+    fn takes(&mut self, spot: &WallPoint, turns: f64, distance2: f64) -> bool {
         let is_nearer = distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none());
         if is_nearer {
             (self.limit2, self.found) = (distance2, Some((*spot, turns)));
@@ -308,7 +304,7 @@ impl Search {
         is_nearer
     }
 
-    /// Whether the found sample is near enough to stop the search.
+    /// Whether the sample found is near enough to stop the search.
     fn is_enough(&self) -> bool {
         self.limit2 <= self.enough2 && self.found.is_some()
     }

@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs, with the section states against which they are checked.
+/// Runs under test, together with the section states that they must match.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -29,7 +29,7 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        // No speed helps against holes of a metre or more.
+        // No speed helps against holes of a metre or more in this test.
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
@@ -146,7 +146,7 @@ fn most_frequent_cause_of_a_run_is_its_main_cause() {
 }
 
 #[test]
-fn run_splits_when_its_middle_passes_and_the_first_part_keeps_the_number() {
+fn run_splits_when_its_middle_sections_pass_and_the_first_part_keeps_the_number() {
     let mut rig = Rig::new();
     for section in 0..9 {
         rig.say(section, Some(Cause::MissingReturns), 0.6 + 0.1 * section as f64);
@@ -173,7 +173,7 @@ proptest! {
             let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(lost)];
             rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
-        // Many changes may exhaust the run numbers. Some sections then have no run.
+        // Many changes may exhaust the run numbers, which leaves some sections without a run.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
             rig.check();
         }

@@ -1,7 +1,7 @@
 //! Decides which sections are due for judging.
 //!
-//! A section is due if the heads have left it, or if a part of it may certainly fail. At the end of a dive, a
-//! section is due if its verdict may still change.
+//! During the dive, a section is due if the heads have left it, or if a part of it may already be certain to
+//! fail. At the end of a dive, a section is due if its verdict may still change.
 
 use super::section_table::{Ended, Judging, LOOK_AT_ONCE, Request, Sections, clamp};
 use crate::frontier::{Moved, Outlook, Reach, clear_of};
@@ -15,17 +15,17 @@ use headrace_geometry::math;
 const LOOK_M: f64 = 0.125;
 
 impl Sections {
-    /// Whether the heads have moved far enough for sections to be due.
+    /// Whether the heads have moved far enough for some sections to be due for judging.
     pub fn may_be_due(&self, moved: &Moved) -> bool {
         let [behind_m, ahead_m] = self.next_look_m;
         let is_due = |reach: Reach| reach.from_m >= behind_m || reach.to_m <= ahead_m;
         !moved.is_nothing() || moved.to_come.is_some_and(is_due)
     }
 
-    /// Sets the next places to check.
+    /// Sets the chainages at which the heads' movement causes the next check.
     ///
-    /// A check is due each time the heads have left a further part of a section: behind the vehicle, or ahead of a
-    /// vehicle that goes back.
+    /// A check is due each time the heads have left a further part of a section. This part lies behind the
+    /// vehicle, or ahead of a vehicle that goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -40,8 +40,8 @@ impl Sections {
 
     /// Calls `ask` for every section of the coverage extent that is due after the heads have moved.
     ///
-    /// A section is due if it left the zone or was never in it, if its hole can get no more samples, or if a part of
-    /// it may certainly fail.
+    /// A section is due if it left the zone or was never in it, if its hole can get no more samples, or if a
+    /// part of it may already be certain to fail.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -62,12 +62,12 @@ impl Sections {
             }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        // The heads may have left only a part of the sections at the zone's ends.
+        // The heads may have moved past only a part of the sections at the zone's ends.
         let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {
             for index in clamp(range, &way) {
-                let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
+                let target = self.target;
                 let bounds_m = self.bounds_m(index);
                 let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
                 let may_fail = !section.is_flagged() && section.verdict == Verdict::Open;
@@ -86,8 +86,8 @@ impl Sections {
                 };
                 let clear_m = clear_of(moved.to_come, hole.x_m);
                 let left_m = hole.least_m.min(2.0 * clear_m);
-                let fails =
-                    section.verdict == Verdict::Open && left_m - confidence_sd * section.hole_sd_m > target_m;
+                let fails = section.verdict == Verdict::Open
+                    && left_m - target.error_m(section.hole_sd_m) > target.max_hole_m;
                 if fails || clear_m >= hole.diameter_m / 2.0 {
                     ask(ask_for(index));
                 } else if may_fail {
@@ -99,9 +99,9 @@ impl Sections {
 
     /// Calls `ask` for sections in reach of a vehicle that is nearly stationary.
     ///
-    /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is due if it
-    /// may certainly fail although its hole may still get samples, or if it is flagged and has new samples since it
-    /// was judged.
+    /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is
+    /// due if it may be certain to fail although its hole may still get samples, or if it is flagged and has
+    /// new samples since it was judged.
     ///
     /// Allocates: never.
     pub fn look_around(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -119,21 +119,22 @@ impl Sections {
         }
     }
 
-    /// Whether a section already has an empty circle that is too large for the target, including the errors.
+    /// Whether a section already has an empty circle that exceeds the target by more than the errors.
     ///
-    /// All heads have passed the circle, and no more samples will land in it.
+    /// All heads have been at the circle, and no more samples will land in it.
     pub(super) fn fails_already(&self, request: &Request, judging: &mut Judging<'_>) -> bool {
         let Judging { store, finder, profile, .. } = judging;
         let Request { section: index, to_come, not_passed, .. } = *request;
         let (Some(section), Some(_)) = (self.get(index), not_passed) else { return false };
         let bounds_m = self.bounds_m(index);
         let clear_m = |reach| clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
-        let (most_clear_m, half_k) = (clear_m(to_come).min(clear_m(not_passed)), self.confidence_sd / 2.0);
-        if most_clear_m <= self.target_m / 2.0 {
+        let (half_m, half_k) = (self.target.max_hole_m / 2.0, self.target.confidence_sd / 2.0);
+        let most_clear_m = clear_m(to_come).min(clear_m(not_passed));
+        if most_clear_m <= half_m {
             return false;
         }
         let pass_error = self.pass_error(index);
-        let radius_m = |pass_sd_m: f64| self.target_m / 2.0 + half_k * section.visits.sd_m(pass_sd_m);
+        let radius_m = |pass_sd_m: f64| half_m + half_k * section.visits.sd_m(pass_sd_m);
         let needed = Needed {
             radius_m: &|arc_m| radius_m(pass_error.sd_m(profile.point_at(arc_m))),
             most_m: radius_m(pass_error.worst_m(profile)),
@@ -151,7 +152,8 @@ impl Sections {
                 debug_assert!(false, "section {index} of the coverage extent exists");
                 continue;
             };
-            // Samples too far away to change a pass may have reduced the hole of a failed section.
+            // Samples too far away to change a pass may nevertheless have reduced the hole of a failed
+            // section.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 ask(Request { ended: Some(Ended(outlook.through)), ..ask_for(index) });
@@ -171,12 +173,13 @@ mod tests {
     use headrace_fusion::relative::Relative;
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::Target;
 
-    /// Sections that the heads have left in part are checked every few centimetres of travel, behind and
-    /// ahead.
+    /// Sections that the heads have passed only in part are checked every few centimetres of travel, behind
+    /// and ahead.
     #[test]
     fn next_check_is_due_after_a_few_centimetres_of_travel() {
-        let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
+        let mut sections = Sections::new(0.25, Target::new(0.5), -1.0, 10.0);
         for k in 0..100 {
             let x_m = 4.0 + 0.013 * f64::from(k);
             sections.look_again(Some(Reach { from_m: x_m, to_m: x_m }));
@@ -191,10 +194,10 @@ mod tests {
 
     /// Around a stationary vehicle, a failed section is judged again only after new samples.
     ///
-    /// Every other section may come to fail at any time.
+    /// Every other section is judged at each check, because it may have become certain to fail.
     #[test]
     fn stationary_vehicle_judges_sections_with_new_samples() {
-        let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
+        let mut sections = Sections::new(0.25, Target::new(0.5), -1.0, 10.0);
         for (index, flagged, stale) in
             [(8, false, true), (9, false, false), (10, true, true), (11, true, false)]
         {
@@ -225,9 +228,9 @@ mod tests {
 
     /// Returns the requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on.
     ///
-    /// Each request has the section's index, and whether it is only for a certain fail.
+    /// Each request has the section's index, and whether it asks only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
-        let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
+        let mut sections = Sections::new(0.25, Target::new(0.5), 1.0, 10.0);
         set(&mut sections);
         let to_come = Some(Reach { from_m: 3.25, to_m: f64::INFINITY });
         let moved = Moved { left_behind: 10..12, left_ahead: 16..16, way_grown: false, to_come };
@@ -267,8 +270,8 @@ mod tests {
     #[test]
     fn section_left_without_a_verdict_is_judged() {
         let found = due(|_| {});
-        // All sections behind the zone are judged completely. At the zone's ends, sections may fail because of the
-        // part that was left. Sections ahead are not judged.
+        // All sections behind the zone get a full judgement. At the zone's ends, sections may fail because of
+        // the part that the heads have left. Sections ahead are not judged.
         let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
         expected.extend([(12, true), (15, true)]);
         assert_eq!(found, expected);
@@ -281,10 +284,10 @@ mod tests {
 
     /// A hole may fail early because of its part out of reach.
     ///
-    /// This part measures up to twice the distance of the hole's centre. A hole that lies completely out of reach
-    /// gets its final verdict.
+    /// The diameter of this part is twice the distance of the hole's centre from the heads' reach. A hole
+    /// that lies completely out of reach gets its final verdict.
     #[test]
-    fn hole_is_judged_once_a_large_enough_part_is_out_of_reach() {
+    fn hole_is_judged_once_a_large_enough_part_is_beyond_the_heads_reach() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
             alone(9, |section| {
                 (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);
@@ -303,10 +306,10 @@ mod tests {
 
     const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
 
-    /// Whether a section with one empty circle certainly fails, in a pipe of 3 m radius.
+    /// Whether a section with one empty circle is certain to fail, in a pipe of 3 m radius.
     ///
-    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw, rad.
-    /// Samples may still land from `to_come_m` on, and not all heads have passed wall up to 9 m.
+    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw,
+    /// rad. Samples may still land from `to_come_m` on. Up to 9 m, some heads have not been at the wall.
     fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -328,7 +331,7 @@ mod tests {
             let (sin, cos) = math::sin_cos(math::TAU / 90.0 * f64::from(k));
             put(10.125 + circle_m * cos, arc_m + circle_m * sin);
         }
-        let mut sections = Sections::new(0.25, 0.5, 0.0, 20.0).with_confidence_sd(3.0);
+        let mut sections = Sections::new(0.25, Target { confidence_sd: 3.0, ..Target::new(0.5) }, 0.0, 20.0);
         let passage = &mut sections.get_mut(40).unwrap().passage;
         let (along, yaw) = (along_m * along_m, yaw_rad * yaw_rad);
         let relative = Relative::new([[along, 0.0, 0.0], [0.0; 3], [0.0, 0.0, yaw]]);
@@ -358,11 +361,11 @@ mod tests {
         sections.fails_already(&request, &mut judging)
     }
 
-    /// The limit of the diameter is the target of 0.5 m plus three standard deviations.
+    /// The diameter of a circle must exceed the target of 0.5 m by three standard deviations.
     ///
     /// The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn limit_of_an_empty_circle_includes_the_position_error_at_its_place() {
+    fn size_limit_of_an_empty_circle_includes_the_position_error_at_its_place() {
         for is_beside in [true, false] {
             let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
             assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "the circle must exceed the target");
@@ -376,7 +379,7 @@ mod tests {
         for (to_come_m, yaw_rad) in
             [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
         {
-            // At other places on the wall, the circle would need to be far larger.
+            // At other places on the wall than above the vehicle, the circle would need to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
         assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in the circle");

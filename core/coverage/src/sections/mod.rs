@@ -4,4 +4,4 @@ mod due;
 mod section_table;
 
 pub(crate) use section_table::verdict;
-pub use section_table::{CONFIDENCE_SD, Ended, Judging, Request, Sections, back_to_m};
+pub use section_table::{Ended, Judging, Request, Sections, back_to_m};

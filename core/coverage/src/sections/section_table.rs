@@ -19,13 +19,14 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::Target;
 
 /// Request to judge a section as of a given time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
     /// Index of the section, from chainage zero.
     pub section: i64,
-    /// Time of the request.
+    /// Time at which the request was made.
     pub at: MonoNs,
     /// Stretch that every awaited head had swept at this time.
     pub swept_by_all: Option<Reach>,
@@ -33,9 +34,9 @@ pub struct Request {
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Stretch that not all heads have passed, and will not pass without the vehicle turning back.
+    /// Stretch where some heads have not been, and will not be unless the vehicle turns back.
     pub not_passed: Option<Reach>,
-    /// Stretch that all heads have passed; `None` before the end of the dive.
+    /// Stretch where all heads have been; `None` before the end of the dive.
     pub ended: Option<Ended>,
     /// Whether to judge only a certain fail: a large empty circle in which no more samples can land.
     ///
@@ -43,27 +44,23 @@ pub struct Request {
     pub only_fails: bool,
 }
 
-/// Stretch that all heads had passed when the dive ended; `None` if there is none.
+/// Stretch where all heads have been when the dive ends; `None` if there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ended(pub Option<Reach>);
 
 impl Ended {
-    /// Whether a hole extends to wall that not all heads have passed.
+    /// Whether a hole extends to wall where some heads have not been.
     fn is_beyond(self, hole: &Hole) -> bool {
         let radius_m = hole.diameter_m / 2.0;
         self.0.is_none_or(|all| hole.x_m - radius_m < all.from_m || hole.x_m + radius_m > all.to_m)
     }
 }
 
-/// Limits that every finite reach has passed, so that the next movement causes a check.
+/// Initial check positions. Every finite reach is beyond them, so the first movement causes a check.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
-/// Default confidence of a pass or a fail.
-///
-/// The confidence is the number of standard deviations of D between hole and target.
-pub const CONFIDENCE_SD: f64 = 2.0;
 
 impl Request {
-    /// Returns a builder of requests with the outlook's time and stretches.
+    /// Returns a function that makes a request to judge a section, with the outlook's time and stretches.
     pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
         let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
         move |section| Self {
@@ -79,7 +76,7 @@ impl Request {
     }
 }
 
-/// A measured section.
+/// Measured hole of a section.
 struct Measured {
     hole: Hole,
     /// Standard deviation of the hole's diameter, m.
@@ -90,26 +87,24 @@ struct Measured {
 
 /// Inputs of judging, and the callback for changed runs.
 pub struct Judging<'a> {
-    /// All samples.
+    /// Store with all samples.
     pub store: &'a SampleStore,
     /// Latest missing samples, for the causes of fails.
     pub lacks: &'a MissingSamples,
     /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: &'a Profile,
-    /// Called for every run that changes.
+    /// Function that is called for every run that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
-/// All sections of the stretch of tunnel that the store covers, and the runs of those that are flagged.
+/// All sections of the stretch of tunnel that the store covers, and the runs of flagged sections.
 #[derive(Debug, Clone)]
 pub struct Sections {
     pub(super) section_m: f64,
-    pub(super) target_m: f64,
-    /// Number of standard deviations of D by which a pass or a fail must differ from the target.
-    pub(super) confidence_sd: f64,
-    /// Distance before a missed stretch at which the vehicle's origin should turn round, m.
+    pub(super) target: Target,
+    /// Distance from the start of a missed stretch at which the vehicle's origin should turn round, m.
     run_up_m: f64,
     first: i64,
     /// Number of judged sections by verdict, in the order of [`Verdict::ALL`].
@@ -124,22 +119,21 @@ pub struct Sections {
     pub(super) next_look_m: [f64; 2],
 }
 
-stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target_m, confidence_sd, run_up_m, first; });
+stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target, run_up_m, first; });
 
 impl Sections {
     /// Creates sections of `section_m` over [`from_m`, `to_m`].
     ///
     /// Allocates: at startup, all that it will ever use.
-    pub fn new(section_m: f64, target_m: f64, from_m: f64, to_m: f64) -> Self {
+    pub fn new(section_m: f64, target: Target, from_m: f64, to_m: f64) -> Self {
         let first = math::floor_to_i64(from_m / section_m);
         let end = -math::floor_to_i64(-to_m / section_m);
         let count = usize::try_from(end - first).unwrap_or(0);
         let runs = Runs::new(first, count, section_m);
         Self {
             section_m,
-            target_m,
-            confidence_sd: CONFIDENCE_SD,
-            run_up_m: target_m,
+            target,
+            run_up_m: target.max_hole_m,
             first,
             judged: [0; 5],
             sections: vec![Section::default(); count],
@@ -148,16 +142,10 @@ impl Sections {
         }
     }
 
-    /// Sets the confidence; the default is [`CONFIDENCE_SD`].
-    #[must_use]
-    pub fn with_confidence_sd(self, confidence_sd: f64) -> Self {
-        Self { confidence_sd, ..self }
-    }
-
     /// Sets how far the heads reach before or behind the vehicle's origin.
     #[must_use]
     pub fn with_heads_reach_m(self, reach_m: f64) -> Self {
-        Self { run_up_m: reach_m + self.target_m, ..self }
+        Self { run_up_m: reach_m + self.target.max_hole_m, ..self }
     }
 
     /// Returns the chainage to which the vehicle's origin has to go back, m, rounded to a decimetre.
@@ -188,7 +176,7 @@ impl Sections {
         self.sections.len()
     }
 
-    /// Whether there are no sections.
+    /// Whether the tunnel stretch has no sections.
     pub fn is_empty(&self) -> bool {
         self.sections.is_empty()
     }
@@ -198,21 +186,16 @@ impl Sections {
         self.section_m
     }
 
-    /// Target T, m.
-    pub fn target_m(&self) -> f64 {
-        self.target_m
-    }
-
-    /// Number of standard deviations of D by which a pass or a fail must differ from the target.
-    pub fn confidence_sd(&self) -> f64 {
-        self.confidence_sd
+    /// Coverage target, with the confidence of verdicts.
+    pub fn target(&self) -> Target {
+        self.target
     }
 
     /// Distance from the heads' reach at which a section is left, m.
     ///
     /// Samples farther away don't change a pass.
     pub fn left_m(&self) -> f64 {
-        self.target_m / 2.0
+        self.target.max_hole_m / 2.0
     }
 
     /// Returns the index of the section at a chainage.
@@ -235,9 +218,10 @@ impl Sections {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Records a sample at `x_m`: every section within T of it is due for judging again.
+    /// Records a sample at `x_m`: every section within the target T of it is due for judging again.
     pub fn touch(&mut self, x_m: f64, visit: &Visit, profile: &Profile) {
-        let (from, to) = (self.index_of(x_m - self.target_m), self.index_of(x_m + self.target_m));
+        let (from, to) =
+            (self.index_of(x_m - self.target.max_hole_m), self.index_of(x_m + self.target.max_hole_m));
         for index in from..=to {
             if let Some(section) = self.get_mut(index) {
                 section.stale = true;
@@ -250,8 +234,6 @@ impl Sections {
     ///
     /// Allocates: never.
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
-        let (from_m, to_m) = self.bounds_m(request.section);
-        let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
         let section = self.get(request.section)?;
         if section.verdict == Verdict::Pass && section.visits.are_several() && section.doubt().is_none() {
             // A later visit does not revoke the pass of an earlier visit.
@@ -262,17 +244,42 @@ impl Sections {
         if request.only_fails && !fails {
             return None;
         }
-        let Measured { hole, sd_m, by_newest } = self.measure(request.section, judging)?;
+        let measured = self.measure(request.section, judging)?;
+        let section = self.get(request.section)?;
+        let before = Self::counted(section);
+        let is_like = section.hole.is_some_and(|before| before.is_like(&measured.hole));
+        let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
+        self.decide(request, &measured, fails, judging)?;
+        // The evidence of an unchanged hole is kept, because its missing samples may no longer be stored.
+        if self.get(request.section)?.verdict == Verdict::Fail && !is_same {
+            let evidence = self.explain(&measured.hole, request, judging);
+            let evidence = self.as_beside(request.section, evidence);
+            let section = self.get_mut(request.section)?;
+            (section.evidence, section.explained_in_part) = (Some(evidence), request.only_fails);
+        }
+        let section = self.get_mut(request.section)?;
+        let (judgement, now) = (section.flag(request.at), Self::counted(section));
+        self.count(before, now);
+        self.tell_runs(request, judging);
+        Some(judgement)
+    }
+
+    /// Updates a section's hole and verdict. `fails` says whether the section fails whatever its largest hole.
+    fn decide(
+        &mut self,
+        request: &Request,
+        &Measured { hole, sd_m, by_newest }: &Measured,
+        fails: bool,
+        judging: &mut Judging<'_>,
+    ) -> Option<()> {
+        let (target, (from_m, to_m)) = (self.target, self.bounds_m(request.section));
         let clear_m = clear_of(request.to_come, hole.x_m);
         let passed_m = clear_of(request.not_passed, hole.x_m);
         let section = self.get_mut(request.section)?;
-        let before = Self::counted(section);
-        let (error_m, had_a_flag) = (confidence_sd * sd_m, section.is_flagged());
-        let is_like = section.hole.is_some_and(|before| before.is_like(&hole));
-        let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
+        let had_a_flag = section.is_flagged();
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
-        section.verdict = match verdict(&hole, error_m, target_m, clear_m.min(passed_m)) {
+        section.verdict = match verdict(&hole, sd_m, target, clear_m.min(passed_m)) {
             Verdict::Pass if section.doubt().is_some() => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if fails => Verdict::Fail,
             verdict => verdict,
@@ -283,12 +290,12 @@ impl Sections {
         }
         // More samples do not change a pass. Samples outside a hole's radius do not change the hole.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
-        let alone = verdict(&hole, error_m, target_m, clear_m);
+        let alone = verdict(&hole, sd_m, target, clear_m);
         section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
         if section.not_inspected {
-            // The largest hole extends to wall that not all heads have passed. Another hole may still make the
-            // section fail.
-            let radius_m = f64::midpoint(target_m, error_m);
+            // The largest hole extends to wall where some heads have not been. Another hole may still make
+            // the section fail.
+            let radius_m = f64::midpoint(target.max_hole_m, target.error_m(sd_m));
             section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
             if had_a_flag || self.fails_already(request, judging) {
@@ -297,25 +304,14 @@ impl Sections {
             }
         }
         let section = self.get_mut(request.section)?;
-        // At the end of the dive, no more samples will come.
+        // The dive has ended, so no more samples will come.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if request.ended.is_some() && section.verdict == Verdict::Open && section.is_flagged() {
-            // The section was missed, and the dive ended on the way back over it.
+            // The section failed, and the dive ended while the vehicle went back over it.
             (section.verdict, section.not_inspected) = (Verdict::Fail, false);
         }
-        // The evidence of an unchanged hole is kept, because its missing samples may no longer be stored.
-        if section.verdict == Verdict::Fail && !is_same {
-            let evidence = self.explain(&hole, request, judging);
-            let evidence = self.as_beside(request.section, evidence);
-            let section = self.get_mut(request.section)?;
-            (section.evidence, section.explained_in_part) = (Some(evidence), request.only_fails);
-        }
-        let section = self.get_mut(request.section)?;
-        let (judgement, now) = (section.flag(request.at), Self::counted(section));
-        self.count(before, now);
-        self.tell_runs(request, judging);
-        Some(judgement)
+        Some(())
     }
 
     /// Returns the evidence of a section.
@@ -333,13 +329,13 @@ impl Sections {
         }
     }
 
-    /// Returns the slot in which a judged section is counted.
+    /// Returns the slot of the verdict counts in which a judged section is counted.
     fn counted(section: &Section) -> Option<usize> {
         section.hole?;
         Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
     }
 
-    /// Measures the hole that counts.
+    /// Measures the hole that decides a section's verdict.
     ///
     /// The hole is that of all visits, unless the newest visit alone shows that the section passes.
     fn measure(&self, index: i64, judging: &mut Judging<'_>) -> Option<Measured> {
@@ -347,9 +343,8 @@ impl Sections {
         let ((from_m, to_m), pass_error) = (self.bounds_m(index), self.pass_error(index));
         let section = self.get(index)?;
         let pass_sd_m = |hole: &Hole| pass_error.sd_m(profile.point_at(hole.arc_m));
-        let passes = |hole: &Hole, sd_m: f64| {
-            verdict(hole, self.confidence_sd * sd_m, self.target_m, f64::INFINITY) == Verdict::Pass
-        };
+        let passes =
+            |hole: &Hole, sd_m: f64| verdict(hole, sd_m, self.target, f64::INFINITY) == Verdict::Pass;
         let hole = finder.largest_since(store, from_m, to_m, section.visits.first());
         let sd_m = section.visits.sd_m(pass_sd_m(&hole));
         let is_shown = section.doubt().is_none() && passes(&hole, sd_m);
@@ -363,7 +358,7 @@ impl Sections {
         Some(Measured { hole, sd_m, by_newest: false })
     }
 
-    /// Moves a judged section from its previous slot in the counts to its present slot.
+    /// Moves a judged section from its previous slot in the verdict counts to its present slot.
     fn count(&mut self, before: Option<usize>, now: Option<usize>) {
         if let Some(count) = before.and_then(|before| self.judged.get_mut(before)) {
             *count -= 1;
@@ -395,13 +390,14 @@ impl Sections {
 
     /// Returns the error of a section's passes.
     ///
-    /// If no head pinged in the section, the result is the largest error within T / 2.
+    /// If no head pinged in the section, the result is the largest error within half the target.
     pub(super) fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
         }
         let (from_m, to_m) = self.bounds_m(index);
-        let near = self.index_of(from_m - self.target_m / 2.0)..=self.index_of(to_m + self.target_m / 2.0);
+        let near = self.index_of(from_m - self.target.max_hole_m / 2.0)
+            ..=self.index_of(to_m + self.target.max_hole_m / 2.0);
         near.filter_map(|index| self.get(index)).fold(PassError::default(), |mut worst, section| {
             worst.add(&section.passage.pass_error);
             worst
@@ -410,12 +406,13 @@ impl Sections {
 
     /// Adds a flagged section to its run, or removes a section whose flag was cleared.
     fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
-        let Self { sections, runs, first, target_m, confidence_sd, .. } = self;
+        let Self { sections, runs, first, target, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
-        let is_consistent = |section: &Section| section.is_consistent(*target_m, *confidence_sd);
+        let is_consistent = |section: &Section| section.is_consistent(*target);
         debug_assert!(
             get(request.section).is_some_and(is_consistent),
-            "a judged section agrees with a target of {target_m} m: {:?}",
+            "a judged section agrees with a target of {} m: {:?}",
+            target.max_hole_m,
             get(request.section)
         );
         let flagged = get(request.section).filter(|section| section.is_flagged());
@@ -425,12 +422,14 @@ impl Sections {
         runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// Determines the causes of a hole, from the passages of the sections within T.
+    /// Determines the causes of a hole from the heads' passages through all sections within the target T of
+    /// it.
     ///
     /// If the heads have left only a part of the section, the largest hole in this part counts.
     fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
         let mut bounds_m = self.bounds_m(request.section);
-        let near = self.index_of(bounds_m.0 - self.target_m)..=self.index_of(bounds_m.1 + self.target_m);
+        let near = self.index_of(bounds_m.0 - self.target.max_hole_m)
+            ..=self.index_of(bounds_m.1 + self.target.max_hole_m);
         let mut hole = *whole;
         if let Some(reach) = request.to_come.filter(|_| request.only_fails) {
             let left =
@@ -457,7 +456,7 @@ impl Sections {
             none_alive: request.none_alive,
             is_dark: passage.pings == 0 && !passage.silent.is_empty(),
             is_torn: visits.are_unrelated(),
-            target_m: self.target_m,
+            target_m: self.target.max_hole_m,
             beside: [beside(request.section - 1), beside(request.section + 1)],
             lacks: judging.lacks,
         };
@@ -487,7 +486,7 @@ impl Sections {
     pub fn unsure(&self, index: i64) -> Option<Stretch> {
         let section = self.get(index)?;
         let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
-        let error_m = self.confidence_sd() * section.hole_sd_m;
+        let error_m = self.target.error_m(section.hole_sd_m);
         let driven = Driven::of(&section.passage);
         Some(Stretch::one(section.unsure()?, index, [hole_m, error_m, section.hole_sd_m], driven))
     }
@@ -508,14 +507,15 @@ impl Sections {
 
 /// Verdict on a hole whose centre is `clear_m` from where samples may still land.
 ///
-/// `error_m` is k sd of its diameter, where k is the confidence.
+/// `sd_m` is the standard deviation of its diameter, and k the confidence.
 /// - `pass` if D + k sd <= T: more samples won't enlarge D.
 /// - `fail` if D - k sd > T for any final D: samples come no nearer than `clear_m`. Wall without samples
 ///   around it fails, too.
 /// - `open` otherwise while D may change, and `cannot_say` afterwards.
 ///
 /// A verdict holds for both bounds of D.
-pub(crate) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+pub(crate) fn verdict(hole: &Hole, sd_m: f64, target: Target, clear_m: f64) -> Verdict {
+    let (target_m, error_m) = (target.max_hole_m, target.error_m(sd_m));
     debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");
     debug_assert!(
         error_m >= 0.0 && clear_m >= 0.0,

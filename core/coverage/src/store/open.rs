@@ -9,23 +9,23 @@ use headrace_sampling::head::MAX_HEADS;
 /// List link: index of a node plus one, or zero for none.
 type Link = u32;
 
-/// A sample in the pool.
+/// A sample in the common pool of the open bricks.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Node {
-    /// Chainage, m.
+    /// Chainage of the sample, m.
     pub x_m: f64,
-    /// Arc length, in [0, perimeter), m.
+    /// Arc length of the sample, in [0, perimeter), m.
     pub arc_m: f64,
     /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
-    /// Visit number.
+    /// Number of the visit that measured the sample.
     pub visit: u32,
     next_in_cell: Link,
     next_of_head: Link,
 }
 
 impl Node {
-    /// Sample of the node.
+    /// Sample in this node of a linked list.
     pub(super) fn sample(&self) -> Packed {
         let Self { x_m, arc_m, step_m, visit, .. } = *self;
         Packed { x_m, arc_m, step_m, visit }
@@ -35,11 +35,11 @@ impl Node {
 /// A cell of an open brick.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CellAt {
-    /// Slot of the brick.
+    /// Slot of the open brick.
     pub slot: usize,
-    /// Row within the brick.
+    /// Row of the cell within the brick.
     pub row: usize,
-    /// Column.
+    /// Column of the cell.
     pub column: usize,
 }
 
@@ -66,11 +66,11 @@ pub(super) struct OpenBricks {
     /// Bitmask of the rows that have samples, for each column of a slot.
     rows_seen: Vec<u32>,
     chains: Vec<[Chain; MAX_HEADS]>,
-    /// Brick in each slot.
+    /// Number of the brick in each slot.
     bricks: Vec<Option<u32>>,
     nodes: Vec<Node>,
     most_nodes: usize,
-    /// Free list of nodes, linked like the list of a cell.
+    /// Free list of pool nodes, linked like the list of a cell.
     free: Link,
     used: usize,
 }
@@ -78,7 +78,7 @@ pub(super) struct OpenBricks {
 stateful!(OpenBricks { state: free, used; lists: nodes; slots: cells, rows_seen, chains, bricks; fixed: rows, columns, most_nodes; });
 
 impl OpenBricks {
-    /// Allocates: at startup only.
+    /// Creates a pool without open bricks. Allocates: at startup only.
     pub(super) fn new(slots: usize, (rows, columns): (usize, usize), most_nodes: usize) -> Self {
         Self {
             rows,
@@ -104,12 +104,12 @@ impl OpenBricks {
         self.used
     }
 
-    /// Number of bytes in use now or before.
+    /// Number of bytes that have been used so far.
     pub(super) fn touched_bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>() + self.cells.len() * size_of::<Cell>()
     }
 
-    /// Returns a slot without a brick.
+    /// Returns a slot that holds no brick.
     pub(super) fn free_slot(&self) -> Option<usize> {
         self.bricks.iter().position(Option::is_none)
     }
@@ -128,7 +128,7 @@ impl OpenBricks {
         }
     }
 
-    /// Whether a slot holds this brick.
+    /// Whether a slot holds the brick `number`.
     pub(super) fn holds(&self, slot: usize, brick: u32) -> bool {
         self.bricks.get(slot) == Some(&Some(brick))
     }
@@ -206,7 +206,7 @@ impl OpenBricks {
         core::iter::successors(node(first), move |before| node(next(before)))
     }
 
-    /// Empties a slot.
+    /// Removes all samples of a slot.
     pub(super) fn clear(&mut self, slot: usize) {
         let per_brick = self.rows * self.columns;
         let Self { cells, nodes, free, used, .. } = self;

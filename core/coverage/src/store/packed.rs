@@ -9,7 +9,7 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Quanta per metre.
+/// Number of quanta per metre.
 const QUANTA_PER_M: f64 = 131_072.0;
 /// Maximum displacement of a sample by packing, m.
 ///
@@ -29,14 +29,14 @@ const VISIT: u16 = u16::MAX;
 /// Tags from this value on switch heads: `HEAD` plus the head's number.
 const HEAD: u16 = 2;
 
-/// Lattice point, quanta: along the tunnel from the start of the brick, and along the perimeter.
+/// Lattice point in quanta: along the tunnel from the start of the brick, and along the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Spot {
     x: i64,
     arc: i64,
 }
 
-/// The lattice of a brick.
+/// The lattice of a brick, on which packed samples lie.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lattice {
     origin: i64,
@@ -44,16 +44,16 @@ pub(super) struct Lattice {
     last_arc: i64,
 }
 
-/// A sample being packed or unpacked.
+/// A sample that is being packed or unpacked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Packed {
-    /// Chainage, m.
+    /// Chainage of the sample, m.
     pub x_m: f64,
-    /// Arc length, m.
+    /// Arc length of the sample, m.
     pub arc_m: f64,
     /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
-    /// Visit number.
+    /// Number of the visit that measured the sample.
     pub visit: u32,
 }
 
@@ -128,17 +128,17 @@ impl Stateful for Arena {
 }
 
 impl Arena {
-    /// Allocates: at startup only.
+    /// Creates an arena of blocks. Allocates: at startup only.
     pub(super) fn new(most_blocks: usize) -> Self {
         Self { blocks: Vec::with_capacity(most_blocks), most: most_blocks, free: 0, used: 0 }
     }
 
-    /// Number of free words.
+    /// Number of free words in the arena.
     pub(super) fn free_words(&self) -> usize {
         (self.most - self.used) * ROOM
     }
 
-    /// Number of bytes in use now or before.
+    /// Number of bytes that have been used so far.
     pub(super) fn touched_bytes(&self) -> usize {
         self.blocks.len() * size_of::<[u32; ROOM + 1]>()
     }
@@ -167,7 +167,7 @@ impl Arena {
         self.blocks.get_mut(link.checked_sub(1)? as usize)
     }
 
-    /// Frees a chain of blocks.
+    /// Frees a chain of blocks of a brick.
     pub(super) fn release(&mut self, first: u32) {
         let mut link = first;
         let free = self.free;
@@ -191,7 +191,7 @@ impl Arena {
     }
 }
 
-/// Writer of a packed brick.
+/// Writer of the samples of a packed brick.
 pub(super) struct Writer<'a> {
     arena: &'a mut Arena,
     lattice: Lattice,
@@ -207,7 +207,7 @@ impl<'a> Writer<'a> {
         Self { arena, lattice, first: 0, block: 0, at: ROOM, before: None, visit: 0 }
     }
 
-    /// Switches to another head; `None` if there is no room.
+    /// Switches to another head's samples; `None` if there is no room.
     pub(super) fn head(&mut self, head: usize) -> Option<()> {
         self.before = None;
         self.word(escape(HEAD + u16::try_from(head).ok()?))
@@ -224,7 +224,7 @@ impl<'a> Writer<'a> {
         let [along_m, around_m] = sample.step_m;
         let stepped = along_m.abs() + around_m.abs() > 0.0;
         let start_m = (sample.x_m - along_m, math::wrap(sample.arc_m - around_m, self.lattice.perimeter_m));
-        // Except for rounding, the step began at the previous sample.
+        // Except for rounding, the step began at the previous sample of the head.
         let follows = |before: &Packed| {
             (before.x_m - start_m.0).abs() < 1e-9 && (before.arc_m - start_m.1).abs() < 1e-9
         };
@@ -263,7 +263,7 @@ impl<'a> Writer<'a> {
         Some(())
     }
 
-    /// First block of the brick.
+    /// First block of the written brick.
     pub(super) fn finish(self) -> u32 {
         self.first
     }

@@ -5,12 +5,13 @@ use core::ops::Range;
 use super::open::Node;
 use super::sample_store::SampleStore;
 use headrace_geometry::math;
+use headrace_geometry::tunnel::WallPoint;
 
-/// Query point of a pass search.
+/// Point from which a pass search looks for the nearest pass.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     x_m: f64,
-    /// Arc length in [0, perimeter), m.
+    /// Arc length of the query point in [0, perimeter), m.
     arc_m: f64,
     perimeter_m: f64,
 }
@@ -46,14 +47,15 @@ struct Side {
 }
 
 impl SampleStore {
-    /// Returns the distance in chainage to the nearest pass over `arc_m` within `within_m`, m.
+    /// Returns the distance in chainage to the nearest pass over a point's arc length within `within_m`, m.
     ///
     /// The distance is accurate to some micrometres if a packed brick had to be opened. A pass is a single step of a
-    /// head from one sample to the next. The chainage of the pass at `arc_m` is interpolated.
+    /// head from one sample to the next. The chainage of the pass at this arc length is interpolated.
     /// Source: docs/reference/glossary.md, "Spacing and holes", T_x.
     ///
     /// Allocates: never.
-    pub fn nearest_pass_m(&mut self, x_m: f64, arc_m: f64, within_m: f64) -> Option<f64> {
+    pub fn nearest_pass_m(&mut self, of: WallPoint, within_m: f64) -> Option<f64> {
+        let WallPoint { x_m, arc_m } = of;
         let perimeter_m = self.layout.perimeter_m;
         let place = Place { x_m, arc_m: math::wrap(arc_m, perimeter_m), perimeter_m };
         let centre = math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m);

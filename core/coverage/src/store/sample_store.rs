@@ -7,6 +7,7 @@ use super::packed::{self, Arena, Lattice, MOST_WORDS, Packed, Reader, Writer};
 use super::thinning;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::head::MAX_HEADS;
 
 /// Number of bricks open at a time.
@@ -15,21 +16,21 @@ use headrace_sampling::head::MAX_HEADS;
 const OPEN_BRICKS: usize = 64;
 /// Minimum length of a brick, m.
 const BRICK_M: f64 = 1.0;
-/// Maximum number of rows per brick: an open brick has a bit for each row in a `u32`.
+/// Maximum number of rows per brick, because an open brick has a bit for each row in a `u32`.
 const MOST_ROWS: usize = 32;
 /// Maximum number of samples in all open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;
-/// Overhead words per brick: unused words in the last block, and head switches.
+/// Overhead words per brick: unused words in the last block, and words that switch heads.
 const WORDS_PER_BRICK: usize = 48;
 
 /// A sample on the unrolled wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallSample {
-    /// Chainage, m.
+    /// Chainage of the sample, m.
     pub x_m: f64,
-    /// Arc length along the profile, m.
+    /// Arc length of the sample along the profile, m.
     pub arc_m: f64,
-    /// Number of the head, below [`MAX_HEADS`].
+    /// Number of the head that measured the sample, below [`MAX_HEADS`].
     pub head: usize,
     /// Step from the same head's previous sample, along the tunnel and along the perimeter, m.
     ///
@@ -44,13 +45,13 @@ pub struct WallSample {
 pub struct StoreLayout {
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
-    /// First chainage, m.
+    /// First chainage of the store, m.
     pub from_m: f64,
-    /// Last chainage, m.
+    /// Last chainage of the store, m.
     pub to_m: f64,
     /// Nominal edge of a cell, m. Half the target is a good value for the searches.
     pub cell_m: f64,
-    /// Minimum capacity in samples.
+    /// Minimum capacity of the store in samples.
     pub capacity: u32,
 }
 
@@ -81,7 +82,7 @@ pub enum StoreError {
     Full,
 }
 
-/// Bounds on the difference between the stored samples of a stretch and the inserted ones.
+/// Bounds on the difference between the samples stored for a stretch and those inserted there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fidelity {
     /// Maximum distance of a dropped sample from a stored one, m.
@@ -97,20 +98,20 @@ pub struct StoreUse {
     pub kept: u64,
     /// Number of samples dropped by thinning.
     pub thinned: u64,
-    /// Number of bytes in use now or before, which the OS has mapped.
+    /// Number of bytes that have been used so far, which the OS has mapped.
     pub bytes: usize,
 }
 
-/// A group of cell rows.
+/// A brick: a group of rows of cells.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Brick {
-    /// Link to the brick's first block in the arena, or zero.
+    /// Link to the brick's first block of packed samples, or zero.
     first_block: u32,
     /// Number of samples in the brick.
     count: u32,
-    /// Slot plus one if the brick is open, or zero.
+    /// Slot plus one if the brick is open (unpacked), or zero.
     slot: u16,
-    /// Coarsest thinning tier applied.
+    /// Coarsest thinning tier applied to the brick.
     tier: u8,
     /// Whether the brick has been packed before, which may have moved its samples.
     moved: bool,
@@ -189,8 +190,8 @@ impl SampleStore {
     }
 
     /// Whether a point is finite and within the store's extent.
-    pub fn covers(&self, x_m: f64, arc_m: f64) -> bool {
-        self.row(x_m).is_some() && arc_m.is_finite()
+    pub fn covers(&self, at: WallPoint) -> bool {
+        self.row(at.x_m).is_some() && at.arc_m.is_finite()
     }
 
     /// Returns the current contents and memory use.
@@ -264,12 +265,12 @@ impl SampleStore {
         Ok(Kept::Stored)
     }
 
-    /// Calls `take` with chainage, arc length, m, and visit number of all samples between two chainages, m.
+    /// Calls `take` with the place and visit number of all samples between two chainages, m.
     ///
     /// Some samples beyond the two chainages may be included.
     ///
     /// Allocates: never.
-    pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(f64, f64, u32)) {
+    pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(WallPoint, u32)) {
         for number in self.bricks_between(from_m, to_m) {
             let Some(brick) = self.bricks.get(number as usize).filter(|brick| brick.count > 0) else {
                 continue;
@@ -283,14 +284,14 @@ impl SampleStore {
                     for row in in_brick.start.max(first)..in_brick.end.min(last + 1) {
                         for column in 0..self.columns {
                             for node in self.open.in_cell(self.cell_at(slot, row, column)) {
-                                take(node.x_m, node.arc_m, node.visit);
+                                take(WallPoint { x_m: node.x_m, arc_m: node.arc_m }, node.visit);
                             }
                         }
                     }
                 }
                 None => {
                     for (_, sample) in self.packed_samples(number, brick) {
-                        take(sample.x_m, sample.arc_m, sample.visit);
+                        take(WallPoint { x_m: sample.x_m, arc_m: sample.arc_m }, sample.visit);
                     }
                 }
             }
@@ -314,7 +315,7 @@ impl SampleStore {
     }
 
     fn bricks_between(&self, from_m: f64, to_m: f64) -> core::ops::RangeInclusive<u32> {
-        // Packing may have moved a sample near the edge of a brick beyond this edge.
+        // Packing may have moved a sample near the edge of a brick across this edge.
         self.brick_of(self.row_near(from_m - packed::MOVED_M))
             ..=self.brick_of(self.row_near(to_m + packed::MOVED_M))
     }
@@ -425,7 +426,7 @@ impl SampleStore {
         inside.then(|| self.row_near(x_m))
     }
 
-    /// Returns the row at a chainage, or the row nearest to it.
+    /// Returns the row of cells at a chainage, or the row nearest to it.
     fn row_near(&self, x_m: f64) -> i64 {
         math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m).clamp(0, self.rows - 1)
     }

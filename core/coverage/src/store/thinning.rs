@@ -10,7 +10,8 @@ use super::open::{CellAt, OpenBricks};
 /// A tier applies from its number of samples on. It drops samples closer than its share to a stored sample.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
-/// Additional number of samples in a cell before samples at the end of a step are thinned.
+/// Samples at the end of a step are thinned only once a cell holds this many samples beyond the tier's
+/// number.
 const PASSES: u32 = 64;
 
 /// Maximum distance of a dropped sample from a stored one after thinning up to a tier, m.
@@ -21,7 +22,7 @@ pub(super) fn delta_m(tier: u8, edge_m: f64) -> f64 {
     tier.map_or(0.0, |(_, share)| share * edge_m)
 }
 
-/// Returns the tier by which a sample may be dropped from its cell; `None` to store the sample.
+/// Returns the tier by which a sample is dropped from its cell; `None` if the sample must be stored.
 pub(super) fn stands_for(
     open: &OpenBricks,
     at: CellAt,
@@ -29,7 +30,8 @@ pub(super) fn stands_for(
     step_m: Option<[f64; 2]>,
     edge_m: f64,
 ) -> Option<u8> {
-    // A step is a pass, so it is dropped later, and only if a nearby step in the same direction represents it.
+    // A step is a pass. Its sample is therefore dropped later, and only if a nearby step in the same
+    // direction represents it.
     let around_m = step_m.map_or(0.0, |[_, around_m]| around_m);
     let count = open.count(at).saturating_sub(if step_m.is_some() { PASSES } else { 0 });
     let tier = TIERS.iter().take_while(|(from, _)| count >= *from).count();

@@ -1,11 +1,11 @@
-//! Heads in a round tunnel with any wall, and the classification of their returns.
+//! Heads in a round tunnel whose wall has an arbitrary shape, and the classification of their returns.
 
 use super::*;
 use headrace_geometry::math::{self, TAU};
 
 const STEPS: u32 = 150;
 
-/// Heads that turn together, evenly spread, on a moving vehicle.
+/// Test fixture: heads that turn together, evenly spread, on a moving vehicle.
 struct Turning {
     limits: WallLimits,
     relief: Relief,
@@ -33,7 +33,7 @@ impl Turning {
         }
     }
 
-    /// Simulates some turns.
+    /// Simulates some turns of the heads.
     ///
     /// `heard` returns the range from the centre that a head measures, for head, chainage, angle, and the numbers of
     /// turn and step; `None` without a return.
@@ -89,10 +89,12 @@ fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
     for radius_m in [0.3, 1.0, 6.0] {
         Turning::new(radius_m, 1).all_wall(10, |_, _| radius_m);
         Turning::new(radius_m, 1).all_wall(10, |_, _| 1.06 * radius_m);
-        // The wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one along it.
+        // The test wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one
+        // lobe along it.
         Turning::new(radius_m, 2)
             .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
-        // A vehicle beside its estimated place in the centre measures these ranges.
+        // The vehicle measures such ranges if it is beside the centre while its estimated position is in the
+        // centre.
         Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
     }
 }
@@ -100,7 +102,7 @@ fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
 #[test]
 fn boulders_and_niches_are_wall_including_their_edges() {
     for (inward_m, half_width) in [(1.5, 0.1), (-2.0, 0.15), (3.0, 0.3)] {
-        // Objects are at least three steps wide. Each edge is a single return.
+        // Objects are at least three steps wide. At their edges the range jumps from one return to the next.
         Turning::new(6.0, 1).all_wall(8, |x_m, angle| {
             let within = (0.5..2.0).contains(&x_m) && (angle - 3.0).abs() < half_width;
             if within { 6.0 - inward_m } else { 6.0 }
@@ -125,7 +127,7 @@ fn object_seen_in_one_turn_is_doubtful_and_object_seen_again_is_wall() {
         };
         let count = &Turning::new(radius_m, 1).turn(6, pole)[0];
         assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 5, 5), "{radius_m}");
-        // An echo off two walls occurs three times in succession.
+        // An echo off two walls gives three successive returns, in one turn only.
         let echo = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
             Some(if turn == 2 && (angle - 3.0).abs() < 1.6 * TAU / f64::from(STEPS) {
                 1.9 * radius_m
@@ -140,7 +142,7 @@ fn object_seen_in_one_turn_is_doubtful_and_object_seen_again_is_wall() {
 
 /// A heap is higher than it is wide, and its foot slopes to the wall.
 #[test]
-fn run_ending_in_a_slope_to_the_wall_is_wall() {
+fn run_of_returns_ending_in_a_slope_to_the_wall_is_wall() {
     let steep = |_: f64, angle: f64| {
         let off = (angle - 3.0).abs();
         6.0 - (1.4 - 12.0 * off).max(0.0)
@@ -222,7 +224,7 @@ fn outvoted_head_is_distrusted_until_it_agrees_with_the_others() {
         }
         let counts = turning.turn(6, frozen);
         assert_eq!((counts[wrong].wall, counts[wrong].doubtful), (0, 6 * STEPS as usize));
-        // The chainage begins at zero again, as if the vehicle had gone back.
+        // The test's chainage begins at zero again, as if the vehicle had gone back to its start.
         turning.turn(4, |_, _, _, _| Some(1.0));
         let counts = turning.turn(4, |_, _, _, _| Some(1.0));
         assert_eq!(counts[wrong].doubtful, 0, "the head is trusted again");
@@ -262,7 +264,7 @@ fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_the_centre() {
 
 /// Off the centre, a constant range agrees with the wall for a part of each turn.
 #[test]
-fn stuck_head_is_distrusted_until_its_range_moves() {
+fn stuck_head_is_distrusted_until_its_range_varies() {
     for (radius_m, out_m) in [(1.0, 0.3), (6.0, 1.0)] {
         let mut turning = Turning::new(radius_m, 1);
         let limits = turning.limits;
@@ -291,7 +293,7 @@ fn stuck_head_is_distrusted_until_its_range_moves() {
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
-        // All wall samples since the head got stuck are withdrawn, and no earlier samples.
+        // All wall samples since the head got stuck are withdrawn. Samples from before that are kept.
         let begun_m = 0.001 * f64::from(2 * STEPS);
         assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
         assert!(
@@ -302,7 +304,7 @@ fn stuck_head_is_distrusted_until_its_range_moves() {
 }
 
 #[test]
-fn tolerances_scale_with_the_cross_section() {
+fn wall_classification_limits_scale_with_the_cross_section() {
     let of = |radius_m: f64| WallLimits::new(TAU * radius_m, (0.2 * radius_m).min(0.5));
     assert!((of(1.0).tolerance_m - 0.1).abs() < 1e-12 && (of(1.0).contradiction_m - 0.2).abs() < 1e-12);
     assert!((of(0.15).tolerance_m - 0.03).abs() < 1e-12, "not below the sonars' accuracy");

@@ -8,11 +8,11 @@ use super::measure::ScalarUpdate;
 use super::state::{ATTITUDE, Errors, HEADING, POSITION, RANGES, VELOCITY};
 use headrace_sensor::device::SensorKind;
 
-/// Averaging length, in measurements of one kind.
+/// Number of measurements of one kind over which the share within the gate is averaged.
 const MEMORY: u32 = 40;
 /// Minimum share of measurements within the gate. Below it, the measured quantity counts as lost and is reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// Standard deviations added for a lost quantity, m, m/s, radians.
+/// Standard deviations by which the uncertainty of a lost quantity is increased: m, m/s, radians.
 ///
 /// `LOST_M` and `LOST_MPS` apply to position and velocity across the tunnel. `LOST_WAY_M` and `LOST_WAY_MPS` apply to
 /// position and velocity along it. The others apply to the attitude and to the scale of ranges.
@@ -52,7 +52,7 @@ impl Memory {
         self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
     }
 
-    /// Whether measurements and estimate disagree. If so, restarts the average.
+    /// Whether too few measurements passed the gate, so that the estimate is wrong. If so, restarts the average.
     fn is_lost(&mut self) -> bool {
         let is_lost = self.seen == MEMORY && self.agreeing < LEAST_AGREEING;
         if is_lost {
@@ -67,13 +67,13 @@ impl Agreement {
     pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
-            // Only tilt counts, because a compass may stay disturbed for long.
+            // Of an attitude, only the tilt is checked, because a compass may stay disturbed for long.
             SensorKind::Imu if row.h.get(HEADING) == Some(&0.0) => self.tilt.note(agrees),
             _ => {}
         }
     }
 
-    /// Adds to the variances if a kind of measurement no longer agrees with the estimate.
+    /// Adds to the variances of the estimate if one kind of measurement no longer agrees with the estimate.
     ///
     /// The additions go to the measured part of the state, and to the errors that may have caused the disagreement.
     pub fn seek(&mut self, variances: &mut Errors) {
@@ -86,7 +86,7 @@ impl Agreement {
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);
-            // The tunnel may be wider from this place on.
+            // The scale of ranges may be wrong, because the tunnel may be wider from this chainage on.
             add(variances, RANGES..RANGES + 1, LOST_SCALE);
         }
         if tilt {
@@ -95,8 +95,8 @@ impl Agreement {
     }
 }
 
-/// Adds to the variances when the chainage is lost. The addition may be large, because no model is linearised about
-/// the chainage.
+/// Adds to the variances of chainage, speed and tilt when the chainage is lost. The addition may be large, because no
+/// model is linearised about the chainage.
 pub fn seek_way(variances: &mut Errors) {
     add(variances, POSITION..POSITION + 1, LOST_WAY_M);
     add(variances, VELOCITY..VELOCITY + 1, LOST_WAY_MPS);

@@ -20,13 +20,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{MAX_SOURCES, Reading};
 
-/// Alignment time.
+/// Duration of the filter's alignment.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);
-/// Maximum number of echoes per echosounder, of which the median is used.
+/// Maximum number of echoes kept per echosounder; the median of their ranges is used.
 const ECHOES: usize = 9;
-/// Initial standard deviations, in the order below.
+/// Initial standard deviations of the estimate, in the order of this list:
 ///
-/// - Position in the section with echoes, and without.
+/// - Position in the cross-section with echoes, and without.
 /// - Chainage without a cable reading.
 /// - Yaw without a compass. The vehicle is then assumed to face along the tunnel.
 /// - Velocity.
@@ -47,7 +47,7 @@ const SCALE_SD: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub struct Listening {
     since: Option<MonoNs>,
-    /// Chainage of the lost estimate, and the standard deviation of that chainage, m.
+    /// Chainage of the previous estimate, which was lost, and the standard deviation of that chainage, m.
     before: Option<(f64, f64)>,
     hears_wall: bool,
     attitude: Option<Rot<Tunnel, Body>>,
@@ -59,12 +59,12 @@ pub struct Listening {
 
 stateful!(Listening { state: since, before, hears_wall, attitude, force, told, height_m; slots: echoes; });
 
-/// A cable reading.
+/// A reading of the cable counter.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Told {
     at: MonoNs,
     chainage_m: f64,
-    /// Distance from the zero of the cable counter, m.
+    /// Length of cable since the zero of the cable counter, m.
     way_m: f64,
     sd_m: f64,
 }
@@ -92,7 +92,7 @@ impl Default for Listening {
 }
 
 impl Listening {
-    /// Adds a reading.
+    /// Adds a sensor reading to the alignment.
     pub fn hear(
         &mut self,
         context: &Context,
@@ -133,17 +133,18 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // After a silence, the other sensors may also have returned only now. So the alignment starts here.
+            // After a silence, the other sensors may also have begun to send only now. So the alignment restarts at
+            // this echo.
             self.since = Some(at);
         }
     }
 
-    /// Creates an alignment after the loss of an estimate with this chainage and standard deviation, m.
+    /// Creates an alignment after an estimate was lost; `before` is its last chainage with standard deviation, m.
     pub fn after(before: Option<(f64, f64)>) -> Self {
         Self { before, ..Self::default() }
     }
 
-    /// Returns the chainage of the lost estimate and its standard deviation, m.
+    /// Returns the chainage of the previous, lost estimate and the standard deviation of that chainage, m.
     pub fn before(&self) -> Option<(f64, f64)> {
         self.before
     }
@@ -159,15 +160,15 @@ impl Listening {
         }
     }
 
-    /// Returns the start of the alignment, as a time of validity.
+    /// Returns the start time of the alignment, as a time of validity.
     pub fn since(&self) -> Option<MonoNs> {
         self.since
     }
 
     /// Returns the first estimate, valid at `at`; `None` until the alignment has lasted long enough.
     pub fn settle(&self, at: MonoNs, context: &Context) -> Option<(State, Factors<ERRORS>)> {
-        // After a loss, the alignment waits for an echo of the wall. Without an echo, the new estimate would be no
-        // better than the lost one.
+        // After the loss of an estimate, the alignment waits for an echo of the wall. Without an echo, the new
+        // estimate would be no better than the lost one.
         if at.since(self.since?).0 < LISTENS.0 || (self.before.is_some() && !self.hears_wall) {
             return None;
         }
@@ -215,11 +216,11 @@ impl Listening {
             }
         }
         let ones = [
-            // Part of the slack that is not correlated with the slack rate.
+            // Part of the slack variance that is not correlated with the slack rate.
             (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
             (SLACK_RATE, settings.slack.drive()),
-            // Error accumulated between the zero of the counter and the present position. Later scale errors add to
-            // it.
+            // Chainage error that the cable's scale has caused between the counter's zero and the present position.
+            // Later scale errors add to it.
             (CREEP, settings.scale_sd * self.told.map_or(0.0, |told| told.way_m.abs())),
             (SCALE, SCALE_SD),
             (DEPTH, settings.depth_offset_sd_m),
@@ -287,7 +288,8 @@ mod tests {
 
     /// Repeated readings of cable and compass add no information.
     ///
-    /// The chainage stays as uncertain as slack and scale, and the yaw stays as uncertain as the compass deviation.
+    /// The chainage stays as uncertain as slack and scale make it. The yaw stays as uncertain as the compass
+    /// deviation makes it.
     #[test]
     fn repeated_readings_after_alignment_add_no_information() {
         let context = Context {

@@ -11,20 +11,21 @@ use headrace_geometry::math;
 
 /// Averaging time of the ratio of squared corrections to expected squares, s.
 const MEMORY_S: f64 = 10.0;
-/// Mean ratio above which the noise is raised. Per second, the noise rises by the ratio to the power
+/// Mean ratio above which the process noise is raised. Per second, it is multiplied by the ratio to the power
 /// `RAISES_PER_S`.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// Mean ratio below which a raised noise decays, and the time constant of this decay, s.
+/// Mean ratio below which a raised process noise decays, and the time constant of this decay, s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
-/// Initial factor: the biases of a unit are assumed to drift fast until its readings show otherwise.
+/// Initial noise factor: biases of an inertial unit are assumed to drift fast until its readings show otherwise.
 const AT_FIRST: f64 = 1e3;
-/// Random walk of the worst supported unit, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
+/// Random walk of the biases of the worst supported inertial unit, per root of a second: 0.3 degrees/s and 50 mm/s^2
+/// in 300 s.
 const MOST_RATE: f64 = 4.3e-4;
 const MOST_FORCE: f64 = 4.1e-3;
 
-/// Factors of the process noise of gyro and accelerometer biases.
+/// Learnt factors that multiply the process noise of gyro and accelerometer biases.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BiasDrift([Ratio; 2]);
 
@@ -42,27 +43,28 @@ impl Default for BiasDrift {
     }
 }
 
-/// Returns the largest factor for a process. With it, the bias drifts as fast as in the worst supported unit.
+/// Returns the largest noise factor of a bias, at which the bias drifts as fast as in the worst supported unit.
 fn most(wander: GaussMarkov, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)
 }
 
 impl BiasDrift {
-    /// Records a correction.
+    /// Records the correction of the biases by a measurement.
     ///
     /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the variance of the
     /// innovation, and its normalised square.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
-            // The expected square is (P h / s)^2 s, summed over the axes.
+            // The expected square is (P h / s)^2 s, summed over the axes. P h is a covariance, and s is the
+            // innovation's variance.
             let expected = covariances.iter().map(|c| c * c).sum::<f64>() / variance;
             ratio.expected += expected;
             ratio.corrected += expected * nis;
         }
     }
 
-    /// Adapts the factors after an epoch of length `dt_s`.
+    /// Adapts the noise factors after an epoch of length `dt_s`.
     pub fn pass(&mut self, dt_s: f64, settings: &Settings) {
         let limits = [most(settings.rate_bias, MOST_RATE), most(settings.force_bias, MOST_FORCE)];
         for (ratio, most) in self.0.iter_mut().zip(limits) {

@@ -1,8 +1,8 @@
 //! Decides whether cable counter and estimate agree.
 //!
-//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are
-//! kept. The counter's readings are withheld, and the inertial unit alone carries the chainage. The chainage is as
-//! uncertain as the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are kept.
+//! The counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the
+//! chainage equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
 //! estimate disagree".
 
 use serde::{Deserialize, Serialize};
@@ -12,73 +12,72 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Averaging time of innovations, s.
+/// Averaging time of the cable counter's innovations, s.
 const RECENT_S: f64 = 1.0;
-/// Mean innovation at which a dispute begins, as a multiple of the mean's standard deviation for white innovations.
+/// Mean innovation at which counter and estimate disagree, as a multiple of the mean's sd for white innovations.
 ///
 /// For limits from 3 to 6, about the same number of seeded dives has an unreported error. With 4, a slack of seven
-/// times the declared size causes a dispute with a sound counter.
+/// times the declared size makes a sound counter disagree.
 const DISPUTED_SDS: f64 = 5.0;
 /// Limit at which each innovation is clipped, in standard deviations.
 const MOST_SDS: f64 = 6.0;
-/// Smallest innovation that begins a dispute, m.
+/// Smallest innovation at which counter and estimate disagree, m.
 const LEAST_M: f64 = 0.01;
-/// Time after which an unchanged count means a stuck counter, if slack otherwise moves the counter constantly.
+/// Time after which an unchanged count means a stuck counter, if slack has moved the counter constantly before.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
 /// Counts that differ by less than this are equal, m.
 const SAME_COUNT_M: f64 = 1e-6;
-/// Time after which a dispute is reported, and time for which readings must agree to end it.
+/// Time after which a disagreement is reported, and time for which readings must agree with the estimate to end it.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum sd of the innovation at which an agreeing reading proves that nothing was lost, m.
+/// Maximum sd of the innovation at which an agreeing reading proves that the counter has lost no length, m.
 const SURE_M: f64 = 0.3;
-/// Maximum difference at which the counter has caught up with the vehicle, m: this share of the vehicle's distance
-/// since the dispute began, plus this length.
+/// Maximum difference at which the counter has caught up with the vehicle, m: a share of the vehicle's distance since
+/// the disagreement began, plus a length.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// Maximum difference at which the counter follows the vehicle's motion, m: this share of the distance, plus this
-/// length.
+/// Maximum difference at which the counter follows the vehicle's motion, m: a share of the distance, plus a length.
 ///
 /// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
 const SAME_M: f64 = 0.01;
-/// Additional share while the vehicle's own distance is uncertain.
+/// Share of the distance that is added to `SAME_SHARE` while the estimated distance is uncertain.
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// Difference of the hypotheses at which the estimate is given up, m; includes the sd of the innovation.
+/// Difference between counter and estimate at which the estimate is given up, m; includes the innovation's sd.
 ///
 /// The counter must also have counted `ALIVE_M` since the difference was reached, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
-/// A dispute between counter and estimate.
+/// A disagreement between cable counter and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableDoubt {
-    /// Time at which the readings left their expected range.
+    /// Time at which the counter's readings left the range that the estimate predicts.
     pub since: MonoNs,
-    /// Expected chainage at that time, m.
+    /// Chainage that the estimate predicted when the disagreement began, m.
     pub from_m: f64,
-    /// Largest difference so far between the counter and the other source, m.
+    /// Largest difference so far between the counter and the estimate or velocity log, m.
     pub differs_m: f64,
-    /// Velocity log that differs from the counter; `None` if the estimate differs.
+    /// Velocity log that disagrees with the counter; `None` if the estimate disagrees.
     pub log: Option<SourceId>,
 }
 
 /// A cable reading compared with the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableReading {
-    /// Time of validity.
+    /// Time of validity of the reading.
     pub at: MonoNs,
     /// Chainage shown by the counter, m.
     pub shown_m: f64,
-    /// Shown chainage less expected chainage, m.
+    /// Shown chainage minus expected chainage, m.
     pub off_m: f64,
     /// Standard deviation of `off_m`, m.
     pub sd_m: f64,
     /// Whether the reading is within the gate.
     pub agrees: bool,
-    /// Whether the reading agrees with the motion of the inertial unit as well as usual.
+    /// Whether the reading differs from the inertial motion by no more than usual.
     pub is_usual: bool,
     /// Whether slack constantly moves the counter by several steps.
     pub is_lively: bool,
@@ -90,18 +89,18 @@ impl CableReading {
     }
 }
 
-/// Decision about a reading.
+/// Decision about the use of a cable reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Use {
-    /// Fuse the reading.
+    /// Fuse the cable reading.
     Fuse,
-    /// Ignore the reading.
+    /// Ignore the cable reading.
     Withhold,
-    /// Ignore readings from now on, and revert the counter's last corrections.
+    /// Counter and estimate disagree: ignore readings from now on, and revert the counter's last corrections.
     ///
-    /// The values are these corrections of chainage and speed, m and m/s.
+    /// The values are the corrections of chainage and speed to revert, m and m/s.
     Dispute([f64; 2]),
-    /// The counter runs correctly again. The value is the difference that remains: shown less expected chainage, m.
+    /// The counter runs correctly again. The value is the difference that remains: shown minus expected chainage, m.
     Slipped(f64),
     /// Give up the estimate and restart from the running counter, which may be wrong by this length, m.
     Seek(f64),
@@ -110,50 +109,51 @@ pub enum Use {
 /// State of the comparison between cable counter and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Cable {
-    /// The last reading.
+    /// The last cable reading.
     last: Option<CableReading>,
-    /// The last reading that has another count than the previous reading.
+    /// The last reading whose count differs from the previous one.
     changed: Option<CableReading>,
     /// The first of the present series of readings beyond the gate.
     left: Option<CableReading>,
-    /// Recent effect of the counter's readings on the estimate.
+    /// Recent corrections of the estimate by the counter's readings.
     pub corrections: CounterCorrections,
-    /// Running mean of the innovations, in standard deviations.
+    /// Running mean of the cable counter's innovations, in standard deviations.
     mean_sds: f64,
     dispute: Option<Dispute>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Dispute {
-    /// The first withheld reading.
+    /// The first cable reading that was withheld from the filter.
     first: CableReading,
     /// First reading of the present series in which the counter follows the vehicle's motion.
     same_from: CableReading,
-    /// Time since which readings agree again.
+    /// Time since which readings agree with the estimate again.
     agreeing_from: Option<MonoNs>,
-    /// Counter reading at the time when the estimate was lost, m.
+    /// Counter reading when the difference from the estimate first exceeded `LOST_M`, m.
     lost_from_m: Option<f64>,
-    /// Longest distance since the first withheld reading, by counter or estimate, and the largest difference, m.
+    /// Since the first withheld reading: longest distance, by counter or estimate, and largest difference between
+    /// them, m.
     longest_m: f64,
     most_m: f64,
 }
 
 impl Cable {
-    /// Returns the dispute once it has lasted for `NOTICED_AFTER`.
+    /// Returns the disagreement of counter and estimate once it has lasted for `NOTICED_AFTER`.
     pub fn doubt(&self, now: MonoNs) -> Option<CableDoubt> {
         let Dispute { first, most_m: differs_m, .. } = self.dispute?;
         let has_lasted = now.since(first.at).0 >= NOTICED_AFTER.0;
         has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), differs_m, log: None })
     }
 
-    /// Difference between the hypotheses, m; 0 while counter and estimate agree and the count changes.
+    /// Difference between the chainages by counter and by estimate, m; 0 while they agree and the count changes.
     pub fn differs_m(&self) -> f64 {
         let disagrees = self.dispute.is_some() || self.left.is_some();
         let off_m = self.last.filter(|_| disagrees).map_or(0.0, |last| last.off_m);
         math::hypot(off_m, self.corrections.lost_m())
     }
 
-    /// Processes a reading and decides what to do with it.
+    /// Processes a cable reading and decides whether to fuse it.
     pub fn take(&mut self, reading: &CableReading) -> Use {
         let before = self.last.replace(*reading);
         let is_later = before.is_none_or(|before| before.at <= reading.at);
@@ -171,7 +171,7 @@ impl Cable {
         self.corrections.pass(dt_s, is_same);
         let off_sds = (reading.off_m / reading.sd_m).clamp(-MOST_SDS, MOST_SDS);
         self.mean_sds = left * self.mean_sds + (1.0 - left) * off_sds;
-        // The mean is compared with the standard deviation of a running mean of white innovations.
+        // The mean innovation is compared with the standard deviation that it would have if innovations were white.
         let is_apart = self.mean_sds.abs() > DISPUTED_SDS * math::sqrt((1.0 - left) / (1.0 + left));
         if let Some(first) = self.goes_wrong(reading, is_apart) {
             self.dispute = Some(Dispute::between(first, reading));
@@ -197,7 +197,8 @@ impl Cable {
         if reading.agrees {
             self.left = None;
         }
-        // If the estimate is uncertain, unusual readings begin no dispute, because the estimate needs the counter.
+        // If the estimate is uncertain, unusual readings start no disagreement, because the estimate needs the
+        // counter.
         let is_unusual = !reading.is_usual && reading.sd_m <= SURE_M;
         let disagrees = is_unusual || is_apart && reading.off_m.abs() > LEAST_M;
         disagrees.then_some(first)
@@ -205,7 +206,7 @@ impl Cable {
 }
 
 impl Dispute {
-    /// Starts a dispute that began with the reading `first`.
+    /// Starts a disagreement whose first withheld reading is `first`.
     fn between(first: CableReading, reading: &CableReading) -> Self {
         Self {
             first,
@@ -257,7 +258,7 @@ impl Dispute {
     }
 }
 
-/// Returns the distance between two readings, m: by counter or by estimate, whichever is longer.
+/// Returns the distance travelled between two readings, m: by counter or by estimate, whichever is longer.
 fn way_m(first: &CableReading, reading: &CableReading) -> f64 {
     let expected_m = (reading.expected_m() - first.expected_m()).abs();
     expected_m.max((reading.shown_m - first.shown_m).abs())
@@ -276,8 +277,9 @@ mod tests {
         CableReading { at, shown_m, off_m, sd_m, agrees, is_usual: true, is_lively: false }
     }
 
-    /// Returns when a dispute begins, s. The vehicle moves at 0.1 m/s; from 10 s on, the counter shows `share` of
-    /// the motion.
+    /// Returns the time at which counter and estimate begin to disagree, s. The vehicle moves at 0.1 m/s; from 10 s
+    /// on, the counter shows
+    /// `share` of the motion.
     fn disputed_at(share: f64, change: impl Fn(f64, &mut CableReading)) -> Option<f64> {
         let mut cable = Cable::default();
         (0..200).map(|k| f64::from(k) / 10.0).find(|t| {
@@ -289,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn stuck_or_slipping_counter_is_disputed_within_4_s() {
+    fn stuck_or_slipping_counter_is_detected_within_4_s() {
         for (share, within_s) in [(0.0, 1.0), (0.4, 1.5), (-1.0, 0.8), (0.85, 4.0)] {
             let at_s = disputed_at(share, |_, _| {}).unwrap();
             assert!((10.1..10.0 + within_s).contains(&at_s), "{share}: {at_s}");
@@ -297,10 +299,11 @@ mod tests {
         assert_eq!(disputed_at(1.0, |_, _| {}), None);
     }
 
-    /// The running mean of white innovations has a standard deviation of 0.22. An innovation of constantly 1.5
-    /// brings the mean to five times this value after 1.4 s. An innovation of constantly 1 never does.
+    /// The running mean of white innovations has a standard deviation of 0.22. A constant innovation of 1.5 standard
+    /// deviations brings the mean to five times this value after 1.4 s. A constant innovation of 1 standard deviation
+    /// never does.
     #[test]
-    fn cable_counter_is_disputed_after_biased_innovations() {
+    fn persistently_biased_innovations_start_a_cable_disagreement() {
         let off = |sds: f64, sd_m: f64| {
             disputed_at(1.0, |t, reading| {
                 (reading.off_m, reading.sd_m) = (if t < 3.0 { 0.0 } else { sds * sd_m }, sd_m);
@@ -319,13 +322,13 @@ mod tests {
     }
 
     #[test]
-    fn cable_counter_is_disputed_after_unusual_motion_within_the_gate() {
+    fn unusual_readings_within_the_gate_start_a_cable_disagreement() {
         let at_s = disputed_at(1.0, |t, reading| reading.is_usual = t < 4.0).unwrap();
         assert!((at_s - 4.0).abs() < 1e-9, "{at_s}");
     }
 
     #[test]
-    fn stationary_counter_is_disputed_only_if_the_cable_slack_varies_strongly() {
+    fn stationary_counter_counts_as_stuck_only_if_cable_slack_varies_strongly() {
         let stands = |is_lively: bool| {
             move |t: f64, reading: &mut CableReading| {
                 reading.shown_m = if t < 6.0 { reading.shown_m } else { 7.6 };
@@ -338,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn dispute_while_the_count_is_constant_reverts_the_last_second() {
+    fn cable_disagreement_at_a_constant_count_reverts_the_last_second_of_corrections() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);
@@ -347,13 +350,13 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // Ten equal corrections a second are summed, and the sum decays over a second. It tends to 1 / (e^0.1 - 1)
-        // corrections.
+        // Ten equal corrections a second are summed, and the sum decays over a second. The sum tends to 1 / (e^0.1 -
+        // 1) corrections.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
     #[test]
-    fn disputed_counter_difference_is_the_last_innovation_and_reported_after_1_s() {
+    fn cable_disagreement_is_reported_after_1_s_with_the_last_innovation() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -370,7 +373,8 @@ mod tests {
         assert!((doubt.from_m - 7.02).abs() < 1e-12 && (doubt.differs_m - 0.5).abs() < 1e-12, "{doubt:?}");
     }
 
-    /// Returns when the dispute of a counter that was wrong by -0.4 m ends, s, and how it ends.
+    /// Returns the time at which a disagreement ends, s, and the decision that ends it. At first, the counter is
+    /// wrong by -0.4 m.
     ///
     /// The vehicle moves at `speed_mps`, and the counter shows `share` of this motion. The innovation has the sd
     /// `sd_m`.
@@ -384,18 +388,18 @@ mod tests {
         times.map(|t| (t, dispute.take(&reading(t)))).find(|(_, used)| *used != Use::Withhold)
     }
 
-    /// The tolerance is a tenth of the distance plus a centimetre.
+    /// A counter follows the vehicle if the difference is within a tenth of the distance plus a centimetre.
     ///
-    /// While the vehicle's own distance is uncertain, it is four tenths of the distance plus a centimetre.
+    /// While the estimated distance is uncertain, the tolerance is four tenths of the distance plus a centimetre.
     #[test]
-    fn dispute_ends_as_a_slip_once_counter_and_vehicle_speeds_match() {
+    fn counter_counts_as_slipped_once_its_speed_matches_the_vehicle_again() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
             (1.0, 0.1, 0.0, 1.0, -0.4),
             (1.0, 0.2, 0.0, 1.0, -0.4),
             (0.95, 0.1, 0.0, 1.0, -0.405),
             (0.8, 0.1, 0.5, 1.0, -0.42),
             (1.3, 0.1, 0.5, 1.0, -0.37),
-            // At this speed, a distance of 5 cm takes longer than a second.
+            // At this speed, the vehicle needs more than a second for 5 cm.
             (1.0, 0.03, 0.0, 1.7, -0.4),
         ] {
             let Some((found_s, Use::Slipped(found_m))) = ends(share, speed_mps, sd_m) else {
@@ -403,14 +407,14 @@ mod tests {
             };
             assert!((found_s - at_s).abs() < 1e-6 && (found_m - lost_m).abs() < 1e-6, "{found_s} {found_m}");
         }
-        // A stationary counter does not end the dispute, whether the vehicle moves or not.
+        // A stationary counter does not end the disagreement, whether the vehicle moves or not.
         for (share, speed_mps) in [(0.0, 0.02), (1.0, 0.0)] {
             assert_eq!(ends(share, speed_mps, 0.0), None, "{share} {speed_mps}");
         }
     }
 
-    /// Beyond a difference of one metre, the estimate is given up if the counter runs. If the counter is stationary,
-    /// the estimate is kept.
+    /// If counter and estimate differ by over one metre and the counter runs, the estimate is given up. If the
+    /// counter is stationary, the estimate is kept.
     #[test]
     fn estimate_off_by_over_1_m_restarts_from_a_running_counter() {
         let (_, used) = ends(2.0, 0.3, 1.1).unwrap();

@@ -17,13 +17,13 @@ use crate::relative::Relative;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Time between two clones.
+/// Time between two clones of the filter's errors.
 pub const STEP: DurNs = DurNs(2_000_000_000);
-/// Number of clones kept: over four turns of a head in its slowest mode (4 x 28 s).
+/// Number of clones kept. Together they cover over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
 /// Ratio of the new to the old variance of the chainage below which the chainage counts as suddenly more certain.
 ///
-/// This happens, for instance, when a silent cable returns.
+/// This happens, for instance, when the cable counter sends again after a silence.
 const SURE_SHARE: f64 = 0.1;
 /// Errors that move a sample along the tunnel: chainage, pitch and yaw.
 pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
@@ -33,21 +33,21 @@ type Square = [Errors; ERRORS];
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Moment {
     at: MonoNs,
-    /// Rows of the covariance at the time of the clone.
+    /// Rows of the error covariance at the time of the clone, for the errors in `MOVING`.
     rows: [Errors; 3],
-    /// Columns of the transition of errors from the previous clone.
+    /// Columns of the matrix that propagates errors from the previous clone to this one.
     since_last: Square,
-    /// Covariance relative to the newest clone.
+    /// Covariance of this clone's errors relative to the newest clone's errors.
     relative: Relative,
 }
 
 impl Moment {
-    /// Variance of the chainage, m^2.
+    /// Variance of the chainage at the time of the clone, m^2.
     fn chainage_m2(&self) -> f64 {
         self.rows[0][POSITION]
     }
 
-    /// Whether the chainage is much more uncertain than a later chainage with this variance, m^2.
+    /// Whether this clone's chainage is much more uncertain than a later chainage with the variance `later_m2`.
     fn is_unsure_beside(&self, later_m2: f64) -> bool {
         later_m2 < SURE_SHARE * self.chainage_m2()
     }
@@ -56,10 +56,10 @@ impl Moment {
 /// Clones of earlier errors, for relative covariances.
 #[derive(Debug, Clone)]
 pub struct ErrorClones {
-    /// Clones, in a ring buffer.
+    /// Clones of earlier errors, in a ring buffer.
     clones: Vec<Moment>,
     count: usize,
-    /// Columns of the transition of errors from the newest clone to the present.
+    /// Columns of the matrix that propagates errors from the newest clone to the present.
     since: Square,
 }
 
@@ -78,7 +78,7 @@ impl ErrorClones {
         (self.count, self.since) = (0, identity());
     }
 
-    /// Propagates the errors by a transition.
+    /// Propagates the present errors by an error transition.
     pub fn carry(&mut self, transition: &Transition) {
         for column in &mut self.since {
             transition.apply(column);
@@ -121,7 +121,8 @@ impl ErrorClones {
         self.compare();
     }
 
-    /// Returns the covariance of the newest clone relative to the time `lag` before it.
+    /// Returns the covariance of the newest clone's errors relative to the errors at the time `lag` before that
+    /// clone.
     ///
     /// `None` if there are fewer than two clones. A lag beyond the oldest clone is extrapolated.
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
@@ -203,7 +204,7 @@ fn sum(a: &Errors, b: &Errors) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Product of a row and a matrix given by columns.
+/// Product of a row vector and a matrix that is given by its columns.
 fn product(row: &Errors, columns: &Square) -> Errors {
     columns.map(|column| sum(row, &column))
 }
@@ -218,11 +219,11 @@ mod tests {
 
     use super::*;
 
-    /// Soundings placed before a silent cable returns stay uncertain.
+    /// Soundings placed while the cable counter is silent stay uncertain.
     ///
-    /// They do not become gradually more certain over the last 2 s before the return.
+    /// They do not become gradually more certain over the last 2 s before the counter sends again.
     #[test]
-    fn soundings_before_a_silent_cable_returns_stay_uncertain() {
+    fn soundings_placed_while_the_cable_counter_is_silent_stay_uncertain() {
         let mut clones = ErrorClones::default();
         let mut factors = Factors::independent(core::array::from_fn(|_| 1.0));
         let at = |k: i64| MonoNs(0) + DurNs::from_millis(100 * k);
@@ -236,7 +237,7 @@ mod tests {
         let sd_m = |clones: &ErrorClones, lag_s: f64| {
             clones.relative(DurNs::from_secs_f64(lag_s)).unwrap().sd_m(Vec3::zero())
         };
-        // The last clone before the cable's return was 1.1 s old.
+        // The last clone was 1.1 s old when the cable counter sent again.
         for lag_s in [0.1, 0.5, 1.1, 2.0, 4.0] {
             let is_m = sd_m(&clones, lag_s);
             assert!((is_m - 1.0).abs() < 0.01, "{lag_s}: {is_m}");
@@ -244,7 +245,8 @@ mod tests {
         for k in 52..=90 {
             clones.note(at(k), &factors);
         }
-        // The clones since then, at 5.1 s and 7.1 s, are certain. Soundings placed before them stay uncertain.
+        // The clones taken since the counter sent again, at 5.1 s and 7.1 s, are certain. Soundings placed before
+        // them stay uncertain.
         let [since_m, before_m] = [1.9, 4.0].map(|lag_s| sd_m(&clones, lag_s));
         assert!(since_m < 0.1 && (before_m - 1.0).abs() < 0.01, "{since_m} {before_m}");
     }

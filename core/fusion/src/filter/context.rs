@@ -10,7 +10,7 @@ use headrace_geometry::tunnel::Profile;
 /// Design, site and settings of a dive.
 #[derive(Debug, Clone)]
 pub struct Context {
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: Profile,
     /// Water and location of the tunnel.
     pub site: Site,
@@ -21,7 +21,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// Returns the part of the context that setting checks need.
+    /// Returns the part of the context that the detection of wrong settings needs.
     pub(super) fn design(&self) -> Design<'_> {
         let Self { profile, site, settings, unit_at } = self;
         Design { profile, site, settings, unit_at: *unit_at }

@@ -11,49 +11,50 @@ use headrace_geometry::math;
 
 /// Time constant for forgetting corrections while the count changes, s.
 ///
-/// They are kept for a while because a counter fails some time before the failure is noticed.
+/// Corrections are kept for a while, because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
-/// Minimum time after which an unchanged count is a stop of the vehicle, s. Shorter pauses may come from slow motion
-/// and coarse steps.
+/// Minimum time after which an unchanged count means a stop of the vehicle, s. Shorter pauses may come from slow
+/// motion and coarse steps.
 const STANDS_S: f64 = 2.0;
-/// Standard deviation of the possible loss, as a share of the corrections.
+/// Standard deviation of the length that a stuck wheel may have lost, as a share of the corrections.
 ///
-/// The wheel is assumed to be stuck in one of ten such cases, so the variance of the loss is a tenth of the squared
-/// corrections.
+/// The wheel is assumed to be stuck in one of ten such cases, so the variance of the lost length is a tenth of the
+/// squared corrections.
 const STUCK_SHARE: f64 = 0.3;
 /// Corrections up to this many predicted standard deviations count as chance.
 ///
-/// With 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %. With 1, stuck
-/// wheels cause unreported errors in 9 of 800 dives, instead of 6.
+/// With a limit of 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %.
+/// With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, instead of 6.
 const CHANCE_SDS: f64 = 0.5;
-/// Time for which a possible loss adds to the relative error between passes, s: about one turn of a head.
+/// Time for which a possibly lost length adds to the relative error between head passes, s: about one head turn.
 ///
 /// Only the corrections in the first such period of a stationary count are added up. Later corrections of a
 /// hovering vehicle say nothing about the wheel.
 const PASSES_S: f64 = 20.0;
 
-/// Corrections by the cable counter, and the possible loss if its wheel has stuck.
+/// Corrections by the cable counter, and the length that the counter has lost if its wheel has stuck.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CounterCorrections {
-    /// Corrections of chainage and speed in the last second, m and m/s.
+    /// Sums of the corrections of chainage and speed in the last second, m and m/s.
     recent: [f64; 2],
-    /// Corrections since shortly before the count stopped changing, m and m/s. The first sum includes the
-    /// integral of the second.
+    /// Sums of the corrections since shortly before the count stopped changing, m and m/s. The chainage sum includes
+    /// the integral of the speed sum.
     sums: [f64; 2],
-    /// Standard deviations that the covariance predicts for these sums, m and m/s.
+    /// Standard deviations of the correction sums that the filter's covariance predicts, m and m/s.
     by_chance: [f64; 2],
-    /// Time for which the count has been stationary, s.
+    /// Time for which the cable count has not changed, s.
     stood_s: f64,
-    /// Standard deviations of the possible loss, m: of the chainage since the count became stationary, and of the
-    /// relative position between passes.
+    /// Standard deviations of the length lost if the wheel has stuck, m: since the count became stationary, and
+    /// between two head passes.
     lacks_m: f64,
     lost_m: f64,
-    /// Variance of the possible permanent loss since the last call of `take_slipped_m2`, m^2.
+    /// Variance of the length that the counter may have lost permanently since the last call of `take_slipped_m2`,
+    /// m^2.
     slipped_m2: f64,
 }
 
 impl CounterCorrections {
-    /// Records the effect of a fused reading.
+    /// Records how a fused cable reading changed the estimate.
     ///
     /// Inputs: the corrections of chainage and speed, m and m/s, and the reductions of their variances, m^2 and
     /// m^2/s^2.
@@ -107,22 +108,23 @@ impl CounterCorrections {
         }
     }
 
-    /// Returns the corrections of the last second, m and m/s, and clears all corrections.
+    /// Returns the sums of the corrections in the last second, m and m/s, and clears all sums.
     ///
-    /// On a cable that is wound in by half metres, most corrections after a change of the count are right. When all
-    /// corrections were reverted, the chainage error grew to between 4 and 18 m, instead of 1 to 3 m (scene
+    /// On a cable that is wound in half a metre at a time, most corrections after a change of the count are right.
+    /// When all corrections were reverted, the chainage error grew to between 4 and 18 m, instead of 1 to 3 m (scene
     /// `leak-current`).
     pub fn take_back(&mut self) -> [f64; 2] {
         core::mem::take(self).recent
     }
 
-    /// Returns the standard deviation of the possible loss between passes, m.
+    /// Returns the standard deviation of the length that a stuck wheel may have lost between two head passes, m.
     pub fn lost_m(&self) -> f64 {
         debug_assert!(self.lost_m >= 0.0, "a standard deviation isn't negative: {} m", self.lost_m);
         self.lost_m
     }
 
-    /// Returns the variance of the possible permanent loss since the last call, m^2, and clears it.
+    /// Returns and clears the variance of the length that the counter may have lost permanently since the last call,
+    /// m^2.
     pub fn take_slipped_m2(&mut self) -> f64 {
         core::mem::take(&mut self.slipped_m2)
     }
@@ -144,13 +146,13 @@ mod tests {
         corrections
     }
 
-    /// Number of corrections in a sum that decays over a second: 1 / (e^0.1 - 1), plus the last correction.
+    /// Effective number of corrections in a sum that decays over a second: 1 / (e^0.1 - 1), plus the last correction.
     fn lately() -> f64 {
         1.0 / (math::exp(0.1) - 1.0) + 1.0
     }
 
     #[test]
-    fn dispute_while_the_count_changes_reverts_the_last_second() {
+    fn cable_disagreement_at_a_changing_count_reverts_the_last_second_of_corrections() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -160,15 +162,15 @@ mod tests {
 
     /// Even after a long stop, only the corrections of the last second are reverted.
     #[test]
-    fn dispute_after_a_long_stop_reverts_only_the_last_second_of_corrections() {
+    fn cable_disagreement_after_a_long_stop_reverts_only_the_last_second_of_corrections() {
         let [way_m, speed_mps] = stood(50, -0.002, [0.0; 2]).take_back();
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
     }
 
-    /// The loss is the difference between the estimates with and without the counter. A speed correction adds
-    /// distance to it.
+    /// The possibly lost length is the difference between the estimates with and without the counter. So a speed
+    /// correction adds speed times time.
     #[test]
-    fn speed_corrections_add_to_the_possible_loss_of_distance() {
+    fn speed_corrections_increase_the_length_that_a_stuck_counter_may_have_lost() {
         let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));
         let expected_m = 0.001 * (lately() + 49.0) + speeds.map(|speed| 0.1 * speed).sum::<f64>();
         let lost_m = stood(50, 0.002, [0.0; 2]).lost_m();
@@ -176,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn possible_loss_of_distance_is_0_3_of_corrections_beyond_chance() {
+    fn sd_of_a_stuck_wheel_loss_is_0_3_of_the_corrections_beyond_chance() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
         // The predicted standard deviation makes half of the corrections count as chance.
@@ -192,7 +194,7 @@ mod tests {
 
     /// After the first 20 s, corrections have the opposite sign, as for a hovering vehicle.
     #[test]
-    fn corrections_after_20_s_of_a_stop_add_no_possible_loss() {
+    fn corrections_after_20_s_of_a_stop_add_no_stuck_wheel_loss() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");
@@ -203,10 +205,11 @@ mod tests {
         assert!((corrections.lost_m() - first_m).abs() < 0.004, "{}", corrections.lost_m());
     }
 
-    /// The possible loss adds to the relative error between passes for one turn of a head. It adds to the error of the
-    /// position permanently. A slow vehicle with coarse steps makes short stops, which do not count.
+    /// The length that a stuck wheel may have lost adds to the relative error between passes for one head turn, and
+    /// to the position error permanently. Short stops do not count, because a slow vehicle with coarse counter steps
+    /// makes many of them.
     #[test]
-    fn possible_loss_during_a_long_stop_remains_after_the_count_changes() {
+    fn stuck_wheel_loss_in_a_long_stop_remains_after_the_count_changes_again() {
         for (readings, slips) in [(15, false), (50, true)] {
             let mut corrections = stood(readings, 0.0, [0.0; 2]);
             let before_m = corrections.lost_m();

@@ -9,33 +9,33 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of changes per block. The larger step of the last two blocks counts, because a garbled reading spoils
-/// only one.
+/// Number of changes per block. The larger step of the last two blocks counts, because a garbled reading spoils only
+/// one block.
 const BLOCK: u32 = 50;
 /// Assumed step of a counter that has not moved yet, m; common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;
 /// Maximum number of readings that are assumed to share one rounding error.
 const MOST_LOOKS: f64 = 50.0;
 
-/// Step detector of a tether counter. It measures changes in units of the stated step.
+/// Detector of a tether counter's resolution step. Changes of the count are in units of the stated step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CountStep {
     last_m: Option<f64>,
     /// Time of the last change of the count.
     changed: MonoNs,
-    /// Smallest change, largest change and greatest common divisor of the changes in the present block.
+    /// Smallest change of the count, largest change, and greatest common divisor of all changes in the present block.
     smallest: u64,
     largest: u64,
     common: u64,
     /// Number of readings that differ from the previous reading, and number of readings equal to it.
     changes: u32,
     stands: u32,
-    /// Steps found in the last two blocks that showed a step.
+    /// Resolution steps found in the last two blocks that showed a step.
     blocks: [u64; 2],
 }
 
 impl CountStep {
-    /// Processes a reading; `stated_m` is the counter's stated step, m.
+    /// Processes a counter reading; `stated_m` is the step stated in the vehicle file, m.
     pub fn hear(&mut self, at: MonoNs, length_m: f64, stated_m: f64) {
         let Some(before_m) = self.last_m.replace(length_m) else {
             self.changed = at;
@@ -64,14 +64,14 @@ impl CountStep {
         }
     }
 
-    /// Returns the step, m: the stated step, or a larger one if the counts show it.
+    /// Returns the counter's step, m: the stated step, or a larger one if the counts show it.
     pub fn step_m(&self, stated_m: f64) -> f64 {
         let [before, latest] = self.blocks;
         if before.max(latest) > 0 {
             return stated_m * before.max(latest) as f64;
         }
-        // Until a block is full, the smallest change so far is the best guess. Before the first change, it is a
-        // common step.
+        // Until a block is full, the step is assumed to be the smallest change so far. Before the first change, it is
+        // assumed to be a common step.
         match (self.changes, self.stands >= self.changes) {
             (0, _) => stated_m.max(COMMON_STEP_M),
             (_, true) => stated_m * self.smallest as f64,
@@ -109,9 +109,11 @@ mod tests {
         MonoNs(7_000_000_000 + 20_000_000 * u64::from(k))
     }
 
-    /// Returns the recognised step, m, of a wheel with step `step_m` after 3000 readings.
+    /// Returns the counter step, m, that the detector recognises after 3000 readings of a wheel with the step
+    /// `step_m`.
     ///
-    /// `way_m` is the cable's distance at a time in s. The wheel's counts are rounded to stated steps.
+    /// `way_m` returns the distance that the cable has moved at a time, s. The wheel's counts are rounded to the
+    /// stated step.
     fn recognised_m(step_m: f64, stated_m: f64, way_m: impl Fn(f64) -> f64) -> f64 {
         let mut step = CountStep::default();
         for k in 0..3000_u32 {
@@ -149,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn one_garbled_reading_does_not_change_the_step() {
+    fn one_garbled_reading_does_not_change_the_counter_step() {
         let mut step = CountStep::default();
         for k in 0..6000_u32 {
             let t = f64::from(k) / 50.0;
@@ -160,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_on_the_same_count_or_whole_steps_share_a_rounding_error() {
+    fn readings_at_equal_counts_or_whole_steps_apart_share_a_rounding_error() {
         let mut step = CountStep::default();
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
         for k in 0..=20_u32 {
@@ -183,7 +185,7 @@ mod tests {
         }
     }
 
-    /// The guess is a common step before the first movement, and then the smallest change so far.
+    /// The assumed step is a common one before the first movement, and then the smallest change so far.
     #[test]
     fn counter_step_is_guessed_before_the_first_block_of_readings() {
         let mut step = CountStep::default();

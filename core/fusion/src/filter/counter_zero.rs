@@ -8,7 +8,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::TetherLength;
 use serde::{Deserialize, Serialize};
 
-/// Validity of the counter's zero.
+/// Record that shows whether the cable counter still counts from its first zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CounterZero {
     /// Number of the counter's last restart.
@@ -23,18 +23,18 @@ pub struct CounterZero {
 }
 
 impl CounterZero {
-    /// Whether the zero, and with it the chainage, is unknown.
+    /// Whether the counter's zero, and with it the chainage, is unknown.
     pub fn is_lost(&self) -> bool {
         self.is_lost
     }
 
-    /// Records the receive time of a reading from any other sensor.
+    /// Records the receive time of a reading from any sensor but the cable counter.
     pub fn hear_other(&mut self, received: MonoNs) {
         let before = self.others.replace(received).unwrap_or(received);
         self.silence = self.silence.max(received.since(before));
     }
 
-    /// Processes a reading of the counter; `is_sure` means that the chainage is known without the counter.
+    /// Processes a reading of the cable counter; `is_sure` means that the chainage is known without the counter.
     pub fn hear(&mut self, received: MonoNs, length: &TetherLength, is_sure: bool) {
         let number = length.restart.map_or(0, |restart| restart.number);
         let before = core::mem::replace(&mut self.restarts, number);
@@ -57,7 +57,7 @@ mod tests {
         TetherLength { length_m: 30.0, resolution_m: 0.001, restart }
     }
 
-    /// Whether the zero is lost after a silence of the counter and a silence of the other sensors, ms.
+    /// Whether the counter's zero is lost after the counter and the other sensors were silent for these times, ms.
     fn is_lost(counter_ms: u64, others_ms: u64, was_away: bool, is_sure: bool) -> bool {
         let at = |ms: u64| MonoNs(1_000_000_000 + 1_000_000 * ms);
         let mut zero = CounterZero::default();
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn counter_restart_keeps_the_zero_only_if_no_other_sensor_was_away() {
+    fn counter_restart_keeps_the_zero_only_if_the_other_sensors_kept_sending() {
         assert!(!is_lost(1000, 10, true, true));
         assert!(is_lost(1000, 10, false, true), "the counter was not away");
         assert!(is_lost(1000, 900, true, true), "all sensors were silent");

@@ -1,11 +1,12 @@
 //! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
 //!
-//! It detects differences that the data sheets do not explain. It uses only readings and the estimated chainage,
-//! and never the filter's covariance, gates or learnt noise. So it still works when the filter has settled on a
-//! wrong speed. The inertial unit is not compared here, because it only measures changes of speed; `slack_level.rs`
-//! compares it with the counter.
+//! The comparison detects differences between the distances that the data sheets do not explain. It uses only
+//! readings and the estimated chainage, and never the filter's covariance, gates or learnt noise. So it still works
+//! when the filter has settled on a wrong speed. The inertial unit is not compared here, because it only measures
+//! changes of speed; `slack_level.rs` compares it with the counter.
 //!
-//! A difference counts over a window W beyond this limit, with n the counter's variance and v the log's noise:
+//! Over a window W, a difference counts if it exceeds this limit, with n the variance of the counter and v the noise
+//! of the log:
 //!
 //! ```text
 //! 2 max(0.15 m, 3 slack_sd) + 5 sqrt(2 n + (scale distance)^2 + v^2 0.25 s W)
@@ -28,19 +29,21 @@ const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
 /// Time between two rows of distances, and capacity for the rows of the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// Capacity for the last readings of a source, and the minimum time between two kept readings.
+/// Maximum number of kept readings of a source, and the minimum time between two kept readings.
 ///
 /// Together they cover more than the filter's longest window at any reading rate.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
-/// Silence after which a source is no longer compared. A velocity log may send a reading only every two seconds.
+/// Duration of silence after which a source is no longer compared. A velocity log may send a reading only every two
+/// seconds.
 const SILENT: DurNs = DurNs(3_000_000_000);
-/// Delay of the comparison, because some readings arrive late.
+/// Time by which the comparison lags behind the present, because some readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
-/// Maximum difference in standard deviations, and the time for which a larger difference must last.
+/// Maximum difference between two distances, in standard deviations, and the time for which a larger one must last to
+/// count.
 const MOST_SDS: f64 = 5.0;
 const LASTS: DurNs = DurNs(1_000_000_000);
-/// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, plus the error of the mount.
+/// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, plus the error of its mounting angle.
 const LOG_SCALE: f64 = 0.015;
 /// Correlation time of a velocity log's noise, s.
 const LOG_TIME_S: f64 = 0.25;
@@ -50,31 +53,30 @@ const CABLE: usize = 0;
 const LOG: usize = 1;
 const ESTIMATE: usize = 2;
 
-/// Recent distances by each source, and the doubt about the cable that they cause.
+/// Recent distances by each source, and the doubt about the cable counter if the distances differ.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceComparison {
     /// Last chainages by the counter, distances by the velocity log, and chainages by the estimate, m.
     cable: Vec<(MonoNs, [f64; 1])>,
     log: Vec<(MonoNs, [f64; 1])>,
     estimate: Vec<(MonoNs, [f64; 1])>,
-    /// Number of the compared velocity log.
+    /// Source number of the velocity log that is compared.
     log_source: Option<usize>,
-    /// Last attitude from an inertial unit.
+    /// Last attitude measured by an inertial unit.
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
-    /// Rows of distances, m; NaN for a missing distance.
+    /// Rows of the distances by each source at one time, m; NaN for a missing distance.
     rows: Vec<(MonoNs, [f64; 3])>,
-    /// Time since which the cable has differed from the log, and time since which it has differed from the
-    /// estimate.
+    /// Times since which the cable's distance has differed from the velocity log's, and from the estimate's.
     since: [Option<MonoNs>; 2],
     doubt: Option<CableDoubt>,
-    /// [`super::eskf::Eskf::ties`] of the estimate at the last comparison.
+    /// Value of [`super::eskf::Eskf::ties`] at the last comparison.
     ties: u32,
 }
 
 stateful!(DistanceComparison { state: log_source, attitude, since, doubt, ties; lists: cable, log, estimate, rows; });
 
 impl Default for DistanceComparison {
-    /// Allocates the buffers, without readings.
+    /// Creates the comparison with allocated buffers, but no readings.
     fn default() -> Self {
         let readings = || Vec::with_capacity(READINGS);
         let rows = Vec::with_capacity(ROOM);
@@ -93,7 +95,7 @@ impl Default for DistanceComparison {
 }
 
 impl DistanceComparison {
-    /// Processes a reading.
+    /// Processes a reading of any sensor.
     ///
     /// Allocates: never.
     pub(super) fn hear(
@@ -133,12 +135,12 @@ impl DistanceComparison {
 
     /// Compares the distances at the end of an epoch.
     ///
-    /// `estimate_m` is the estimated chainage at that time, m; `None` while the filter itself reports a dispute
+    /// `estimate_m` is the estimated chainage at that time, m; `None` while the filter itself reports a disagreement
     /// with the cable. If `ties` has changed, earlier chainages are unrelated to later ones.
     ///
     /// Allocates: never.
     pub(super) fn compare(&mut self, at: MonoNs, estimate_m: Option<f64>, ties: u32, settings: &Settings) {
-        // While the filter itself reports a dispute, the estimate is not compared.
+        // While the filter itself reports a disagreement with the cable, the estimate is not compared.
         if core::mem::replace(&mut self.ties, ties) != ties || estimate_m.is_none() {
             self.estimate.clear();
             self.forget(ESTIMATE);
@@ -162,7 +164,8 @@ impl DistanceComparison {
         self.judge(at, settings);
     }
 
-    /// Updates the times since which the cable differs, and the doubt with the largest lasting difference.
+    /// Updates since when the cable differs from each other source, and the doubt with the largest lasting
+    /// difference.
     fn judge(&mut self, at: MonoNs, settings: &Settings) {
         let mut doubt: Option<CableDoubt> = None;
         for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
@@ -198,7 +201,7 @@ impl DistanceComparison {
         self.cable.last().map_or(0.0, |(_, [shown_m])| *shown_m)
     }
 
-    /// Returns the doubt about the cable, if a difference has lasted.
+    /// Returns the doubt about the cable counter, if a difference has lasted for `LASTS`.
     pub(super) fn doubt(&self) -> Option<CableDoubt> {
         self.doubt
     }
@@ -238,7 +241,7 @@ impl DistanceComparison {
     }
 }
 
-/// Appends a reading, unless it is close in time to the last one.
+/// Appends a reading to a list, unless it is close in time to the last one.
 ///
 /// If the time goes back or a long gap has passed, the list restarts with this reading.
 fn append(readings: &mut Vec<(MonoNs, [f64; 1])>, at: MonoNs, way_m: f64) {
@@ -272,7 +275,7 @@ mod tests {
         0.2 + 0.1 * math::cos(t / 20.0)
     }
 
-    /// Compares distances for `lasts_s`; returns the time of the first doubt, s, and the last doubt.
+    /// Compares distances for `lasts_s`; returns the time of the first doubt about the cable, s, and the last doubt.
     ///
     /// Each function returns the value that a source shows at a time.
     fn compared(
@@ -310,7 +313,7 @@ mod tests {
                 let moved = Vec3::new(along_mps, 0.02, 0.0);
                 ways.hear(at(t), DVL, &log, &Reading::VelocityOverGround(moved), &site);
             }
-            // An epoch lasts a tenth of a second.
+            // An epoch of this test lasts a tenth of a second.
             if k.is_multiple_of(rate_hz / 10) {
                 ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
             }
@@ -322,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn sources_within_their_data_sheets_agree() {
+    fn distances_with_errors_within_the_data_sheets_agree() {
         for period_s in [3.0, 20.0, 60.0] {
             let cable_m = |t: f64| 1.002 * way_m(t) + 0.15 * math::sin(t * math::TAU / period_s);
             let none = compared(300, cable_m, |t| Some(1.01 * speed_mps(t) + 0.002), |t| Some(way_m(t)));
@@ -334,8 +337,8 @@ mod tests {
     fn velocity_log_wrong_by_a_fifth_is_reported_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
-        // The vehicle travels about 12 m in a window of a minute, and the log shows a fifth too much. The difference
-        // is smaller while the vehicle is slow.
+        // The vehicle travels about 12 m in a window of a minute, and the log shows a fifth too much. While the
+        // vehicle is slow, the difference between the distances is smaller.
         assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
         assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
     }
@@ -349,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn diverging_estimate_is_reported_unless_the_filter_reports_it() {
+    fn diverging_estimate_is_reported_unless_the_filter_reports_a_cable_disagreement() {
         let runs = |t: f64| Some(way_m(t) + 0.5 * (t - 60.0).max(0.0));
         let (first_s, doubt) = compared(70, way_m, |_| None, runs);
         assert!((61.0..63.0).contains(&first_s.unwrap()), "{first_s:?}");
@@ -360,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn counters_and_logs_of_any_rate_are_compared() {
+    fn cable_counters_and_velocity_logs_of_any_rate_are_compared() {
         for (rate_hz, log_every) in [(10, 1), (10, 10), (10, 20), (50, 5), (200, 50), (1000, 125)] {
             let log_mps = |t: f64| Some(1.2 * speed_mps(t));
             let compare = |share: f64| {
@@ -374,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn log_that_returns_after_silence_causes_no_doubt() {
+    fn velocity_log_that_returns_after_silence_causes_no_doubt_about_the_cable() {
         let log_mps = |t: f64| (!(30.0..50.0).contains(&t)).then(|| speed_mps(t));
         assert_eq!(compared(120, way_m, log_mps, |t| Some(way_m(t))), (None, None));
     }

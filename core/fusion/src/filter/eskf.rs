@@ -1,6 +1,6 @@
 //! The error-state Kalman filter.
 //!
-//! An epoch is one leg of propagation followed by the measurements of its time.
+//! In each epoch, inertial data first propagate the estimate; then the epoch's measurements correct it.
 
 use core::ops::Range;
 
@@ -34,43 +34,43 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// Capacity for the estimates within an epoch, one at each inertial sample.
+/// Maximum number of estimates kept within an epoch, one at each inertial sample.
 const KNOTS: usize = 256;
-/// Standard deviation of the velocity at rest, m/s, caused by motion of the sea or of the deck.
+/// Standard deviation of the velocity of a vehicle at rest, m/s, caused by motion of the sea or of the deck.
 const REST_SD_MPS: f64 = 0.02;
 /// Standard deviation of the mean turn rate over a second at rest, rad/s.
 const REST_SD_RADPS: f64 = 1e-3;
-/// Gate of the rest hypothesis. If the vehicle is at rest, the gate is exceeded once in ten thousand times.
+/// Gate for zero-velocity updates (chi-square). A vehicle at rest exceeds the gate once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// Standard deviation of the predicted range below which the wall counts as flat, m.
+/// Standard deviation of a predicted range up to which the wall counts as flat, m.
 ///
-/// If the noise of the range is smaller, it is the limit instead.
+/// If the standard deviation of the range noise is smaller, it is the limit instead.
 const NEAR_M: f64 = 0.03;
-/// Standard deviation of the speed prior, m/s.
+/// Standard deviation of the prior for the vehicle's speed, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// Standard deviation added to an estimate that lies beyond the wall, m.
+/// Standard deviation by which the position uncertainty of an estimate beyond the wall is increased, m.
 const BEYOND_M: f64 = 1.5;
 
 /// Standard deviation below which the gyro bias counts as known, rad/s.
 ///
-/// A pass of 3 s is then wrong by a milliradian. A longer stop would gain little.
+/// With this bias, the attitude is wrong by a milliradian after a head pass of 3 s. A longer stop would gain little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
 /// Maximum normalised squared innovation of a range at which the learnt smoothness of the wall applies.
 const SMOOTH: f64 = 4.0;
 /// Maximum step of a counter, as a share of its noise, at which the rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
-/// Time after the start within which an estimate settles.
+/// Time after its start within which an estimate settles, as its yaw becomes certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Standard deviation of yaw below which the estimate counts as settled.
 ///
-/// At 6 m, soundings then move by 5 cm. Beyond that, more certainty is not worth the loss of the relation between
-/// earlier and later soundings.
+/// A yaw error of this size moves a sounding at 6 m by 5 cm. A further restart of the relation between earlier and
+/// later soundings would cost more than it gains.
 const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
-/// Maximum number of steps in an epoch: the leg, two additions to the covariance, and an end.
+/// Maximum number of recorded steps in an epoch: the propagation, two additions to the covariance, and an end.
 const STEPS: usize = 4;
 
-/// The estimate at one time, with its covariance.
+/// The filter's estimate at one time, with its covariance.
 #[derive(Debug, Clone)]
 pub struct Eskf {
     /// Time of the estimate. All earlier readings have been fused.
@@ -81,17 +81,17 @@ pub struct Eskf {
     pub factors: Factors<ERRORS>,
     /// Clones of earlier errors, for relative covariances.
     pub clones: ErrorClones,
-    /// Time of the last reacquisition of the chainage.
+    /// Time at which the filter last reacquired a lost chainage.
     pub way_sought: Option<MonoNs>,
-    /// Variance of the counter's possible loss during motion, m^2.
+    /// Variance of the length that the counter may have lost during motion, m^2.
     slipped_m2: f64,
-    /// Number of times at which the relation of later soundings to earlier ones was lost.
+    /// Number of times that the relative position of later and earlier soundings has become unknown.
     pub ties: u32,
     /// Start time of the estimate, and the standard deviation of yaw at the start or its last halving, radians.
     begun: (MonoNs, f64),
-    /// Number of times this standard deviation has halved while the estimate settled.
+    /// Number of times that the standard deviation of yaw has halved while the estimate settled.
     pub settled: u32,
-    /// Estimates within the last epoch, before its measurements.
+    /// Estimates within the last epoch, before the epoch's measurements were fused.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
     /// Comparison of the cable counter with the estimate.
@@ -103,17 +103,17 @@ pub struct Eskf {
     seen_again: RepeatedBumps,
     /// Share of the declared variance that applies to ranges of heads until the gyro bias is known.
     ///
-    /// It is the largest such share among the heads.
+    /// The share is the largest among the heads.
     smoothness: f64,
     /// Whether the vehicle is known to be at rest. Its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
     /// Whether inertial data were missing in the last epoch. The motion is then a guess, and no noise is learnt.
     is_blind: bool,
-    /// Checks of settings against the ranges.
+    /// Checks of settings by the residuals of ranges.
     pub suspicions: SettingChecks,
-    /// Variances to add at the end of the epoch, because an estimate may be wrong.
+    /// Variances to add to the errors at the end of the epoch, because the estimate may be wrong.
     doubts: Errors,
-    /// Steps of the last epoch, for smoothing; empty unless `keeps_steps`.
+    /// Filter steps of the last epoch, for smoothing; empty unless `keeps_steps`.
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
@@ -121,7 +121,7 @@ pub struct Eskf {
 stateful!(Eskf { state: at, state, factors, clones, way_sought, slipped_m2, ties, begun, settled, agreement, cable, unrest, slack_level, roughness, seen_again, smoothness, is_at_rest, is_blind, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
-    /// Allocates the buffers, without an estimate.
+    /// Creates a filter that has buffers, but no estimate yet.
     fn default() -> Self {
         Self {
             at: MonoNs(0),
@@ -151,6 +151,19 @@ impl Default for Eskf {
     }
 }
 
+/// Innovation of an update, with the variances that it is weighed by.
+struct Weighed {
+    innovation: f64,
+    /// Variance of the estimate.
+    of_estimate: f64,
+    /// Declared noise.
+    declared: f64,
+    /// Noise of a single reading, as learnt.
+    white: f64,
+    /// Variance from bumps of the wall that many readings see.
+    bumps: f64,
+}
+
 impl Eskf {
     /// Records the steps of each epoch in `steps` from now on, for smoothing. The caller drains them after each
     /// epoch.
@@ -161,7 +174,7 @@ impl Eskf {
         self.keeps_steps = true;
     }
 
-    /// Starts with a first estimate and its covariance.
+    /// Starts the filter with a first estimate and its covariance.
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.clones.clear();
@@ -175,7 +188,7 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// Restarts the relation between passes whenever the standard deviation of yaw has halved.
+    /// Records that earlier samples are unrelated to later ones whenever the standard deviation of yaw has halved.
     ///
     /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
     /// about the errors between later passes.
@@ -192,7 +205,7 @@ impl Eskf {
         }
     }
 
-    /// Advances to a later time, and fuses the readings in the window up to that time.
+    /// Advances the estimate to a later time, and fuses the waiting readings up to that time.
     pub fn advance(
         &mut self,
         to: MonoNs,
@@ -218,35 +231,7 @@ impl Eskf {
         }
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
-            // Each reading is compared with the best estimate so far, because the first readings after a silence
-            // may change the estimate by metres.
-            let known = errors;
-            let later_s = to.since(waiting.at).as_secs_f64();
-            let mut then = self.state_at(waiting.at);
-            then.correct(&state::earlier(&known, later_s));
-            self.suspicions.hear(&then, &context.design(), sources, &waiting);
-            let others_change = sources::others_change(sources, waiting.source);
-            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
-            if let Reading::TetherLength(length) = waiting.reading {
-                source.count_step.hear(waiting.at, length.length_m, length.resolution_m);
-                if !source.is_due(waiting.at, TETHER_PERIOD) {
-                    continue;
-                }
-            }
-            for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
-                let again = |state: &State| {
-                    rows(state, context, source, &waiting, window).get(number).copied().flatten()
-                };
-                if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
-                    let sd_m = math::sqrt(self.factors.variance_along(&row.h));
-                    if source.says_one_range(&waiting.reading, row.residual, sd_m) && others_change {
-                        source.leave_out(number);
-                        continue;
-                    }
-                    let row = row.seen_later(later_s);
-                    self.fuse(&row, (&waiting, number), &context.settings, source, (&known, &mut errors));
-                }
-            }
+            self.fuse_reading(&waiting, (to, window), context, sources, &mut errors);
         }
         (self.at, self.state) = (to, nominal);
         self.state.correct(&errors);
@@ -263,6 +248,45 @@ impl Eskf {
         }
     }
 
+    /// Fuses a reading of an epoch that ends at `to`, and adds the corrections to `errors`.
+    fn fuse_reading(
+        &mut self,
+        waiting: &Waiting,
+        (to, window): (MonoNs, &Window),
+        context: &Context,
+        sources: &mut [Option<Source>],
+        errors: &mut Errors,
+    ) {
+        // Each reading is compared with the best estimate so far, because the first readings after a silence
+        // may change the estimate by metres.
+        let known = *errors;
+        let later_s = to.since(waiting.at).as_secs_f64();
+        let mut then = self.state_at(waiting.at);
+        then.correct(&state::earlier(&known, later_s));
+        self.suspicions.hear(&then, &context.design(), sources, waiting);
+        let others_change = sources::others_change(sources, waiting.source);
+        let Some(Some(source)) = sources.get_mut(waiting.source) else { return };
+        if let Reading::TetherLength(length) = waiting.reading {
+            source.count_step.hear(waiting.at, length.length_m, length.resolution_m);
+            if !source.is_due(waiting.at, TETHER_PERIOD) {
+                return;
+            }
+        }
+        for (number, row) in rows(&then, context, source, waiting, window).into_iter().enumerate() {
+            let again =
+                |state: &State| rows(state, context, source, waiting, window).get(number).copied().flatten();
+            if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
+                let sd_m = math::sqrt(self.factors.variance_along(&row.h));
+                if source.says_one_range(&waiting.reading, row.residual, sd_m) && others_change {
+                    source.leave_out(number);
+                    continue;
+                }
+                let row = row.seen_later(later_s);
+                self.fuse(&row, (waiting, number), &context.settings, source, (&known, &mut *errors));
+            }
+        }
+    }
+
     /// Adds the speed change of an implausible force to the uncertainty, because the force may have been real.
     fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
@@ -273,7 +297,7 @@ impl Eskf {
         }
     }
 
-    /// Adds to the variances of the errors. The estimate itself does not change.
+    /// Adds to the variances of the estimate's errors. The estimate itself does not change.
     fn widen(&mut self, variances: &Errors) {
         self.keep(self.at, &Move::Widened(*variances), self.state);
         self.factors.widen(variances);
@@ -297,7 +321,8 @@ impl Eskf {
         self.keep(self.at, &Move::End, self.state);
     }
 
-    /// Fuses zero velocity (ZUPT) and a mean turn rate as gyro bias, unless the estimate makes rest too improbable.
+    /// Fuses zero velocity (ZUPT), and the mean turn rate as gyro bias, unless the estimated velocity contradicts
+    /// rest.
     pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
         let rows = measure::rest(&self.state, REST_SD_MPS);
         let unlikely = |row: &ScalarUpdate| {
@@ -353,7 +378,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Fuses an update. Its residual refers to the estimate corrected by the errors in `known`.
+    /// Fuses a scalar update whose residual refers to the estimate corrected by the errors in `known`.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
@@ -367,10 +392,7 @@ impl Eskf {
         row.noise += self.left_out(row.bends);
         let (kind, declared) = (source.sensor.kind, row.noise);
         let is_head_square = kind == SensorKind::Head && row.is_square();
-        // Several readings share the rounding error of a counter. If this error matters, no noise is learnt from
-        // the innovation.
-        let is_white = !matches!(&waiting.reading, Reading::TetherLength(length)
-            if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m);
+        let is_white = is_white(&waiting.reading, source, settings);
         if settings.learns && is_white {
             row.noise *= source.noise_level.factor(kind, number);
         }
@@ -378,14 +400,13 @@ impl Eskf {
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         if settings.learns && is_head_square {
-            // If the residual is too large for a smooth wall, the declared noise of a rough wall applies.
+            // If the residual of a range is too large for a smooth wall, the declared noise of a rough wall applies.
             let smooth = row.noise * self.smoothness;
             if innovation * innovation <= SMOOTH * (of_estimate + smooth) {
                 row.noise = smooth;
             }
         }
-        let white = row.noise;
-        let bumps = self.bumps(kind, settings);
+        let (white, bumps) = (row.noise, self.bumps(kind, settings));
         row.noise = white + bumps;
         let variance = of_estimate + row.noise;
         let nis = innovation * innovation / variance;
@@ -405,38 +426,63 @@ impl Eskf {
             self.agreement.note(kind, &row, is_near);
         }
         let agrees = believes.unwrap_or(is_near);
-        if agrees {
-            if self.is_blind || !is_white {
-                source.noise_level.skip(number);
-            } else {
-                source.noise_level.note(kind, number, innovation, of_estimate + white);
-            }
-            if kind == SensorKind::VelocityLog {
-                row.noise = declared * VELOCITY_LOOKS;
-            } else if matches!(kind, SensorKind::Echosounder { .. }) {
-                row.noise =
-                    self.spread_over_looks(&row, waiting, [white, bumps, innovation, of_estimate], settings);
-            } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading
-                && settings.learns
-            {
-                let again_m2 = self.seen_again.noise_m2(range_m, white, source.noise_level.share(), settings);
-                row.noise = if self.is_at_rest { again_m2 } else { white };
-            }
-            if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
-                self.correct_by_wall(&row, settings.wall_share, known, errors);
-            } else if matches!(kind, SensorKind::Tether { .. }) {
-                self.correct_by_counter(&row, known, errors);
-            } else {
-                self.correct(&row, known, errors);
-            }
-        } else {
+        if !agrees || self.is_blind || !is_white {
             source.noise_level.skip(number);
+        } else {
+            source.noise_level.note(kind, number, innovation, of_estimate + white);
+        }
+        if agrees {
+            let weighed = Weighed { innovation, of_estimate, declared, white, bumps };
+            row.noise = self.noise_of_correction(&row, waiting, &weighed, source, settings);
+            self.correct_by(kind, &row, settings, known, errors);
         }
     }
 
-    /// Returns the variance of a range from bumps of the wall, m^2, if many pings see the same bump.
+    /// Returns the noise with which an accepted update corrects the estimate.
+    fn noise_of_correction(
+        &mut self,
+        row: &ScalarUpdate,
+        waiting: &Waiting,
+        weighed: &Weighed,
+        source: &Source,
+        settings: &Settings,
+    ) -> f64 {
+        let Weighed { declared, white, .. } = *weighed;
+        if source.sensor.kind == SensorKind::VelocityLog {
+            declared * VELOCITY_LOOKS
+        } else if matches!(source.sensor.kind, SensorKind::Echosounder { .. }) {
+            self.spread_over_looks(row, waiting, weighed, settings)
+        } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading
+            && settings.learns
+        {
+            let again_m2 = self.seen_again.noise_m2(range_m, white, source.noise_level.share(), settings);
+            if self.is_at_rest { again_m2 } else { white }
+        } else {
+            row.noise
+        }
+    }
+
+    /// Corrects the estimate by an update from a sensor of this kind.
+    fn correct_by(
+        &mut self,
+        kind: SensorKind,
+        row: &ScalarUpdate,
+        settings: &Settings,
+        known: &Errors,
+        errors: &mut Errors,
+    ) {
+        match kind {
+            SensorKind::Head | SensorKind::Echosounder { .. } => {
+                self.correct_by_wall(row, settings.wall_share, known, errors);
+            }
+            SensorKind::Tether { .. } => self.correct_by_counter(row, known, errors),
+            _ => self.correct(row, known, errors),
+        }
+    }
+
+    /// Returns the variance, m^2, that bumps of the wall add to a range if many pings see the same bump.
     ///
-    /// 0 for other measurements.
+    /// The result is 0 for other measurements.
     fn bumps(&self, kind: SensorKind, settings: &Settings) -> f64 {
         let sees_one = settings.learns && matches!(kind, SensorKind::Echosounder { .. });
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
@@ -444,17 +490,18 @@ impl Eskf {
 
     /// Returns the noise to use for one of many pings that see the same bump, m^2.
     ///
-    /// It also records the ping for the roughness.
+    /// Also records the ping for learning the roughness of the wall.
     fn spread_over_looks(
         &mut self,
         row: &ScalarUpdate,
         waiting: &Waiting,
-        [white_m2, bumps_m2, innovation_m, of_estimate_m2]: [f64; 4],
+        weighed: &Weighed,
         settings: &Settings,
     ) -> f64 {
+        let Weighed { innovation, of_estimate, white, bumps, .. } = *weighed;
         let speed_mps = self.state.velocity_mps.norm();
         let looks = self.roughness.looks_at_a_bump(waiting.source, waiting.at, speed_mps, settings.bump_m);
-        let noise_m2 = white_m2 + bumps_m2 * looks;
+        let noise_m2 = white + bumps * looks;
         let mut of_scale = [0.0; ERRORS];
         if let (Some(slot), Some(by)) = (of_scale.get_mut(RANGES), row.h.get(RANGES)) {
             *slot = 2.0 * by;
@@ -463,8 +510,8 @@ impl Eskf {
             source: waiting.source,
             at: waiting.at,
             by_place: state::vec(&row.h, POSITION),
-            left_m: innovation_m * noise_m2 / (of_estimate_m2 + noise_m2),
-            white_m2,
+            left_m: innovation * noise_m2 / (of_estimate + noise_m2),
+            white_m2: white,
         };
         self.roughness.note(look, 1.0 / looks, self.factors.variance_along(&of_scale), settings);
         noise_m2
@@ -472,8 +519,8 @@ impl Eskf {
 
     /// Returns the variance of the second-order terms that an update neglects.
     ///
-    /// It matters only while position or attitude is very uncertain. For a normal error e, the mean square of f''
-    /// e^2 / 2 is 3/4 (f'' sd^2)^2.
+    /// The terms matter only while position or attitude is very uncertain. For a normal error e, the mean square of
+    /// f'' e^2 / 2 is 3/4 (f'' sd^2)^2.
     fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
         let sum = |axes: Range<usize>| axes.map(|i| self.factors.variance(i)).sum::<f64>();
         let (place, turn) = (sum(POSITION + 1..POSITION + 3), sum(ATTITUDE..ATTITUDE + 3));
@@ -507,8 +554,8 @@ impl Eskf {
         Some(row)
     }
 
-    /// Moves an estimate that lies beyond the wall back into the tunnel, because no beam can be predicted from
-    /// there.
+    /// Moves an estimate that lies beyond the wall back into the tunnel, because no beam can be predicted from beyond
+    /// the wall.
     fn stay_inside(&mut self, profile: &Profile) {
         let place = [self.state.position.y(), self.state.position.z()];
         if profile.contains(place) {
@@ -530,7 +577,7 @@ impl Eskf {
         self.state.correct(&errors);
     }
 
-    /// Returns the standard deviations of the estimate.
+    /// Returns the standard deviations of the estimate's position and attitude.
     pub fn pose_sd(&self) -> PoseSd {
         let along_m = math::sqrt(self.along_sd_m() * self.along_sd_m() + self.slipped_m2);
         PoseSd { along_m, ..PoseSd::of(&self.factors) }
@@ -538,7 +585,7 @@ impl Eskf {
 
     /// Returns the standard deviation of the chainage error that later samples share, m.
     ///
-    /// It excludes the counter's possible permanent losses.
+    /// It excludes length that the counter may have lost permanently.
     pub fn along_sd_m(&self) -> f64 {
         math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
@@ -559,11 +606,10 @@ impl Eskf {
         self.apply(row, &gain, known, errors);
     }
 
-    /// Corrects by a range to the wall, and applies only a share of the correction of the attitude and related
-    /// errors.
+    /// Corrects by a range to the wall, with only a share of the computed correction of attitude and related errors.
     ///
-    /// The covariance is Joseph's for the smaller gain. It equals the optimal covariance plus a dyad of the omitted
-    /// gain.
+    /// The covariance is Joseph's for the smaller gain. This covariance equals the optimal covariance plus a dyad of
+    /// the omitted gain.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
@@ -588,8 +634,7 @@ impl Eskf {
         }
     }
 
-    /// Judges a counter reading by its innovation, m, and the innovation's variance, m^2; returns whether to fuse
-    /// it.
+    /// Decides whether to fuse a cable reading, given its innovation, m, and the innovation's variance, m^2.
     ///
     /// `None` for readings of other sensors.
     fn believes_counter(
@@ -621,7 +666,7 @@ impl Eskf {
         Some(self.trusts(&CableReading { at, shown_m, off_m, sd_m, agrees, is_usual, is_lively }, errors))
     }
 
-    /// Corrects by a counter reading, and records how much the estimate changes.
+    /// Corrects the estimate by a cable reading, and records how much the estimate changes.
     fn correct_by_counter(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
         let along = |eskf: &Self, errors: &Errors| {
             [POSITION, VELOCITY].map(|i| [errors.get(i).copied().unwrap_or(0.0), eskf.factors.variance(i)])
@@ -633,8 +678,7 @@ impl Eskf {
         self.cable.corrections.note(by, [before_p[1] - after_p[1], before_v[1] - after_v[1]]);
     }
 
-    /// Judges a cable reading; returns whether to fuse it. A length that the counter has lost is added to the
-    /// creep.
+    /// Decides whether to fuse a cable reading. A length that the counter has lost is added to the creep.
     fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
         let used = self.cable.take(reading);
         self.slipped_m2 += self.cable.corrections.take_slipped_m2();
@@ -650,11 +694,12 @@ impl Eskf {
             }
             Use::Slipped(lost_m) => {
                 self.slack_level.skip();
-                // The estimated position does not change, so that later soundings fit those placed during the
-                // dispute.
+                // The estimated position does not change, so that later soundings fit those placed during the cable
+                // disagreement.
                 add_to(errors, CREEP, lost_m);
                 add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                // Either the counter has lost this length, or the estimated motion was wrong during the dispute.
+                // Either the counter has lost this length, or the estimated motion was wrong during the cable
+                // disagreement.
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
             }
@@ -669,4 +714,13 @@ impl Eskf {
         }
         false
     }
+}
+
+/// Whether the noise of a reading is independent of that of other readings.
+///
+/// Several readings share the rounding error of a counter. If this error matters, no noise is learnt from the
+/// innovation.
+fn is_white(reading: &Reading, source: &Source, settings: &Settings) -> bool {
+    !matches!(reading, Reading::TetherLength(length)
+        if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m)
 }

@@ -1,34 +1,35 @@
-//! Sums that show whether a setting is wrong: for one parameter, or for a source that may have another mount.
+//! Sums of residuals that show whether a setting is wrong: the value of a parameter, or the mount of a sensor.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Maximum number of range sources that are followed.
+/// Maximum number of range sources whose settings are checked.
 pub(super) const FOLLOWED: usize = 12;
-/// Out of this many readings, one is compared with its alternatives, because each comparison costs a ray.
+/// One reading in this many is compared with alternative mounts, because each comparison costs a ray.
 pub(super) const COMPARED: u32 = 4;
-/// Minimum number of blocks for computing the uncertainty of a figure.
+/// Minimum number of blocks of distance for computing the uncertainty of a parameter.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// Standard deviations from zero above which a figure counts as certain.
+/// Number of standard deviations from zero above which a fitted parameter counts as certainly non-zero.
 ///
-/// The limit for an alternative is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
+/// The limit for an alternative mount is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
 /// Minimum sum of normalised squares that a parameter must explain, per reading of all sources.
 ///
-/// It corresponds to a parameter that changes ranges by a seventh of their noise.
+/// A parameter that changes ranges by a seventh of their noise explains this much.
 const EXPLAINS: f64 = 0.02;
 /// Unknowns of the vehicle's pose within a pose window of a few seconds: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// Limit at which residuals are clipped in a comparison, m, because some echoes come from objects other than the wall.
+/// Limit at which residuals are clipped in a comparison of mounts, m, because some echoes come from objects other
+/// than the wall.
 const MOST_MISSED_M: f64 = 0.5;
 /// Minimum mean square residual of a source whose mount is doubted, m^2. Maximum ratio of the squared residuals with
 /// the alternative mount to those with the configured mount.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Sums of one parameter within a pose window, and its products with the vehicle's pose.
+/// Least-squares sums of one parameter within a pose window, and its products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) by_pose: [f64; POSE],
@@ -36,7 +37,7 @@ pub(super) struct Line {
     pub(super) residuals: f64,
 }
 
-/// Sums of one parameter over blocks, with the vehicle's pose eliminated.
+/// Least-squares sums of one parameter over blocks of distance, with the vehicle's pose eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Fit {
     pub(super) blocks: u32,
@@ -48,7 +49,7 @@ pub(super) struct Fit {
     values_2: f64,
 }
 
-/// Comparison of two fits of a source: at its own mount, and at another mount or turned by half a turn.
+/// Comparison of a sonar's residuals at its configured mount with those at another mount or turned by half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Alternative {
     pub(super) source: u16,
@@ -56,7 +57,7 @@ pub(super) struct Alternative {
     pub(super) is_echo: bool,
     /// Sums of the present block, and of all earlier blocks.
     ///
-    /// Each has three sums: squared residuals at the own mount, squared residuals of the alternative, number of
+    /// Each contains the squared residuals at the configured mount and at the alternative, and the number of
     /// readings.
     pub(super) block: [f64; 3],
     pub(super) all: [f64; 3],
@@ -92,7 +93,7 @@ pub(super) fn solved(factor: &[[f64; POSE]; POSE], right: [f64; POSE]) -> [f64; 
 }
 
 impl Fit {
-    /// Adds the sums of a block; `readings` is the number of readings of all sources.
+    /// Adds the sums of a block to the fit; `readings` is the number of readings of all sources.
     pub(super) fn add(&mut self, [weight, value]: [f64; 2], readings: u32) {
         if weight <= 0.0 {
             return;
@@ -106,12 +107,12 @@ impl Fit {
         self.values_2 += value * value;
     }
 
-    /// Whether there are enough blocks for an estimate.
+    /// Whether there are enough blocks for an estimate of the parameter.
     pub(super) fn is_settled(&self) -> bool {
         self.blocks >= FEWEST_BLOCKS
     }
 
-    /// Returns the estimate and its standard deviation, computed from the scatter of blocks.
+    /// Returns the estimated parameter and its standard deviation, computed from the scatter of blocks.
     pub(super) fn estimate(&self) -> Option<[f64; 2]> {
         if self.blocks < FEWEST_BLOCKS || self.weight <= 0.0 {
             return None;
@@ -122,11 +123,11 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// Returns the estimate and its distance from zero in sd, if it certainly exceeds `least`.
+    /// Returns the estimated parameter and its distance from zero in sd, if it certainly exceeds `least`.
     ///
-    /// The standard deviation is the larger one of the scatter of blocks and the noise of ranges, because blocks
-    /// alone may hardly scatter. `None` if the parameter hardly changes any range: an estimate from millimetres
-    /// only shows errors of the wall and beam models.
+    /// The standard deviation is computed from the scatter of blocks and from the noise of ranges, and the larger
+    /// result counts, because blocks alone may hardly scatter. `None` if the parameter hardly changes any range:
+    /// changes of millimetres only show errors of the wall and beam models.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
@@ -141,7 +142,7 @@ impl Fit {
 }
 
 impl Alternative {
-    /// Adds a reading, given by its residuals at the own mount and at the other mount, m.
+    /// Adds a reading, given by its residuals at the configured mount and at the alternative mount, m.
     pub(super) fn note(&mut self, missed_m: [f64; 2]) {
         let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(MOST_MISSED_M));
         for (sum, part) in self.block.iter_mut().zip([own * own, theirs * theirs, 1.0]) {
@@ -163,13 +164,13 @@ impl Alternative {
         self.gains_2 += gain * gain;
     }
 
-    /// Returns the ratio of the squared residuals of the alternative to those at the own mount.
+    /// Returns the ratio of the squared residuals at the alternative mount to those at the configured mount.
     pub(super) fn share_left(&self) -> f64 {
         let [own, theirs, _] = self.all;
         theirs / own.max(f64::MIN_POSITIVE)
     }
 
-    /// Returns by how many standard deviations the alternative fits better.
+    /// Returns by how many standard deviations the alternative mount fits better than the configured one.
     ///
     /// `None` unless it certainly fits better and the ratio `share_left` is small. For two swapped sources,
     /// `share_left` covers both of them.
@@ -185,7 +186,7 @@ impl Alternative {
         (sure_sd >= SURE_GAIN).then_some(sure_sd)
     }
 
-    /// Returns the sum of normalised squares that the alternative explains, for a range noise of 3 cm.
+    /// Returns the sum of normalised squares that the alternative mount explains, for a range noise of 3 cm.
     pub(super) fn explains(&self) -> f64 {
         let [own, theirs, _] = self.all;
         (own - theirs) * f64::from(COMPARED) / (0.03 * 0.03)
@@ -205,7 +206,8 @@ mod tests {
         fit
     }
 
-    /// The gain of an alternative varies between blocks. The alternative is as certain as its mean gain.
+    /// The gain of an alternative mount varies between blocks. The mount is only as certain as the mean of these
+    /// gains.
     #[test]
     fn alternative_setting_is_less_certain_if_its_gain_scatters_between_blocks() {
         let sure_sd = |scatter_m2: f64| {
@@ -218,8 +220,8 @@ mod tests {
             }
             alternative.certain(alternative.share_left())
         };
-        // The mean gain is 0.2 m^2. Eight gains alternate around it by the scatter, so its sd is the scatter over
-        // the root of seven.
+        // The mean gain is 0.2 m^2. Eight gains lie alternately above and below it by the scatter, so its sd is the
+        // scatter over the root of seven.
         for scatter_m2 in [0.05, 0.04, 0.02] {
             let expected = 0.2 / scatter_m2 * math::sqrt(7.0);
             let found = sure_sd(scatter_m2).unwrap();

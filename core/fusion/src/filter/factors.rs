@@ -31,7 +31,7 @@ pub struct Gain<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     variance: f64,
-    /// Indices and weights of the errors. The first error has the higher index.
+    /// Indices and weights of the driven errors. The first error has the higher index.
     weights: [(usize, f64); 2],
 }
 
@@ -66,12 +66,12 @@ impl<const N: usize> Factors<N> {
         columns.map(|(column, d)| at(column, i) * d * at(column, j)).sum()
     }
 
-    /// Variance of one error.
+    /// Variance of the error `i`.
     pub fn variance(&self, i: usize) -> f64 {
         self.covariance(i, i)
     }
 
-    /// Rows `rows` of the covariance.
+    /// The rows of the covariance whose indices are in `rows`.
     pub fn rows<const M: usize>(&self, rows: [usize; M]) -> [[f64; N]; M] {
         rows.map(|i| core::array::from_fn(|j| self.covariance(i, j)))
     }
@@ -139,7 +139,7 @@ impl<const N: usize> Factors<N> {
 
     /// Returns the factors of the covariance of a sum of independent, transformed errors.
     ///
-    /// The rows of a matrix give the transformation of each part.
+    /// The rows of each matrix give the transformation of one part of the sum.
     ///
     /// Source: Thornton's modified weighted Gram-Schmidt, in Bierman 1977, VI.4.
     pub fn of_sum<const M: usize>(parts: [(&Self, &[[f64; N]; N]); M]) -> Self {
@@ -173,7 +173,7 @@ impl<const N: usize> Factors<N> {
         sum
     }
 
-    /// Multiplies a row by U.
+    /// Multiplies a row vector by the factor U.
     fn through(&self, row: &[f64; N]) -> [f64; N] {
         core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
     }
@@ -233,7 +233,7 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Adds noise with this variance to one error.
+    /// Adds noise with this variance to the error `i`.
     pub fn add_to(&mut self, i: usize, variance: f64) {
         self.add_all([Noise::of_one(i, variance)]);
     }
@@ -296,7 +296,8 @@ impl<const N: usize> Factors<N> {
 
     /// Whether no variance is negative.
     ///
-    /// True for any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects them.
+    /// This holds after any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects
+    /// them.
     pub fn has_variances(&self) -> bool {
         self.d.iter().all(is_variance)
     }
@@ -309,18 +310,18 @@ impl<const N: usize> Factors<N> {
 }
 
 impl Noise {
-    /// Returns the noise with its variance multiplied by a factor.
+    /// Returns this process noise with its variance multiplied by a factor.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self { variance: self.variance * factor, ..self }
     }
 
-    /// Creates noise of one error, with this variance.
+    /// Creates process noise of one error, with this variance.
     pub fn of_one(i: usize, variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0); 2] }
     }
 
-    /// Creates noise of one error, with this variance, that also acts by `share` on an error with a lower index.
+    /// Creates process noise of one error that also acts by `share` on an error with a lower index.
     pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0), (before, share)] }
     }
@@ -353,7 +354,7 @@ fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance:
     *d = sum;
 }
 
-/// Whether a number may be a variance: it isn't negative, or it is no number.
+/// Whether a number is a valid variance: not negative, or NaN.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "iterators pass references")]
 fn is_variance(number: &f64) -> bool {
     *number >= 0.0 || number.is_nan()
@@ -382,7 +383,7 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// The textbook form, which adds a single noise.
+    /// Adds a single noise term in the textbook form.
     fn add_alone(factors: &mut Factors<7>, noise: &Noise) {
         let (mut c, mut a) = (noise.variance, [0.0; 7]);
         noise.put(&mut a);

@@ -10,20 +10,21 @@ use serde::{Deserialize, Serialize};
 use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
 use headrace_geometry::math;
 
-/// Minimum share of the weight that remains after the constant part is eliminated.
+/// Minimum share of a tilt's weight that remains after the constant excess of the ranges is eliminated.
 ///
-/// If less remains, the vehicle has not turned to both sides enough.
+/// If less weight remains, the vehicle has not turned to both sides enough.
 const LEAST_LEFT: f64 = 0.05;
 
-/// Minimum significance of the smallest reported tilt, in standard deviations caused by range noise.
+/// Minimum size of the smallest reported tilt, in standard deviations caused by range noise.
 const SHOWS: f64 = 3.0;
 /// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
 
-/// Number of sums: pattern squared, pattern times derivative, derivative squared, and both times the residual.
+/// Number of sums: pattern squared, pattern x derivative, derivative squared, pattern x residual, derivative x
+/// residual.
 const SUMS: usize = 5;
 
-/// Sums of one head and one axis within a pose window, and their products with the vehicle's pose.
+/// Tilt sums of one head about one axis within a pose window, and their products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltSums {
     pattern_by_pose: [f64; POSE],
@@ -31,7 +32,7 @@ pub(super) struct TiltSums {
     sums: [f64; SUMS],
 }
 
-/// Sums over blocks after the vehicle's pose is eliminated, and their second moments.
+/// Tilt sums over blocks after the vehicle's pose is eliminated, and their second moments.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltFit {
     blocks: u32,
@@ -42,8 +43,8 @@ pub(super) struct TiltFit {
 impl TiltSums {
     /// Adds a reading.
     ///
-    /// Inputs: derivatives of the range with respect to the pose, the tilt, and half of the squared tilt at zero
-    /// lean (`pattern`).
+    /// Inputs: derivatives of the range with respect to the pose, to the tilt, and to half of the squared tilt at
+    /// zero lean (`pattern`).
     pub(super) fn add(
         &mut self,
         by_pose: [f64; POSE],
@@ -70,7 +71,7 @@ impl TiltSums {
         }
     }
 
-    /// Returns the sums after the pose is eliminated.
+    /// Returns the tilt sums after the vehicle's pose is eliminated.
     ///
     /// `residuals` are the sums of residuals times pose. `factor` is the Cholesky factor of the information on the
     /// pose.
@@ -93,7 +94,7 @@ impl TiltSums {
 }
 
 impl TiltFit {
-    /// Adds the sums of a block.
+    /// Adds the tilt sums of a block to the fit.
     pub(super) fn add(&mut self, block: [f64; SUMS]) {
         if block[0] <= 0.0 {
             return;
@@ -109,7 +110,7 @@ impl TiltFit {
         }
     }
 
-    /// Returns the tilt, radians, and its weight after the constant part is eliminated.
+    /// Returns the head's tilt, radians, and the tilt's weight after the constant range excess is eliminated.
     ///
     /// `None` if the vehicle has not turned enough.
     fn estimate(&self) -> Option<(f64, f64)> {
@@ -122,11 +123,12 @@ impl TiltFit {
         (weight > LEAST_LEFT * tilt_2).then(|| ((tilt_off - share * pattern_off) / weight, weight))
     }
 
-    /// Returns the tilt and its distance from zero in standard deviations, if it certainly exceeds `least_rad`.
+    /// Returns the head's tilt and its distance from zero in standard deviations, if it certainly exceeds
+    /// `least_rad`.
     ///
-    /// The standard deviation comes from the scatter of blocks. It is at least that of the range noise, whose
-    /// variance is `level` times the declared one. `None` if declared noise would hide a tilt of `least_rad`, or if
-    /// the tilt is too large for the linear model.
+    /// The standard deviation comes from the scatter of blocks. It is at least the one caused by range noise, whose
+    /// variance is `level` times the declared variance. `None` if declared noise would hide a tilt of `least_rad`, or
+    /// if the tilt is too large for the linear model.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
         if weight * least_rad * least_rad < SHOWS * SHOWS {
@@ -135,7 +137,7 @@ impl TiltFit {
         let [pattern_2, both, _, pattern_off, _] = self.sums;
         let share = both / pattern_2;
         let steady = (pattern_off - tilt_rad * both) / pattern_2;
-        // Weights with which a block's sums add up to the remainder that the fit leaves.
+        // Weights that combine a block's sums into the residual that the fit leaves in this block.
         let left = [share * steady, share * tilt_rad - steady, -tilt_rad, -share, 1.0];
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.blocks);
@@ -156,7 +158,7 @@ mod tests {
 
     const NOISE_M: f64 = 0.01;
 
-    /// Returns readings by block: pattern, derivative, residual. The head has the tilt `tilt_rad`.
+    /// Returns the readings of each block: pattern, derivative, residual. The head has the tilt `tilt_rad`.
     ///
     /// The wall differs from its design by `steady` times the pattern.
     fn blocks(tilt_rad: f64, steady: f64) -> Vec<Vec<[f64; 3]>> {
@@ -191,7 +193,7 @@ mod tests {
 
     /// The oracle is a least-squares fit to the readings themselves, for two unknowns by Cramer's rule.
     #[test]
-    fn tilt_and_certainty_equal_those_of_a_least_squares_fit() {
+    fn head_tilt_and_its_certainty_equal_a_least_squares_fit() {
         let weight = 1.0 / (NOISE_M * NOISE_M);
         let square = |x: f64| x * x;
         for (tilt_rad, steady) in [(0.05, 0.02), (-0.08, -0.1), (0.2, 0.3)] {
@@ -228,7 +230,8 @@ mod tests {
             None,
             "a tilt below the limit is not reported"
         );
-        // The certainty is limited by the range noise if that is large, and otherwise by the scatter of blocks.
+        // The certainty of the tilt is limited by the range noise if that is large, and otherwise by the scatter of
+        // blocks.
         let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
         assert!(
             (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,

@@ -24,7 +24,7 @@ pub struct InertialSample {
     pub force_mps2: Option<Vec3<Body>>,
 }
 
-/// Number of values in the record of a leg.
+/// Number of values in the record of a leg, which is the inertial motion of an epoch.
 pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 2 + 2;
 
 /// Inertial motion accumulated since the errors were last propagated.
@@ -36,19 +36,20 @@ pub struct Leg {
     /// Integral and double integral of the rotation matrix over times with accelerometer data.
     pushed: Matrix3<f64>,
     pushed_twice: Matrix3<f64>,
-    /// Velocity and displacement caused by specific force, without gravity.
+    /// Change of velocity and displacement caused by specific force, without gravity.
     velocity: Vector3<f64>,
     way: Vector3<f64>,
-    /// Effect of a gyro bias on velocity and displacement: the bias tilts the force.
+    /// Effect of a gyro bias on velocity and displacement, because the bias tilts the estimated direction of the
+    /// force.
     tilting: Matrix3<f64>,
     tilting_twice: Matrix3<f64>,
-    /// Time without gyro data, and without accelerometer data, s.
+    /// Duration without gyro data, and duration without accelerometer data, s.
     blind_s: [f64; 2],
     /// Distance along the tunnel, m, and the cable's scale error on it; their product is the creep.
     creeping: [f64; 2],
-    /// Factors for the process noise of gyro and accelerometer biases.
+    /// Factors that multiply the process noise of gyro and accelerometer biases.
     unrest: [f64; 2],
-    /// The cable's slack.
+    /// Standard deviation, m, and time constant, s, of the cable's slack.
     slack: [f64; 2],
 }
 
@@ -72,7 +73,7 @@ impl Default for Leg {
 }
 
 impl State {
-    /// Propagates the estimate over `dt_s`. Adds the effect on its errors to `leg`.
+    /// Propagates the estimate over `dt_s`, and adds the effect on the estimate's errors to `leg`.
     pub fn go_on(&mut self, felt: &InertialSample, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
         let from_m = self.position.x();
         let (turn, force) = self.move_on(felt, dt_s, gravity_mps2);
@@ -128,7 +129,8 @@ impl Leg {
         *without_force += if force.is_some() { 0.0 } else { dt_s };
     }
 
-    /// Returns the process noise of the slack, which is two equal lags in series, driven by white noise.
+    /// Returns the process noise of the cable's slack, which is modelled as white noise through two equal lags in
+    /// series.
     fn slack_noises(&self) -> [Noise; 2] {
         let slack = self.slack();
         let lags = self.dt_s / slack.time_s;
@@ -151,7 +153,7 @@ impl Leg {
         GaussMarkov { reach, time_s }
     }
 
-    /// Returns the values of the leg for a record.
+    /// Returns the values of this leg for its record.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
@@ -180,7 +182,7 @@ impl Leg {
         Some(leg)
     }
 
-    /// Returns the leg with this noise and this slack.
+    /// Returns the leg with these noise factors and this slack model.
     ///
     /// `unrest` contains the factors by which the process noise of gyro and accelerometer biases is multiplied.
     #[must_use]
@@ -278,7 +280,8 @@ impl Leg {
     }
 }
 
-/// Minimum decay factor, which avoids a division by zero. A smaller factor would leave a negligible error anyway.
+/// Minimum decay factor of an error over a leg, which avoids a division by zero. A smaller factor would leave a
+/// negligible error anyway.
 const LEAST_FADING: f64 = 1e-3;
 
 /// Transition of errors between two times: e' = F e.
@@ -294,12 +297,12 @@ pub struct Transition {
     way_turned: Matrix3<f64>,
     /// Distance along the tunnel, m, and the cable's scale error on it.
     creeping: [f64; 2],
-    /// Indices of the errors that decay, each with its decay factor.
+    /// Indices of the errors that decay over time, each with its decay factor.
     fading: [(usize, f64); 9],
 }
 
 impl Transition {
-    /// Propagates the covariance.
+    /// Propagates the covariance of the errors through this transition.
     pub fn carry(&self, factors: &mut Factors<ERRORS>) {
         factors.shear(|column, len| self.shear(column, len));
         for (i, fading) in self.fading {
@@ -331,7 +334,7 @@ impl Transition {
         }
     }
 
-    /// Applies the transition without the decay. Errors from `len` on are zero.
+    /// Applies the error transition without the decay of errors. Errors from index `len` on are zero.
     fn shear(&self, e: &mut Errors, len: usize) {
         if len <= VELOCITY {
             return;

@@ -15,20 +15,20 @@ use headrace_geometry::tunnel::Profile;
 /// If the hull is pitched steeply, the beams look along the tunnel, and only few of them determine the attitude.
 const SQUARE: f64 = 0.8;
 
-/// A scalar measurement.
+/// A scalar measurement of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScalarUpdate {
     /// Change of the expected value per unit of each error.
     pub h: Errors,
-    /// Measured value less expected value.
+    /// Measured value minus expected value.
     pub residual: f64,
     /// Variance of the measurement noise.
     pub noise: f64,
-    /// Inclination of the beam along the tunnel; only for a range.
+    /// Inclination of the beam along the tunnel; present only if the measurement is a range.
     pub lean: Option<Lean>,
     /// Second derivatives of the expected value, which the update neglects.
     ///
-    /// They are with respect to position, 1/m, to rotation, m, and to both.
+    /// They are with respect to position, 1/m; to rotation, m; and to both.
     pub bends: [f64; 3],
 }
 
@@ -38,9 +38,9 @@ pub struct ScalarUpdate {
 /// first guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lean {
-    /// Component of the beam along the tunnel.
+    /// Component of the beam's unit vector along the tunnel.
     pub along: f64,
-    /// Change of `along` per unit of each error.
+    /// Change of `along` per unit of each error of the estimate.
     pub by: Errors,
     /// Change of the range per unit of `along`, divided by `along`, m.
     pub slope_m: f64,
@@ -51,7 +51,7 @@ impl ScalarUpdate {
         Self { h: [0.0; ERRORS], residual, noise, lean: None, bends: [0.0; 3] }
     }
 
-    /// Creates a direct measurement of one error.
+    /// Creates a measurement whose expected value depends on one error only, with factor 1.
     pub fn of(error: usize, residual: f64, noise: f64) -> Self {
         Self::new(residual, noise).with_one(error, 1.0)
     }
@@ -68,7 +68,8 @@ impl ScalarUpdate {
         self
     }
 
-    /// Removes the dependence on the beam's inclination if `is_used` is false or the direction is uncertain.
+    /// Removes the range's dependence on the beam's inclination if `is_used` is false or the inclination is
+    /// uncertain.
     ///
     /// `sd_of` returns the standard deviation of a weighted sum of errors.
     #[must_use]
@@ -85,13 +86,13 @@ impl ScalarUpdate {
         self
     }
 
-    /// Whether a beam meets the wall squarely. Per metre of position, the range changes by one over the cosine of
+    /// Whether the beam meets the wall squarely. Per metre of position, the range changes by one over the cosine of
     /// incidence.
     pub fn is_square(&self) -> bool {
         vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
-    /// Returns the part of the residual that comes from errors found since `known`.
+    /// Returns the part of the residual that comes from errors found since the errors in `known`.
     pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
         self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
     }
@@ -113,15 +114,15 @@ impl ScalarUpdate {
 ///
 /// The range of a beam at a more grazing angle shows the wall's roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
-/// Minimum distance that is assumed for the curvature of the wall, m.
+/// Minimum distance to the wall that is assumed when its curvature is computed, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// Standard deviations from zero above which an inclination counts as certain.
+/// Number of standard deviations from zero above which the side of a beam's inclination counts as certain.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
-    /// Position relative to the inertial unit, in the body's frame.
+    /// Position of the sonar relative to the inertial unit, in the body's frame.
     pub offset: Vec3<Body>,
     /// Direction of the beam's axis.
     pub along: Vec3<Body>,
@@ -157,8 +158,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // The slope is d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The true range may be as short as the nearest ray of the wider cone. A uniform distribution in between is
-    // assumed.
+    // The true range may be as short as the nearest ray of the wider cone. The true range is assumed to be uniformly
+    // distributed between both values.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
@@ -175,8 +176,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     Some(row.with_one(RANGES, designed_m))
 }
 
-/// Predicts the height of a pressure sensor above the tunnel floor, m; `offset` is its position from the inertial
-/// unit.
+/// Predicts the height of a pressure sensor above the tunnel floor, m; `offset` is its position relative to the
+/// inertial unit.
 pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.z() + arm.z() + state.depth_offset_m;
@@ -186,7 +187,8 @@ pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Sc
         .with_one(DEPTH, 1.0)
 }
 
-/// Predicts the chainage that the cable shows; `offset` is the position of the cable's end from the inertial unit.
+/// Predicts the chainage that the cable shows; `offset` is the position of the cable's end relative to the inertial
+/// unit.
 pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.x() + arm.x() + state.creep_m + state.slack_m;
@@ -197,8 +199,8 @@ pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -
         .with_one(SLACK, 1.0)
 }
 
-/// Predicts an attitude computed by a unit, about the tunnel's x, y and z. About z, it is a compass with a
-/// deviation.
+/// Predicts the attitude that an inertial unit computes, as rotations about the tunnel's x, y and z. The rotation
+/// about z is modelled as a compass with a deviation.
 ///
 /// The model compares rotations instead of angles, so it is smooth at any attitude, including a pitch of 90
 /// degrees.
@@ -219,7 +221,7 @@ pub fn attitude(
     ]
 }
 
-/// Predicts the velocity over ground in the frame of a sensor, m/s; `offset` is its position from the inertial
+/// Predicts the velocity over ground in the frame of a sensor, m/s; `offset` is its position relative to the inertial
 /// unit.
 ///
 /// `rate_radps` is the turn rate of the body.
@@ -236,14 +238,14 @@ pub fn velocity(
     let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
     let residuals = [off.x(), off.y(), off.z()];
     core::array::from_fn(|k| {
-        // Axis of the sensor in the tunnel frame.
+        // One axis of the sensor's frame, in the tunnel frame.
         let axis = state.attitude * (mounted * axes.get(k).copied().unwrap_or_else(Vec3::zero));
         let residual = residuals.get(k).copied().unwrap_or(0.0);
         ScalarUpdate::new(residual, sd_mps * sd_mps).with(VELOCITY, axis).with(ATTITUDE, axis.cross(&moved))
     })
 }
 
-/// Measures the gyro bias by the mean rate of a unit that does not turn, rad/s.
+/// Measures the gyro bias by the mean turn rate of an inertial unit that does not turn, rad/s.
 pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarUpdate; 3] {
     let off = mean_radps + -state.rate_bias_radps;
     let off = [off.x(), off.y(), off.z()];
@@ -252,7 +254,7 @@ pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarU
     })
 }
 
-/// Measures zero velocity (ZUPT).
+/// Returns the measurement of zero velocity (ZUPT), one scalar for each axis.
 pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
     let moved = [state.velocity_mps.x(), state.velocity_mps.y(), state.velocity_mps.z()];
     core::array::from_fn(|k| {

@@ -67,21 +67,23 @@ use headrace_sensor::reading::{MAX_SOURCES, Reading};
 
 /// Maximum time by which a fix is extrapolated beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
-/// If the clock goes back by more than this, it has been reset.
+/// If the clock goes back by more than this, the clock has been reset.
 ///
 /// Readings stamped further than this in the future are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// Standard deviations above which the estimate is restarted, because linearised updates would not converge.
+/// Standard deviations of the estimate above which it is restarted, because linearised updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
-/// Silence of all sensors after which the estimate is restarted.
+/// Duration of silence of all sensors after which the estimate is restarted.
 const SILENCE: DurNs = DurNs(5_000_000_000);
-/// Limits of plausible inertial samples. If they are exceeded, the unit is saturated or faulty.
+/// Largest plausible turn rate and specific force of an inertial sample. A unit that exceeds them is saturated or
+/// faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
-/// Capacity for estimates after the last epoch: a unit at 600 Hz over the longest window plus epoch, 1.5 s.
+/// Maximum number of estimates after the last epoch: an inertial unit at 600 Hz over the longest window plus epoch,
+/// 1.5 s.
 const AHEAD: usize = 1024;
-/// Assumed time between two passes of the heads if no head is known to turn.
+/// Assumed time between two passes of the heads over the same position if no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 
 /// Navigation by the error-state Kalman filter.
@@ -99,14 +101,15 @@ pub struct FilterNavigation {
     is_running: bool,
     /// Start of the first epoch. Later epochs begin at whole multiples of the epoch length after it.
     epoch_zero: MonoNs,
-    /// Latest receive time.
+    /// Latest receive time of any reading.
     received: MonoNs,
     /// Estimates after the last epoch, propagated by inertial samples.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// Covariance relative to an independent estimate with the same uncertainty.
+    /// Error covariance relative to a much earlier visit to this position, whose error is independent and equally
+    /// large.
     revisit: Relative,
-    /// Number of restarts of the estimate. Reasons: it was lost or not finite, or the clock went back.
+    /// Number of restarts of the estimate, because it was lost or not finite, or because the clock went back.
     restarts: u64,
     journal: Option<Journal>,
 }
@@ -114,7 +117,7 @@ pub struct FilterNavigation {
 stateful!(FilterNavigation { state: context, window, unit, listening, stillness, raw_ways, zero, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
-    /// Creates the navigation, without readings.
+    /// Creates the navigation filter, which has no readings yet.
     pub fn new(profile: Profile, site: Site, settings: Settings) -> Self {
         Self {
             context: Context { profile, site, settings, unit_at: Vec3::zero() },
@@ -142,7 +145,8 @@ impl FilterNavigation {
         self.is_running.then_some(&self.running)
     }
 
-    /// Returns when the cable readings left the expected range, once the doubt about them has lasted for a second.
+    /// Returns the time at which the cable readings left the expected range, once the doubt about them has lasted for
+    /// a second.
     ///
     /// `None` while the readings are trusted.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {
@@ -159,7 +163,7 @@ impl FilterNavigation {
         self.restarts
     }
 
-    /// Records the steps of each epoch from now on, for smoothing.
+    /// Records the filter's steps in each epoch from now on, for smoothing after the dive.
     #[must_use]
     pub(crate) fn with_journal(mut self, journal: Journal) -> Self {
         self.running.keep_steps();
@@ -175,7 +179,7 @@ impl FilterNavigation {
         }
         while self.running.at < last {
             let due = self.epoch_before(self.running.at + self.context.settings.epoch);
-            // A time span without readings is propagated as a single leg.
+            // A time span without readings is propagated in a single step.
             let heard =
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
@@ -206,7 +210,8 @@ impl FilterNavigation {
         self.running().and_then(|running| running.cable.doubt(running.at))
     }
 
-    /// Returns the difference between the compared distances, as an error along the tunnel.
+    /// Returns the difference between the distances by cable, velocity log and estimate, as an error along the
+    /// tunnel.
     fn raw_error(&self) -> Relative {
         Relative::along(self.raw_ways.doubt().map_or(0.0, |doubt| doubt.differs_m))
     }
@@ -224,7 +229,7 @@ impl FilterNavigation {
         }
     }
 
-    /// Records that the estimate ends.
+    /// Records for smoothing that the present estimate ends.
     fn write_end(&mut self) {
         if self.is_running && self.journal.is_some() {
             self.running.keep_end();
@@ -247,7 +252,7 @@ impl FilterNavigation {
         debug_assert!(sd.is_valid(), "standard deviations of a sound estimate are numbers: {sd:?}");
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        // At first, errors of new soundings are independent of errors of earlier soundings.
+        // Until two clones exist, errors of new soundings are independent of errors of earlier soundings.
         self.revisit = sd.independent();
         let differs = Relative::along(self.running.cable.differs_m());
         let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);
@@ -259,11 +264,11 @@ impl FilterNavigation {
         self.carry_ahead();
     }
 
-    /// Whether the chainage was reacquired since the heads last passed this position, or the counter's zero is
+    /// Whether the chainage was reacquired since the heads last passed this position, or the cable counter's zero is
     /// lost.
     ///
-    /// If so, the offset between earlier and present soundings is unknown. Once the zero is lost, this remains
-    /// true.
+    /// If so, the offset between earlier and present soundings is unknown. Once the counter's zero is lost, the
+    /// offset stays unknown.
     fn has_jumped(&self) -> bool {
         if self.zero.is_lost() {
             return true;
@@ -308,8 +313,7 @@ impl FilterNavigation {
 
     /// Returns the time between two passes of evenly spread heads.
     ///
-    /// Includes the share `apart_share` of the time until the rearmost head reaches the position of the foremost
-    /// head.
+    /// Adds the share `apart_share` of the time until the rearmost head reaches the position of the foremost head.
     fn between_passes(&self, apart_share: f64) -> DurNs {
         let (mut passes_per_s, mut ahead_m, mut astern_m) = (0.0, f64::NEG_INFINITY, f64::INFINITY);
         for source in self.sources.iter().flatten() {
@@ -381,8 +385,8 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // The clock was reset, or the previous timestamp was wrong. To wait until the clock catches up would
-            // not be better.
+            // Either the clock was reset, or the previous timestamp was wrong. Waiting until the clock catches up
+            // would not be better.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();
@@ -411,7 +415,7 @@ impl Navigation for FilterNavigation {
                 self.unit = Some(number);
                 self.context.unit_at = sensor.mount.position;
             }
-            // Readings from before the alignment are never fused.
+            // Readings from before the start of the alignment are never fused.
             let old = self.received - LISTENS;
             self.window.drop_until(old);
             self.window.forget(old);

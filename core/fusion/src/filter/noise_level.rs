@@ -9,38 +9,39 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
 
-/// Change of the level's logarithm by a measurement whose normalised square exceeds its expected value by one.
+/// Change of the noise level's logarithm by a measurement whose squared normalised innovation is one too large.
 const GAIN: f64 = 0.01;
-/// Limit at which normalised squares are clipped, because one outlier does not show the noise.
+/// Limit at which squared normalised innovations are clipped, because one outlier does not show the noise.
 const MOST: f64 = 9.0;
-/// Minimum share of a head's declared variance that may apply.
+/// Minimum share of a head's declared range variance to which learning may lower it.
 ///
-/// The declared 3 cm suit a rough wall. A range step of 2 cm and noise of 1 cm alone amount to this share.
+/// The declared 3 cm suit a rough wall. On a smooth wall, a range step of 2 cm and noise of 1 cm still cause this
+/// share.
 const LEAST_OF_HEAD: f64 = 0.15;
 /// Limit at which the square of a rejected innovation is clipped, as a share of the declared variance.
 ///
-/// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, there are many of
-/// them.
+/// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, many innovations are
+/// rejected.
 const MOST_UNUSED: f64 = 2.0;
-/// Number of measurements in the mean, and the minimum number before the mean is used.
+/// Number of measurements in the running mean, and the minimum number before that mean is used.
 const MEMORY: u32 = 200;
 const FEW: u32 = 30;
 /// Number of used returns in a turn of a head, one every three degrees. Fewer returns do not cover the whole wall.
 const TURN: u32 = 120;
-/// Mean normalised square above which the innovations are too large to be noise.
+/// Mean squared normalised innovation above which the innovations are too large to be noise.
 const UNUSUAL: f64 = 1.8;
 
 /// Learnt noise level of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseLevel {
-    /// Last innovation of each scalar of a reading.
+    /// Last innovation of each scalar component of a reading.
     last: [Option<f64>; 3],
-    /// Factor of the declared variance.
+    /// Learnt factor by which the declared variance is multiplied.
     factor: f64,
-    /// Running mean of the normalised squares of all innovations, and the number of these innovations.
+    /// Running mean of all squared normalised innovations, and the number of innovations in it.
     nis: f64,
     seen: u32,
-    /// Running mean of squared innovations less the estimate's own variance, as a share of the declared variance.
+    /// Running mean of squared innovations minus the estimate's own variance, as a share of the declared variance.
     share: f64,
     /// The same mean over the last few measurements, which shows changes of the wall.
     latest: f64,
@@ -52,12 +53,12 @@ impl Default for NoiseLevel {
     }
 }
 
-/// Returns the limits of the level, as factors of the declared variance; `None` if the level is not learnt.
+/// Returns the limits of the noise level, as factors of the declared variance; `None` if the level is not learnt.
 ///
-/// The declared tilt noise of an inertial unit covers its slow errors, which differences do not show. The declared
-/// range noise of a head also covers bumps and shape of the wall, which a leaning beam would confuse with yaw. So
-/// differences can only raise a head's level. The square of its total residual lowers it
-/// ([`NoiseLevel::smoothness`]).
+/// The declared tilt noise of an inertial unit covers its slow errors, which differences between successive
+/// innovations do not show. The declared range noise of a head also covers bumps and shape of the wall, which a
+/// leaning beam would confuse with yaw. So differences can only raise a head's level. Only the square of the total
+/// residual can lower it ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
         SensorKind::Head => Some([1.0, 9.0]),
@@ -70,7 +71,7 @@ fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
 }
 
 impl NoiseLevel {
-    /// Processes a used innovation and its variance; `scalar` is the index within the reading.
+    /// Processes an innovation of a fused measurement, and its variance; `scalar` is its index within the reading.
     pub fn note(&mut self, kind: SensorKind, scalar: usize, innovation: f64, variance: f64) {
         let Some(before) = self.last.get_mut(scalar).and_then(|last| last.replace(innovation)) else {
             return;
@@ -81,7 +82,7 @@ impl NoiseLevel {
         self.factor = (self.factor * math::exp(GAIN * (white - 1.0))).clamp(least, most);
     }
 
-    /// Processes the normalised square of any innovation, whether used or rejected.
+    /// Processes the squared normalised innovation of any measurement, whether fused or rejected.
     ///
     /// Returns the square divided by the earlier mean, if this mean exceeds its expected value of 1.
     pub fn relative(&mut self, nis: f64) -> f64 {
@@ -91,7 +92,7 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Processes a squared innovation less the estimate's own variance, as a share of the declared variance.
+    /// Processes a squared innovation minus the estimate's own variance, as a share of the declared variance.
     pub fn note_share(&mut self, share: f64, is_used: bool) {
         let most = if is_used { MOST } else { MOST_UNUSED };
         let share = share.clamp(-most, most);
@@ -99,33 +100,33 @@ impl NoiseLevel {
         self.latest += (share - self.latest) / f64::from(self.seen.clamp(1, FEW));
     }
 
-    /// Returns the recent share of the declared noise, 0 to 1; 1 until there are enough measurements.
+    /// Returns the recently observed share of the declared variance, 0 to 1; 1 until there are enough measurements.
     pub fn share(&self) -> f64 {
         if self.seen >= FEW { self.share.clamp(0.0, 1.0) } else { 1.0 }
     }
 
-    /// Whether innovations have about their expected size. Those of ranges are larger if the wall differs from its
-    /// design.
+    /// Whether innovations have about their expected size. Innovations of ranges are larger if the wall differs from
+    /// its design.
     pub fn is_usual(&self) -> bool {
         self.nis < UNUSUAL
     }
 
-    /// Records that a measurement of this scalar was not used, so that no difference spans it.
+    /// Records that a measurement of this scalar was not fused, so that no difference of innovations spans it.
     pub fn skip(&mut self, scalar: usize) {
         if let Some(last) = self.last.get_mut(scalar) {
             *last = None;
         }
     }
 
-    /// Returns the factor of the declared variance; 1 if the level is not learnt.
+    /// Returns the factor by which to multiply the declared variance; 1 if the noise level is not learnt.
     pub fn factor(&self, kind: SensorKind, scalar: usize) -> f64 {
         limits(kind, scalar).map_or(1.0, |_| self.factor)
     }
 
-    /// Returns the factor, at most 1, of the variance of a head's range that meets the wall squarely.
+    /// Returns the variance factor, at most 1, for a head's ranges whose beams meet the wall squarely.
     ///
-    /// It is the learnt share of the declared variance: over many measurements, or over the last few if that is
-    /// larger. It is 1 until there are measurements of a whole turn. It is large if the wall differs from its
+    /// The factor is the learnt share of the declared variance: over many measurements, or over the last few if that
+    /// is larger. It is 1 until there are measurements of a whole turn. It is large if the wall differs from its
     /// design, by roughness or by shape. `None` for a head without measurements.
     pub fn smoothness(&self) -> Option<f64> {
         let is_known = self.seen >= TURN;
@@ -140,7 +141,7 @@ mod tests {
 
     const HEAD: SensorKind = SensorKind::Head;
 
-    /// Returns the level after `count` measurements whose innovation is `off` declared standard deviations.
+    /// Returns the noise level after `count` measurements whose innovation is `off` declared standard deviations.
     fn level(count: u32, off: impl Fn(u32) -> f64, is_used: bool) -> NoiseLevel {
         let mut level = NoiseLevel::default();
         for k in 0..count {
@@ -170,14 +171,14 @@ mod tests {
             level(2000, |k| 0.5 * math::sqrt(2.0) * math::sin(f64::from(k)), true).smoothness().unwrap(),
             0.25,
         );
-        // The factor is never smaller than the share of range steps and noise.
+        // The factor is never smaller than the share that range steps and sensor noise cause.
         near(level(2000, alternating(0.01), true).smoothness().unwrap(), 0.15);
     }
 
     /// If the wall differs from its design, neighbouring ranges have about equal errors, so their differences show
     /// nothing.
     #[test]
-    fn wall_that_differs_in_shape_is_not_smooth() {
+    fn wall_that_differs_from_its_design_is_not_smooth() {
         near(level(2000, |_| 1.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |_| 3.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).smoothness().unwrap(), 0.5);
@@ -185,7 +186,7 @@ mod tests {
 
     /// Rejected innovations show that the wall differs from its design. One stray echo in twenty changes little.
     #[test]
-    fn rejected_innovations_have_limited_weight() {
+    fn rejected_innovations_have_limited_weight_in_the_noise_level() {
         near(level(2000, |_| 9.0, false).share(), 1.0);
         let mut one = level(1000, alternating(0.5), true);
         for k in 0..200 {

@@ -9,18 +9,18 @@ use crate::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Limits for georeferencing: standard deviations of the position in the section, m, and of yaw, radians.
+/// Largest standard deviations for georeferencing: of the position in the cross-section, m, and of yaw, radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
-/// Limit for the standard deviation of the chainage, both relative to the previous pass of the heads and absolute, m.
+/// Largest standard deviation of the chainage for georeferencing, relative to the previous head pass and absolute, m.
 const ALONG_LIMIT_M: f64 = 1.0;
 
-/// Standard deviations of an estimate.
+/// Standard deviations of the parts of an estimated pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseSd {
     /// Standard deviation of the chainage, without the part caused by the cable's scale, m.
     pub along_m: f64,
-    /// Standard deviation of the position in the section, in the less certain direction, m.
+    /// Standard deviation of the position in the cross-section, in the less certain direction, m.
     pub place_m: f64,
     /// Standard deviation of roll or pitch, whichever is larger, radians.
     pub tilt_rad: f64,
@@ -61,7 +61,7 @@ impl PoseSd {
 
     /// Returns `relative` if this estimate and `relative` are certain enough to georeference samples.
     ///
-    /// Errors: the part that is too uncertain.
+    /// Errors: the part of the pose that is too uncertain.
     pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {
         if self.yaw_rad > YAW_LIMIT_RAD {
             Err(NoFix::Heading)

@@ -1,6 +1,6 @@
-//! Sums over a pose window of a few seconds, for the vehicle's pose and all fitted parameters.
+//! Least-squares sums over a pose window of a few seconds, for the vehicle's pose and all fitted settings.
 //!
-//! Only residuals that the pose does not explain count for the parameters.
+//! Only residuals that the pose does not explain count for the settings.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,10 +9,10 @@ use super::head_tilt::TiltSums;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 
-/// Prior standard deviations of the pose within a pose window, m and radians.
+/// Prior standard deviations of the vehicle's pose error within a pose window, m and radians.
 const POSE_SD: [f64; POSE] = [0.3, 0.3, 0.005, 0.01, 0.02];
 
-/// Sums over the readings of a pose window.
+/// Least-squares sums over the readings of a pose window.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct PoseWindow {
     pub(super) begun: Option<MonoNs>,
@@ -21,12 +21,12 @@ pub(super) struct PoseWindow {
     pub(super) residuals: [f64; POSE],
     pub(super) scale: Line,
     pub(super) turned: [Line; FOLLOWED],
-    /// Sums for the pitch and yaw of each head on its mount.
+    /// Sums for fitting the pitch and yaw of each head on its mount.
     pub(super) tilted: [[TiltSums; 2]; FOLLOWED],
 }
 
 impl PoseWindow {
-    /// Adds the information of a reading on the vehicle's pose.
+    /// Adds the information that a reading gives on the vehicle's pose.
     pub(super) fn add(&mut self, by_pose: [f64; POSE], residual_m: f64, weight: f64) {
         for ((by, line), sum) in by_pose.iter().zip(&mut self.pose).zip(&mut self.residuals) {
             for (part, other) in line.iter_mut().zip(&by_pose) {
@@ -54,7 +54,7 @@ impl PoseWindow {
             .then_some(factor)
     }
 
-    /// Returns the weight and the weighted value of a parameter after the pose is eliminated.
+    /// Returns the weight and the weighted value of a fitted parameter after the vehicle's pose is eliminated.
     pub(super) fn freed(&self, line: &Line, factor: &[[f64; POSE]; POSE]) -> [f64; 2] {
         let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
         [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
@@ -67,8 +67,8 @@ mod tests {
 
     /// Three readings with residuals of 1, 2 and 3 m are fitted by a parameter.
     ///
-    /// In the first case, the pose has no effect on the parameter's fit. In the second case, both have the same
-    /// effect.
+    /// In the first case, the pose has no effect on the parameter's fit. In the second case, pose and parameter
+    /// change the ranges in the same way.
     #[test]
     fn residuals_explained_by_a_pose_error_are_removed() {
         let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };

@@ -8,33 +8,33 @@ use serde::{Deserialize, Serialize};
 use super::settings::Settings;
 use headrace_geometry::math;
 
-/// Maximum share of the variance of a return that comes from bumps.
+/// Maximum share of a return's range variance that is assumed to come from bumps of the wall.
 const MOST_BUMPS: f64 = 0.9;
-/// Limit for the number of passes.
+/// Maximum number of passes over the same bumps that is counted.
 ///
-/// It is needed so that gyros alone do not let the estimate drift: returns from repeated bumps still hold it.
+/// Returns from repeated bumps must keep some weight, because on gyros alone the estimate would drift.
 const MOST_PASSES: f64 = 10.0;
 
-/// Counts how often the heads have passed the present bumps.
+/// Counts how often the heads have passed over the bumps that they see now.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct RepeatedBumps {
-    /// Chainage at which the heads began to see these bumps, m.
+    /// Chainage at which the heads began to see the present bumps, m.
     from_m: Option<f64>,
-    /// Number of returns of all heads since then.
+    /// Number of returns of all heads since they began to see the present bumps.
     returns: u32,
 }
 
 impl RepeatedBumps {
-    /// Updates the chainage of the vehicle, m.
+    /// Restarts the count of passes if the vehicle has moved on; `x_m` is its chainage.
     pub(super) fn pass(&mut self, x_m: f64, settings: &Settings) {
         if self.from_m.is_none_or(|from_m| (x_m - from_m).abs() >= settings.seen_again_m) {
             *self = Self { from_m: Some(x_m), returns: 0 };
         }
     }
 
-    /// Returns the mean number of times that a bump has been seen, including now, at least 1.
+    /// Returns how often the heads have seen a bump on average, including the present pass; at least 1.
     ///
-    /// In an unfinished turn, half of the bumps have been seen once more.
+    /// In an unfinished turn of a head, half of the bumps have been seen once more than the others.
     fn passes(&self, settings: &Settings) -> f64 {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }
@@ -42,7 +42,7 @@ impl RepeatedBumps {
     /// Counts a return, and returns the variance with which to fuse it, m^2.
     ///
     /// `declared_m2` is the variance of a single return, and `bumps` is the share of this variance that comes from
-    /// bumps. All returns from one bump together have the weight of their mean. Each return adds the part of that
+    /// bumps. Together, all returns from one bump weigh as much as their mean. Each return adds the part of that
     /// weight that is new.
     pub(super) fn noise_m2(
         &mut self,
@@ -77,9 +77,9 @@ mod tests {
         seen.noise_m2(settings.bump_m / settings.return_step_rad / around, DECLARED_M2, bumps, &settings)
     }
 
-    /// In a least-squares sum, all returns from one bump have the weight of their mean.
+    /// In a least-squares sum, all returns from one bump together weigh as much as their mean.
     #[test]
-    fn returns_from_one_bump_have_the_weight_of_their_mean() {
+    fn returns_from_one_bump_together_weigh_as_much_as_their_mean() {
         let bumps = 0.6;
         for around in [1.0, 4.0] {
             let mut information = 0.0;
@@ -110,7 +110,7 @@ mod tests {
             (0..returns).for_each(|_| _ = seen.noise_m2(6.0, DECLARED_M2, 0.5, &settings));
             seen.passes(&settings)
         };
-        // A turn has 120 returns.
+        // A turn of a head has 120 returns.
         let passes = [(0, 7.0), (120, 7.01), (240, 7.0), (60, 7.06), (0, 7.03), (0, 7.0)]
             .map(|(n, x_m)| after(n, x_m));
         for (found, right) in passes.iter().zip([1.0, 1.5, 3.5, 1.0, 1.0, 1.0]) {

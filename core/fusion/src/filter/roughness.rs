@@ -10,26 +10,27 @@ use super::settings::Settings;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Maximum number of bumps in the running mean, and the weight of the declared noise in it, as a number of bumps.
+/// Maximum number of bumps in the running mean, and the weight of the declared roughness in it, as a number of bumps.
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
-/// Limit at which the square of a sum is clipped, as a factor of its variance, because one outlier is no bump.
+/// Limit at which the squared sum of two residuals is clipped, in variances of the sum, because one outlier is no
+/// bump.
 const MOST: f64 = 9.0;
-/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to 6 cm.
+/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to bumps of 6 cm.
 const ROUGHEST: f64 = 4.0;
 /// Minimum speed along the wall that is assumed, m/s. A slower vehicle drifts sideways at about this speed.
 const STILL_MPS: f64 = 0.05;
 /// Number of echosounders whose last pings are kept.
 const ECHOSOUNDERS: usize = 8;
-/// Maximum cosine between the range gradients of two echosounders that face opposite walls.
+/// Maximum cosine of the angle between the range gradients of two echosounders that count as facing opposite walls.
 const FACING: f64 = -0.95;
-/// Maximum time between two pings that form a sum, s.
+/// Maximum time between two opposite pings whose ranges are added, s.
 const AT_ONCE_S: f64 = 0.25;
 
-/// A fused ping.
+/// An echosounder's ping that has been fused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Look {
-    /// Number of the echosounder.
+    /// Source number of the echosounder.
     pub(super) source: usize,
     /// Time of the ping.
     pub(super) at: MonoNs,
@@ -51,7 +52,7 @@ pub(super) struct Roughness {
 }
 
 impl Default for Roughness {
-    /// Starts with the declared roughness.
+    /// Creates the record with the declared roughness of the wall.
     fn default() -> Self {
         Self { factor: 1.0, seen: DECLARED, looks: [None; ECHOSOUNDERS] }
     }
@@ -60,8 +61,8 @@ impl Default for Roughness {
 impl Roughness {
     /// Processes a ping that has corrected the estimate.
     ///
-    /// `bump` is the share of a bump that the ping adds. `scale_m2` is the variance of a sum of two ranges that the
-    /// unknown scale of ranges causes.
+    /// `bump` is the weight of the ping in bumps: one divided by the number of pings that see the same bump.
+    /// `scale_m2` is the variance that the unknown scale of ranges causes in a sum of two ranges.
     pub(super) fn note(&mut self, look: Look, bump: f64, scale_m2: f64, settings: &Settings) {
         let faces = |other: &&Look| {
             other.by_place.dot(&look.by_place) < FACING
@@ -93,15 +94,15 @@ impl Roughness {
 
     /// Returns how many pings of this echosounder see the same bump at this speed, at least 1.
     ///
-    /// Together these pings give no more information on the position than a single ping. For a first ping, returns
-    /// 1.
+    /// Together these pings give no more information on the position than a single ping. For the first ping of an
+    /// echosounder, returns 1.
     pub(super) fn looks_at_a_bump(&self, source: usize, at: MonoNs, speed_mps: f64, bump_m: f64) -> f64 {
         let before = self.looks.iter().flatten().find(|look| look.source == source);
         before.map_or(1.0, |before| looks(at.since(before.at), speed_mps, bump_m))
     }
 }
 
-/// Returns how many pings see the same bump at this speed; `apart` is the time between pings.
+/// Returns how many pings of an echosounder see the same bump at this speed; `apart` is the time between two pings.
 fn looks(apart: DurNs, speed_mps: f64, bump_m: f64) -> f64 {
     let way_m = apart.as_secs_f64().abs() * speed_mps.abs().max(STILL_MPS);
     if way_m > 0.0 { (bump_m / way_m).max(1.0) } else { 1.0 }
@@ -112,7 +113,7 @@ mod tests {
     use super::*;
     use headrace_geometry::math;
 
-    /// Height of bumps with a length of a third of a metre and this standard deviation, m.
+    /// Height of the wall's bumps at a chainage, m; bumps are a third of a metre long, and their sd is `sd_m`.
     fn height_m(side: f64, along_m: f64, sd_m: f64) -> f64 {
         sd_m * (math::sin((19.0 + 2.0 * side) * along_m) + math::sin((31.7 + 4.0 * side) * along_m))
     }
@@ -143,7 +144,7 @@ mod tests {
     /// The roughness is found although the vehicle sways. A smooth wall is recognised even if it is declared as
     /// rough.
     #[test]
-    fn roughness_equals_the_excess_variation_of_the_range_sum() {
+    fn wall_roughness_equals_the_excess_variation_of_opposite_range_sums() {
         for rough_m in [0.0, 0.01, 0.03, 0.05] {
             for white_m in [0.0, 0.02] {
                 let found_m = found_m(rough_m, white_m, 0.0, 400.0);
@@ -152,12 +153,12 @@ mod tests {
         }
     }
 
-    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two that face the same
-    /// way.
+    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two echosounders that
+    /// face the same way.
     ///
     /// The learnt roughness is at most twice the declared one.
     #[test]
-    fn roughness_is_as_declared_until_observed() {
+    fn wall_roughness_is_as_declared_until_observed() {
         let settings = Settings::default();
         assert!((found_m(0.05, 0.0, 0.1, 100.0) - settings.echo_sd_m).abs() < 1e-12);
         assert!((found_m(1.0, 0.0, 0.0, 400.0) - 2.0 * settings.echo_sd_m).abs() < 1e-12);

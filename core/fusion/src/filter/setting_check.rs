@@ -32,22 +32,22 @@ use headrace_sensor::reading::Reading;
 
 /// Length of a pose window: about the time for which a filter with wrong ranges keeps its position.
 const SPELL: DurNs = DurNs(2_000_000_000);
-/// Minimum duration and distance of a block, and the maximum duration. A block that is too short by then is
-/// dropped.
+/// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that is too short by
+/// then is dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
-/// Minimum number of readings in a block.
+/// Minimum number of readings in a block of pose windows.
 const FEWEST_READINGS: u32 = 100;
-/// Smallest values that are reported: a share of the range, and an angle.
+/// Smallest setting errors that are reported: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
-/// Residual above which a range loses weight, and residual above which it is ignored, m.
+/// Residual above which a range loses weight, and residual above which a range is ignored, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
-/// Maximum number of pairs of a source and another mount.
+/// Maximum number of pairs of a sonar and an alternative mount for it.
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
-/// Mean square residual above which an echosounder counts as wrong, m^2.
+/// Mean square residual above which an echosounder counts as wrongly configured, m^2.
 ///
 /// Such an echosounder pulls the estimate away and makes correct heads look turned.
 const ASTRAY_M2: f64 = 0.04;
@@ -67,7 +67,7 @@ pub enum Setting {
     HeadPitched(f64),
     /// A head is yawed on its mount by this angle, radians, which is to be added to the configured yaw.
     HeadYawed(f64),
-    /// A source faces the opposite direction.
+    /// A sensor is mounted facing the opposite direction.
     WrongWayRound,
     /// Two sources are swapped; the value is the number of the second source.
     Swapped(u16),
@@ -78,9 +78,9 @@ pub enum Setting {
 pub struct SettingDoubt {
     /// The setting that is likely wrong.
     pub setting: Setting,
-    /// Number of the source, if the setting belongs to one source.
+    /// Number of the source to which the setting belongs, if it belongs to one source.
     pub source: Option<u16>,
-    /// Distance from the configured value, in standard deviations.
+    /// Distance of the setting from its configured value, in standard deviations.
     pub sure_sd: f64,
 }
 
@@ -97,7 +97,7 @@ impl Setting {
         }
     }
 
-    /// Returns the value of the setting, a share or an angle in radians; 0 if it has none.
+    /// Returns the size of the setting error, a share or an angle in radians; 0 if it has no size.
     pub fn figure(self) -> f64 {
         match self {
             Self::RangeScale(figure)
@@ -137,7 +137,7 @@ impl SettingDoubt {
 /// Context for the prediction of ranges.
 #[derive(Debug, Clone, Copy)]
 pub struct Design<'a> {
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: &'a Profile,
     /// Water and location of the tunnel.
     pub site: &'a Site,
@@ -154,7 +154,7 @@ struct Look {
     sd_m: f64,
 }
 
-/// A block: its start, its number of readings, and the sums of its pose windows.
+/// Sums over a block of pose windows, with the block's start and number of readings.
 ///
 /// The vehicle's pose is already eliminated from the sums.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -176,7 +176,7 @@ pub struct SettingChecks {
     turned: [Fit; FOLLOWED],
     tilted: [[TiltFit; 2]; FOLLOWED],
     alternatives: Vec<Alternative>,
-    /// For each followed source, the number of readings and the observed share of the declared variance, at most 1.
+    /// For each checked source, the number of readings and the observed share of the declared variance, at most 1.
     heard: [u32; FOLLOWED],
     levels: [f64; FOLLOWED],
     doubt: Option<SettingDoubt>,
@@ -185,7 +185,7 @@ pub struct SettingChecks {
 stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, doubt; lists: alternatives; });
 
 impl Default for SettingChecks {
-    /// Allocates the buffers, without readings.
+    /// Creates the checks with allocated buffers, but no readings.
     fn default() -> Self {
         Self {
             block: Block::default(),
@@ -258,7 +258,8 @@ impl SettingChecks {
         let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
         let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
-        // A known scale error makes no range an outlier: the smaller of the residuals with and without it counts.
+        // A known scale error makes no range an outlier: of the residuals with and without it, the smaller one
+        // counts.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
@@ -282,7 +283,7 @@ impl SettingChecks {
         }
     }
 
-    /// Returns the index of a source among the followed sources; adds the source if there is room.
+    /// Returns the index of a source among the sources that are checked; adds the source if there is room.
     fn slot(&mut self, source: usize) -> Option<usize> {
         let source = u16::try_from(source).ok()?;
         let place = self.followed.iter().position(|known| known.is_none_or(|known| known == source))?;
@@ -290,9 +291,10 @@ impl SettingChecks {
         Some(place)
     }
 
-    /// Compares a reading with predictions for other mounts.
+    /// Compares a range with predictions for alternative mounts of its sonar.
     ///
-    /// These are the mounts of other sources of the same kind, and the source's own mount turned by half a turn.
+    /// The alternatives are the mounts of other sources of the same kind, and the source's own mount turned by half a
+    /// turn.
     fn compare(
         &mut self,
         state: &State,
@@ -353,7 +355,7 @@ impl SettingChecks {
         }
     }
 
-    /// Ends a block, and adds its sums to the fits.
+    /// Ends a block of pose windows, and adds its sums to the fits of settings.
     fn close(&mut self) {
         self.end_spell();
         if self.block.readings >= FEWEST_READINGS {
@@ -436,7 +438,7 @@ fn tilt_axes(mount: &Rot<Body, Sensor>) -> [Vec3<Body>; 2] {
     [Vec3::new(-ahead.y() / level, ahead.x() / level, 0.0), Vec3::new(0.0, 0.0, 1.0)]
 }
 
-/// Returns half a turn about the sensor's own vertical axis.
+/// Returns the rotation by half a turn about the sensor's own vertical axis.
 fn round() -> Rot<Sensor, Sensor> {
     Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
 }

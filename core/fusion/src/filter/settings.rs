@@ -13,9 +13,9 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// A Gauss-Markov process with zero mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GaussMarkov {
-    /// Standard deviation, in the unit of the process.
+    /// Standard deviation of the process, in its unit.
     pub reach: f64,
-    /// Correlation time, s.
+    /// Correlation time of the process, s.
     pub time_s: f64,
 }
 
@@ -28,7 +28,7 @@ impl GaussMarkov {
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance that a process with a single lag gains per second.
+    /// Variance that white noise adds to a process with a single lag per second.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }
@@ -48,10 +48,10 @@ pub struct Settings {
     pub rate_noise: f64,
     /// White noise of the accelerometers, m/s^2/sqrt(Hz).
     pub force_noise: f64,
-    /// White noise without gyro or accelerometer data: the vehicle's own turning and acceleration, in the same
-    /// units.
+    /// White noise assumed without gyro or accelerometer data: the vehicle's own turning, rad/s/sqrt(Hz), and
+    /// acceleration, m/s^2/sqrt(Hz).
     pub blind_rate_noise: f64,
-    /// See `blind_rate_noise`.
+    /// White noise without accelerometer data; see `blind_rate_noise`.
     pub blind_force_noise: f64,
     /// Bias of the gyros, rad/s.
     pub rate_bias: GaussMarkov,
@@ -63,7 +63,7 @@ pub struct Settings {
     pub slack: GaussMarkov,
     /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
     pub scale_sd: f64,
-    /// See `scale_sd`.
+    /// Random walk of the cable's scale error; see `scale_sd`.
     pub scale_noise: f64,
     /// Noise of a depth sensor without the rounding to its quantum, m.
     pub depth_sd_m: f64,
@@ -71,7 +71,7 @@ pub struct Settings {
     ///
     /// The offset contains errors of water level, density and surface pressure.
     pub depth_offset_sd_m: f64,
-    /// See `depth_offset_sd_m`.
+    /// Random walk of the depth sensor's offset; see `depth_offset_sd_m`.
     pub depth_noise: f64,
     /// Noise of a measured attitude about the vertical axis, radians.
     pub heading_sd_rad: f64,
@@ -91,7 +91,7 @@ pub struct Settings {
     pub echo_beam_rad: f64,
     /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
     pub range_scale_sd: f64,
-    /// See `range_scale_sd`.
+    /// Random walk of the scale error of ranges; see `range_scale_sd`.
     pub range_scale_noise: f64,
     /// Noise of the range of a head's return, m, wall roughness included.
     pub return_sd_m: f64,
@@ -99,7 +99,7 @@ pub struct Settings {
     pub return_beam_rad: f64,
     /// Minimum angle between used returns of a head, radians. Returns that are closer see the same roughness.
     pub return_step_rad: f64,
-    /// Noise of a velocity over ground, m/s.
+    /// Noise of a velocity log's velocity over ground, m/s.
     pub velocity_sd_mps: f64,
     /// Gate: a measurement is rejected if its squared innovation exceeds the innovation's variance times this
     /// factor.
@@ -113,7 +113,7 @@ pub struct Settings {
     /// Whether noise levels of the sources are learnt. Without learning, likelihoods of different settings can be
     /// compared.
     pub learns: bool,
-    /// Share of a wall range's correction of attitude and related errors that is applied.
+    /// Share of the computed correction of attitude and related errors that a wall range applies.
     ///
     /// With 0, ranges do not correct the attitude; 1 is the optimal estimate. Coverage depends on the attitude of one
     /// pass relative to the next. Gyros measure this relative attitude more accurately than ranges do, because walls
@@ -144,10 +144,10 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Not configurable: two thirds of 0.3 m, which was the distance between bumps in field dives
+            // Length of a bump, not configurable: two thirds of the distance of 0.3 m between bumps in field dives
             // (docs/why/field.md).
             bump_m: 0.2,
-            // Not configurable. It is about the vehicle's distance during half a turn of a head.
+            // Not configurable: about the distance that the vehicle travels during half a turn of a head.
             seen_again_m: 0.05,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,
@@ -181,7 +181,8 @@ impl Settings {
         }
     }
 
-    /// Measurement variance of a kind of sensor, in its unit squared. Innovation variances are compared with it.
+    /// Measurement variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
+    /// compared with it.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {
             SensorKind::Head => self.return_sd_m,

@@ -1,13 +1,14 @@
 //! Size and speed of the cable's slack, measured by comparing the counter with inertial motion.
 //!
-//! The difference between counter and inertial motion contains the slack. It also contains the effect of the
-//! inertial unit's constant errors, which is a polynomial of second degree in time. So its third differences show
-//! the slack alone. At several lags, they are compared with the third differences of the slack model. If they are
-//! larger than declared, the slack is larger or faster. A single third difference far above the usual size means
-//! that the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it
-//! uses only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
+//! The difference between counter and inertial motion contains the slack. It also contains the effect of the inertial
+//! unit's constant errors, which is a polynomial of second degree in time. So its third differences show the slack
+//! alone. At several lags, these are compared with the third differences of the slack model. If the measured ones are
+//! larger, the slack is larger or faster than declared. A single third difference far above the usual size means that
+//! the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it uses
+//! only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
 //!
-//! With u the counter less the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant T:
+//! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant
+//! T:
 //!
 //! ```text
 //! d(L) = u(t) - 3 u(t - L) + 3 u(t - 2 L) - u(t - 3 L)
@@ -27,60 +28,61 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Lags of the third differences, s.
+/// Time lags over which third differences are taken, s.
 const LAGS_S: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Capacity for differences between counter and inertial motion: ten a second over three of the longest lags.
 const ROOM: usize = 256;
-/// Capacity for the inertial samples of an epoch.
+/// Maximum number of inertial samples in an epoch.
 const KNOTS: usize = 256;
-/// Averaging time of the mean squares, s.
+/// Averaging time for the mean squares of third differences, s.
 const MEMORY_S: f64 = 40.0;
 /// Limit at which a third difference is clipped, as a multiple of the rms. Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Margin of the noise when a mean square is compared with it, in standard deviations of the mean square.
+/// Margin by which the noise is raised before it is subtracted from a mean square, in sds of the mean square.
 ///
 /// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
-/// Time constant with which the inertial velocity decays, s. The decay limits the numbers and hardly changes a
+/// Time constant with which the inertial velocity decays, s. The decay keeps the values bounded and hardly changes a
 /// third difference.
 const FORGETS_S: f64 = 1000.0;
 /// Time constant for levelling the attitude and aligning it with the estimate's heading, s.
 ///
 /// It may be long, because only changes within a lag matter.
 const LEVELS_S: f64 = 100.0;
-/// Largest difference from the estimate's attitude, rad. Beyond it, inertial motion is integrated anew.
+/// Largest difference between the integrated and the estimated attitude, rad. If exceeded, the integration restarts.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Maximum size of a third difference at which counter and inertial motion agree, in multiples of the usual size.
+/// Largest third difference at which counter and inertial motion agree, in multiples of the usual size.
 ///
-/// Agreement is judged from `FEW` differences on. From `ENOUGH` differences on, their usual size counts as known.
+/// Agreement is judged once there are `FEW` differences. Once there are `ENOUGH`, their usual size counts as known.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
 /// Until the first comparison, slack is assumed to be faster than declared by this factor.
 const AT_FIRST: f64 = 2.0;
-/// Third differences up to `AGREES_SDS` times this are usual, m. A lever arm or a tilting vehicle causes them.
+/// Third differences up to `AGREES_SDS` times this length always count as usual, m. A lever arm or a tilting vehicle
+/// causes them.
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Size of third differences over a second above which slack constantly moves the counter, in counter steps.
+/// Rms third difference at a lag of 1 s, in counter steps, above which slack is taken to move the counter constantly.
 const LIVELY_STEPS: f64 = 4.0;
-/// Time between two comparisons of the averages with the model.
+/// Time between two comparisons of the averaged third differences with the slack model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
-/// Maximum time between compared counter readings.
+/// Maximum time between two counter readings that are compared.
 const GAP: DurNs = DurNs(1_500_000_000);
 /// Shortest time constant, s, and largest standard deviation, m, of slack. Faster changes are counter noise, and
 /// larger ones are a fault.
 const LEAST_TIME_S: f64 = 0.15;
 pub(super) const MOST_REACH_M: f64 = 0.15;
 
-/// Estimate of the slack from third differences.
+/// Estimate of the cable's slack from third differences.
 #[derive(Debug, Clone)]
 pub(super) struct SlackEstimate {
     attitude: Option<Rot<Tunnel, Body>>,
-    /// Inertial position and velocity along the tunnel, up to a constant each.
+    /// Inertial position and velocity along the tunnel, each up to an unknown constant.
     way_m: f64,
     speed_mps: f64,
-    /// Inertial positions within the last epoch.
+    /// Inertial positions along the tunnel within the last epoch.
     knots: Vec<(MonoNs, [f64; 1])>,
     /// Differences between counter and inertial position, m, each with the counter's reading, m.
     differences: Vec<(MonoNs, [f64; 2])>,
@@ -88,7 +90,7 @@ pub(super) struct SlackEstimate {
     squares_m2: [f64; LAGS_S.len()],
     means_m: [f64; LAGS_S.len()],
     seen: [u32; LAGS_S.len()],
-    /// Time of the last comparison with the model.
+    /// Time of the last comparison with the slack model.
     compared: MonoNs,
     slack: Option<GaussMarkov>,
 }
@@ -96,7 +98,7 @@ pub(super) struct SlackEstimate {
 stateful!(SlackEstimate { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, compared, slack; lists: knots, differences; });
 
 impl Default for SlackEstimate {
-    /// Allocates the buffers, without readings.
+    /// Creates the estimate with allocated buffers, but no readings.
     fn default() -> Self {
         Self {
             attitude: None,
@@ -114,7 +116,7 @@ impl Default for SlackEstimate {
 }
 
 impl SlackEstimate {
-    /// Returns the slack: as declared, or larger and faster if observed.
+    /// Returns the slack model: as declared, or larger and faster if so observed.
     pub(super) fn slack(&self, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
         self.slack.unwrap_or(GaussMarkov { time_s: declared.time_s / AT_FIRST, ..declared })
@@ -122,13 +124,13 @@ impl SlackEstimate {
 
     /// Whether slack constantly moves a counter that has this step, m.
     ///
-    /// On average, third differences over a second then exceed [`LIVELY_STEPS`] steps and the noise.
+    /// On average, third differences at a lag of 1 s then exceed [`LIVELY_STEPS`] steps and the noise.
     pub(super) fn is_lively(&self, step_m: f64, noises: Noises, settings: &Settings) -> bool {
         let least_m = LIVELY_STEPS * step_m;
         self.squares_m2[1] > (least_m * least_m).max(noises.third_square_m2(1.0, settings))
     }
 
-    /// Begins an epoch.
+    /// Begins the integration of inertial motion in an epoch.
     pub(super) fn begin(&mut self, at: MonoNs) {
         self.knots.clear();
         self.knots.push((at, [self.way_m]));
@@ -163,7 +165,8 @@ impl SlackEstimate {
         let gain = up.x - self.speed_mps / FORGETS_S;
         self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
         self.speed_mps += gain * dt_s;
-        // The mean force points up. A lean of this force is removed slowly.
+        // On average, the specific force points up. So a lean of its mean is an attitude error, which is removed
+        // slowly.
         let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
         let back = rotation(back.scaled(dt_s / LEVELS_S));
         self.attitude = Some(back * (middle * rotation(rate.scaled(dt_s / 2.0))));
@@ -204,14 +207,14 @@ impl SlackEstimate {
         agrees
     }
 
-    /// Restarts the comparison, because the counter has stuck or slipped, or a force is missing.
+    /// Restarts the comparison with inertial motion, because the counter has stuck or slipped, or a force is missing.
     pub(super) fn skip(&mut self) {
         self.differences.clear();
     }
 
-    /// Returns the third difference of counter less inertial position, m.
+    /// Returns the third difference of counter minus inertial position, m.
     ///
-    /// The second value is the spread of the counter's distances in the three lags, m.
+    /// The second value is the difference between the counter's longest and shortest distance in the three lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
@@ -223,14 +226,15 @@ impl SlackEstimate {
 
     /// Adds a third difference to the averages.
     ///
-    /// Returns whether it has the usual size, or is explained by noise and late readings (`noise_m2`, `late_m2`).
+    /// Returns whether the difference has the usual size, or is explained by noise and late readings (`noise_m2`,
+    /// `late_m2`).
     fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, [noise_m2, late_m2]: [f64; 2]) -> bool {
         let (Some(square_m2), Some(mean_m), Some(seen)) =
             (self.squares_m2.get_mut(lag), self.means_m.get_mut(lag), self.seen.get_mut(lag))
         else {
             return true;
         };
-        // Once there are enough differences, the observed size includes the noise.
+        // Once there are enough third differences, their observed mean square includes the noise.
         let seen_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 };
         let usual_m2 = seen_m2 + late_m2 + LEAST_M * LEAST_M;
         let off_m = third_m - *mean_m;
@@ -245,9 +249,9 @@ impl SlackEstimate {
         agrees
     }
 
-    /// Returns the slowest slack whose third differences are as large as observed.
+    /// Returns the slowest slack model whose third differences are as large as observed.
     ///
-    /// It is at least as large as declared.
+    /// The model's slack is at least as large as declared.
     fn shown(&self, noises: Noises, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
         let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
@@ -289,7 +293,7 @@ fn third_square(x: f64) -> f64 {
     20.0 - 30.0 * correlation(x) + 12.0 * correlation(2.0 * x) - 2.0 * correlation(3.0 * x)
 }
 
-/// Noise in the difference between counter and inertial motion.
+/// Noise in the difference between cable counter and inertial motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noises {
     /// Variance of the counter's noise and rounding, m^2.
@@ -299,10 +303,10 @@ pub(super) struct Noises {
 }
 
 impl Noises {
-    /// Creates the noise from the counter's variance, m^2, and the gyro bias.
+    /// Creates the noise from the counter's variance, m^2, and the variance of the gyro bias.
     ///
-    /// `known` is the variance of the bias, rad^2/s^2, and `wander` its random walk, rad^2/s^3. A constant bias
-    /// error does not count, because it is part of the mean.
+    /// `known` is the variance of the bias, rad^2/s^2, and `wander` its random walk, rad^2/s^3. A constant bias error
+    /// does not count, because it only changes the mean third difference.
     pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {
         let renewed = 1.0 - math::exp(-MEMORY_S * wander / known.max(f64::MIN_POSITIVE));
         Self { counter_m2, rate_bias_rad2ps2: renewed * known }
@@ -310,8 +314,8 @@ impl Noises {
 
     /// Mean square of the noise's third difference at a lag, m^2.
     ///
-    /// It contains the white noise of the counter and the declared noise of the inertial unit. The latter is white
-    /// force noise, a random walk of tilt and bias, and a rotation of gravity.
+    /// The noise contains the white noise of the counter and the declared noise of the inertial unit. The latter is
+    /// white force noise, a random walk of tilt and bias, and a rotation of gravity.
     fn third_square_m2(self, lag_s: f64, settings: &Settings) -> f64 {
         const GRAVITY_MPS2: f64 = 9.81;
         let tilting = GRAVITY_MPS2 * settings.rate_noise;
@@ -385,7 +389,7 @@ mod tests {
 
     /// The fastest change of a sine is its amplitude times its angular frequency.
     ///
-    /// For the model, three standard deviations of its rate are compared with this.
+    /// Three standard deviations of the slack model's rate are compared with this speed.
     #[test]
     fn strongly_varying_cable_gets_larger_and_faster_slack_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
@@ -399,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_of_a_stuck_counter_counts_as_unusual_within_1_s() {
+    fn readings_of_a_stuck_counter_count_as_unusual_within_1_s() {
         let sticks = |t: f64| {
             if (60.0..70.0).contains(&t) {
                 -0.2 * (t - 60.0)
@@ -430,7 +434,7 @@ mod tests {
         assert!(level.differences.is_empty());
     }
 
-    /// The process itself is simulated: two lags in series, in steps of a hundredth of their time constant.
+    /// The slack process itself is simulated: two lags in series, in steps of a hundredth of their time constant.
     #[test]
     fn slack_model_has_the_third_differences_of_the_process() {
         let (mut seed, mut rate, mut slack) = (3_u64, 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! The filter's record of each source: mount, last used reading, and innovation statistics.
+//! The filter's record of each sensor: mount, last used reading, and innovation statistics.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,55 +11,56 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Reading, SonarReturn};
 use headrace_sensor::sampling::head::SILENT_AFTER;
 
-/// Limits for a stuck head.
+/// Limits at which a head's range counts as stuck.
 ///
 /// At least this many returns have the same range although the expected range varies by more than `VARIES_M`. The
-/// expected ranges must be certain to `SURE_M`, standard deviation. A low limit is safe, because a return that is
+/// standard deviation of the expected ranges must be at most `SURE_M`. A low limit is safe, because a return that is
 /// dropped by mistake costs nothing.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Minimum time between used attitudes, because their errors are correlated over a longer time.
+/// Minimum time between two attitude readings that are used. Their errors stay correlated for longer than this.
 ///
-/// The same applies to cable readings and depths.
+/// The periods for cable, depth and velocity readings have the same reason.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
-/// See [`ATTITUDE_PERIOD`].
+/// Minimum time between two used cable readings; see [`ATTITUDE_PERIOD`].
 pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
-/// See [`ATTITUDE_PERIOD`].
+/// Minimum time between two used depth readings; see [`ATTITUDE_PERIOD`].
 pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
-/// See [`ATTITUDE_PERIOD`].
+/// Minimum time between two used velocity readings; see [`ATTITUDE_PERIOD`].
 pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
 /// Number of velocity readings that share one error: errors of the log's scale, mount and bottom track last for 10
 /// s.
 ///
-/// With 3 s, a log that shows a fifth too much pulls the estimate away (`docs/why/navigation.md`, "Seeded dives").
+/// If errors lasted for only 3 s, a log that shows a fifth too much would pull the estimate away
+/// (`docs/why/navigation.md`, "Seeded dives").
 pub const VELOCITY_LOOKS: f64 = 20.0;
-/// Weight of a new turn rate of a head in its running mean.
+/// Weight of a new measurement of a head's turn rate in the running mean.
 const RATE_SHARE: f64 = 0.05;
 
 /// Innovation statistics of a source. A consistent filter has a mean NIS of 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Consistency {
-    /// Number of used measurements.
+    /// Number of measurements that were fused.
     pub used: u64,
     /// Number of measurements rejected by the gate.
     pub gated: u64,
     /// Number of readings that arrived too late to be fused.
     pub late: u64,
-    /// Number of readings that were implausible or not finite, or for which there was no room.
+    /// Number of readings dropped because they were implausible or not finite, or because the window was full.
     pub dropped: u64,
     /// Sum of the normalised innovations squared (NIS) of the used measurements.
     pub nis_sum: f64,
     /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement.
     ///
-    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) less 1. The second is the
-    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways,
-    /// the interpretation with the lower value is more likely.
+    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) minus 1. The second is the
+    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways, the
+    /// interpretation with the lower value is more likely.
     pub surprise: f64,
 }
 
 impl Consistency {
-    /// Counts an innovation as used or rejected.
+    /// Counts an innovation of a fused or rejected measurement.
     pub fn count(&mut self, nis: f64, gate: f64, variance: f64, usual: f64) {
         self.surprise += nis.min(gate) - 1.0 + math::ln(variance / usual);
         if nis <= gate {
@@ -70,32 +71,32 @@ impl Consistency {
         }
     }
 
-    /// Returns the mean NIS of the used measurements; `None` if there are none.
+    /// Returns the mean NIS (normalised innovation squared) of the used measurements; `None` if there are none.
     pub fn nis(&self) -> Option<f64> {
         (self.used > 0).then(|| self.nis_sum / self.used as f64)
     }
 }
 
-/// The filter's record of one source.
+/// The filter's record of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Source {
-    /// Mount and kind.
+    /// Mount and kind of the sensor.
     pub sensor: SensorInfo,
-    /// Innovation statistics.
+    /// Innovation statistics of the sensor.
     pub consistency: Consistency,
-    /// Time of the last reading that was put into the window.
+    /// Time of the last reading that was put into the reordering window.
     pub taken: Option<MonoNs>,
-    /// Rotation of a head.
+    /// Rotation of the sensor if it is a head.
     pub turning: Turning,
-    /// Learnt noise level.
+    /// Learnt noise level of the sensor.
     pub noise_level: NoiseLevel,
-    /// Resolution step of a tether counter.
+    /// Resolution step of the sensor if it is a tether counter.
     pub count_step: CountStep,
     /// Record that shows whether the range of a head follows the wall.
     pub one_range: ConstantRange,
 }
 
-/// Rotation of a head.
+/// Measured rotation of a head, and its last used angle.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Turning {
     last: Option<(MonoNs, f64)>,
@@ -104,7 +105,7 @@ pub struct Turning {
 }
 
 impl Source {
-    /// Creates a source without readings.
+    /// Creates the record of a sensor without readings.
     pub fn new(sensor: SensorInfo) -> Self {
         Self {
             sensor,
@@ -119,7 +120,7 @@ impl Source {
 
     /// Processes a head's range; returns whether the head reports the same range in every direction.
     ///
-    /// Inputs: the range less the expected range, m, and the standard deviation of the expected range, m. While the
+    /// Inputs: the range minus the expected range, m, and the standard deviation of the expected range, m. While the
     /// estimate is uncertain, returns `false`.
     pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
         let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };
@@ -136,14 +137,14 @@ impl Source {
         self.one_range.is_stuck(FEW_OF_ONE_RANGE, VARIES_M)
     }
 
-    /// Counts a scalar of a reading as rejected; `number` is its index in the reading.
+    /// Counts one scalar component of a reading as rejected; `number` is its index in the reading.
     pub fn leave_out(&mut self, number: usize) {
         self.consistency.gated += 1;
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since the last reading that was put into the window. If so, this reading is the
-    /// new last.
+    /// Whether `period` has passed since the source's last reading that was put into the window. If so, this reading
+    /// is recorded as the last one.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {
@@ -175,7 +176,7 @@ pub fn smoothness(sources: &[Option<Source>]) -> f64 {
 }
 
 impl Turning {
-    /// Processes a ping of a head.
+    /// Processes a ping of a head, and decides whether to use it.
     ///
     /// Returns whether the ping has a range and differs by at least `step_rad` in direction from the last used
     /// ping.
@@ -198,7 +199,7 @@ impl Turning {
         elsewhere && sonar.range_m.is_some()
     }
 
-    /// Returns the turns per second; `None` for a head that does not turn.
+    /// Returns the head's turns per second; `None` for a head that does not turn.
     pub fn turns_per_s(&self, now: MonoNs) -> Option<f64> {
         let (last, _) = self.last?;
         (now.since(last).0.abs() <= SILENT_AFTER.0 && self.rate_radps > 0.0)
@@ -219,7 +220,7 @@ mod tests {
         }
         assert_eq!((consistency.used, consistency.gated), (3, 2));
         assert_eq!(consistency.nis(), Some(4.0));
-        // Innovations are clipped at the gate.
+        // The statistics clip innovations at the gate.
         assert!((consistency.surprise - (0.5 + 9.0 + 2.5 + 9.0 + 9.0 - 5.0)).abs() < 1e-12);
     }
 }

@@ -40,7 +40,7 @@ pub const STATE_NUMBERS: usize = ERRORS + 1;
 /// `docs/why/navigation.md`.
 pub type Errors = [f64; ERRORS];
 
-/// The estimated state.
+/// The estimated state of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Position of the inertial unit.
@@ -145,7 +145,7 @@ impl State {
         }
     }
 
-    /// Returns the values of the state in the order of the errors, with the attitude as a quaternion.
+    /// Returns the numbers of the state in the order of the error state, with the attitude as a quaternion.
     pub fn numbers(&self) -> [f64; STATE_NUMBERS] {
         let [px, py, pz] = self.position.0.into();
         let [vx, vy, vz] = self.velocity_mps.0.into();
@@ -162,7 +162,7 @@ impl State {
         ]
     }
 
-    /// Creates a state from such values; `None` if the quaternion is invalid.
+    /// Creates a state from its numbers with a quaternion; `None` if the quaternion is invalid.
     pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
         let [
             px,
@@ -205,7 +205,7 @@ impl State {
         })
     }
 
-    /// Whether every number is finite.
+    /// Whether every number of the state is finite.
     pub fn is_sound(&self) -> bool {
         let cable = [self.creep_m, self.slack_m, self.slack_rate_mps, self.scale];
         let offsets = [self.depth_offset_m, self.heading_offset_rad, self.range_scale];
@@ -218,20 +218,20 @@ impl State {
     }
 }
 
-/// Reads three errors from index `from` on.
+/// Returns three successive errors from index `from` on as a vector.
 pub fn vec<F>(errors: &Errors, from: usize) -> Vec3<F> {
     let [x, y, z] = [0, 1, 2].map(|k| errors.get(from + k).copied().unwrap_or(0.0));
     Vec3::new(x, y, z)
 }
 
-/// Sets three errors from index `from` on.
+/// Sets three successive errors from index `from` on to a vector.
 pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     for (slot, value) in errors.iter_mut().skip(from).zip(value.0.iter()) {
         *slot = *value;
     }
 }
 
-/// Returns the errors as they were `by_s` seconds earlier.
+/// Returns the errors as they were `by_s` seconds earlier, at constant velocity.
 pub fn earlier(errors: &Errors, by_s: f64) -> Errors {
     let mut then = *errors;
     put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
@@ -248,7 +248,8 @@ pub fn add_to(errors: &mut Errors, i: usize, amount: f64) {
 /// Returns the rotation that has this rotation vector, radians.
 pub fn rotation<To: Copy>(by: Vec3<To>) -> Rot<To, To> {
     let angle = by.norm();
-    // The share is sin(a / 2) / a. For small angles it is a series, because the quotient would lose digits.
+    // The factor of the rotation vector is sin(a / 2) / a. For small angles, it is computed as a series, because the
+    // quotient would lose digits.
     let share = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { math::sin(angle / 2.0) / angle };
     let [x, y, z] = [by.x() * share, by.y() * share, by.z() * share];
     Rot::from_wxyz(math::cos(angle / 2.0), x, y, z).unwrap_or_else(Rot::identity)
@@ -264,7 +265,7 @@ pub fn rotation_vector<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Vec3<To
     v.scaled(share)
 }
 
-/// Returns the matrix of a rotation.
+/// Returns the 3 x 3 matrix of a rotation.
 pub fn matrix<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Matrix3<f64> {
     *UnitQuaternion::to_rotation_matrix(rotation.0).matrix()
 }

@@ -1,4 +1,4 @@
-//! Scalar updates of a reading.
+//! Scalar measurement updates of the filter from one sensor reading.
 
 use super::context::Context;
 use super::measure::{self, Beam, ScalarUpdate, with_quantum};
@@ -12,7 +12,7 @@ use headrace_geometry::time::DurNs;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{Level, Reading};
 
-/// Returns the scalar updates of a reading; none if the reading cannot be predicted.
+/// Returns the scalar measurement updates of a reading; none if the estimate cannot predict the reading.
 pub(super) fn rows(
     state: &State,
     context: &Context,
@@ -71,7 +71,7 @@ pub(super) fn rows(
     }
 }
 
-/// Rotates the attitude of a unit from its level frame to the tunnel frame.
+/// Rotates an inertial unit's attitude from the unit's level frame to the tunnel frame.
 pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
     Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
 }

@@ -10,30 +10,30 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Reading;
 
-/// Capacity for waiting readings. Four heads, four echosounders and the other sensors need a tenth of it.
+/// Maximum number of waiting readings. Four heads, four echosounders and the other sensors need a tenth of it.
 const MOST: usize = 1024;
-/// Capacity for samples of inertial units.
+/// Maximum number of waiting samples of inertial units.
 const MOST_FELT: usize = 1024;
 /// Longest interval for which an inertial sample is valid.
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
 /// Time within which samples are merged into their mean.
 ///
-/// Merged samples are the rate and the force of one sample, or several samples of one burst. The mean of a burst
-/// applies to the whole time since the sample before it.
+/// Merged samples are the turn rate and the force of one sample, or several samples that arrive in one burst. The
+/// mean of a burst applies to the whole time since the sample before it.
 const SAME: DurNs = DurNs(500_000);
 
-/// A waiting reading.
+/// A reading that waits in the window.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Waiting {
-    /// Time of validity.
+    /// Time of validity of the reading.
     pub at: MonoNs,
-    /// Number of the source.
+    /// Number of the reading's source.
     pub source: usize,
     /// The reading.
     pub reading: Reading,
 }
 
-/// Mean of the samples at one time, with the number of rates and the number of forces in it.
+/// Mean of the inertial samples at one time, with the numbers of averaged turn rates and specific forces.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct FeltAt {
     at: MonoNs,
@@ -69,21 +69,21 @@ impl Window {
         true
     }
 
-    /// Adds a turn rate; returns false if there is no room.
+    /// Adds a turn rate sample; returns false if there is no room.
     pub fn take_rate(&mut self, at: MonoNs, rate_radps: Vec3<Body>) -> bool {
         self.felt_at(at)
             .map(|FeltAt { felt, counts: [of, _], .. }| take_mean(&mut felt.rate_radps, of, rate_radps))
             .is_some()
     }
 
-    /// Adds a specific force; returns false if there is no room.
+    /// Adds a specific force sample; returns false if there is no room.
     pub fn take_force(&mut self, at: MonoNs, force_mps2: Vec3<Body>) -> bool {
         self.felt_at(at)
             .map(|FeltAt { felt, counts: [_, of], .. }| take_mean(&mut felt.force_mps2, of, force_mps2))
             .is_some()
     }
 
-    /// Records a rejected force, m/s^2. Adds the speed change that it would cause over the time since the previous
+    /// Records a rejected specific force, m/s^2, and adds the speed change that it would cause since the previous
     /// sample.
     pub fn take_jolt(&mut self, at: MonoNs, force_mps2: f64) {
         let before = self.felt.iter().rev().map(|felt| felt.at).find(|felt| *felt < at);
@@ -118,7 +118,7 @@ impl Window {
 
     /// Returns the inertial data valid from `from` on, and the end of their validity, which is at most `until`.
     ///
-    /// A sample is the mean over the time before its timestamp.
+    /// An inertial sample is the mean over the time before its timestamp.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (InertialSample, MonoNs) {
         let next = self.felt.partition_point(|felt| felt.at <= from);
         let speaking = |number: Option<usize>| {
@@ -150,7 +150,7 @@ impl Window {
         (felt, at.max(from + DurNs(1)).min(until))
     }
 
-    /// Removes and returns the first reading, if it is valid at or before `until`.
+    /// Removes and returns the earliest reading, if its time of validity is at or before `until`.
     pub fn pop(&mut self, until: MonoNs) -> Option<Waiting> {
         let first = self.waiting.first()?;
         let is_first = self.waiting.get(1).is_none_or(|next| first.at <= next.at);
@@ -173,14 +173,14 @@ impl Window {
         self.felt.get(self.felt.partition_point(|felt| felt.at <= at)).map(|felt| felt.at)
     }
 
-    /// Removes all readings and samples.
+    /// Removes all waiting readings and inertial samples.
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.felt.clear();
         self.jolt = None;
     }
 
-    /// Removes readings valid at or before `at`.
+    /// Removes waiting readings valid at or before `at`.
     pub fn drop_until(&mut self, at: MonoNs) {
         let old = self.waiting.partition_point(|waiting| waiting.at <= at);
         self.waiting.drain(..old);

@@ -9,11 +9,10 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// Averaging window, and the number of equal means in a row that show rest. A floating vehicle never reaches this
-/// number.
+/// Averaging window, and the number of equal successive means that show rest. A floating vehicle never reaches it.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
-/// Number of means at rest after which the gyro bias is known.
+/// Number of mean turn rates at rest after which the gyro bias is known.
 const ENOUGH: u32 = 25;
 /// Time after which a vehicle on a stationary cable counts as floating if it has not been at rest, s.
 const FLOATS: u32 = 15;
@@ -22,11 +21,11 @@ const ASKS_FOR: DurNs = DurNs(60_000_000_000);
 /// Number of remembered pauses of the cable, and the multiple of the longest pause after which the cable is at
 /// rest.
 ///
-/// They are needed if a winch operator winds by half metres. The cable is then stationary between pulls while the
-/// vehicle moves on.
+/// The pauses matter if a winch operator winds the cable in half a metre at a time. The cable is then stationary
+/// between pulls while the vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
-/// Largest difference between means at rest: of the turn rate, rad/s, and of the specific force, m/s^2.
+/// Largest difference between two means at rest: of turn rates, rad/s, and of specific forces, m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
 
@@ -41,18 +40,18 @@ pub struct RestDetector {
     /// Time of the cable's last movement, and the lengths of the pauses before it, the latest one last.
     cable_moved_at: Option<MonoNs>,
     pauses: [DurNs; PAUSES],
-    /// Number of means taken at rest.
+    /// Number of mean turn rates that were taken at rest.
     rested: u32,
     /// Time for which the cable has been stationary although the vehicle is not at rest, s.
     floated: u32,
-    /// Whether the vehicle floats. It was in motion for a long time while the cable was stationary, and has not been
-    /// at rest since.
+    /// Whether the vehicle floats: it moved for a long time while the cable was stationary, and has not been at rest
+    /// since.
     floats: bool,
-    /// Time of the first estimate.
+    /// Time of the filter's first estimate, from which on the pilot is asked to keep still.
     asks_from: Option<MonoNs>,
 }
 
-/// Means of successive windows. Each mean is compared with the first mean of a steady run.
+/// Means over successive averaging windows. Each mean is compared with the first mean of a steady run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Means {
     since: Option<MonoNs>,
@@ -60,12 +59,12 @@ struct Means {
     count: f64,
     first: Option<[f64; 3]>,
     alike: u32,
-    /// Latest mean, until [`RestDetector::take_mean_rate`] takes it.
+    /// Latest mean of a window, until [`RestDetector::take_mean_rate`] takes it.
     latest: Option<[f64; 3]>,
 }
 
 impl Means {
-    /// Adds a value; returns whether the value ended a window.
+    /// Adds a sample; returns whether the sample ended an averaging window.
     fn take(&mut self, at: MonoNs, value: [f64; 3], same: f64) -> bool {
         let since = *self.since.get_or_insert(at);
         let ends = at.since(since).0 >= MEAN_OVER.0;
@@ -87,7 +86,7 @@ impl Means {
 }
 
 impl RestDetector {
-    /// Processes a reading.
+    /// Processes a reading of the cable counter or of an inertial unit.
     pub fn take(&mut self, at: MonoNs, kind: SensorKind, reading: &Reading) {
         match (kind, reading) {
             (SensorKind::Imu, Reading::AngularRate(rate)) => {
@@ -123,7 +122,7 @@ impl RestDetector {
         (self.rate.alike, self.force.alike, self.floated) = (0, 0, 0);
     }
 
-    /// Records the length of a pause, because the cable has moved again.
+    /// Records the length of the cable's pause, because the cable has moved again.
     fn note_pause(&mut self, at: MonoNs) {
         if let Some(before) = self.cable_moved_at.replace(at) {
             self.pauses.rotate_left(1);
@@ -154,15 +153,15 @@ impl RestDetector {
         Some(Vec3::new(x, y, z))
     }
 
-    /// Records the time of an estimate; only the first time counts.
+    /// Records the time of an estimate, which counts if it is the first; the request to keep still begins then.
     pub fn ask_from(&mut self, at: MonoNs) {
         self.asks_from.get_or_insert(at);
     }
 
     /// Returns how much longer the vehicle should stand still for its gyro bias to become known, s.
     ///
-    /// 0 if the vehicle floats or its unit is too noisy, because then no stop counts as rest. Also 0 later in a
-    /// dive, because by then the gyros seldom cause uncertain passes.
+    /// 0 if the vehicle floats or its inertial unit is too noisy, because then no stop counts as rest. Also 0 later
+    /// in a dive, because by then the gyros seldom cause uncertain passes.
     pub fn lacking_s(&self, now: MonoNs) -> u32 {
         let lacking = ENOUGH.saturating_sub(self.rested);
         let begins = self.asks_from.is_some_and(|from| (0..ASKS_FOR.0).contains(&now.since(from).0));
@@ -210,8 +209,8 @@ mod tests {
         );
     }
 
-    /// If the cable is wound in by half metres, its pauses are longer than the averaging windows for rest, and the
-    /// vehicle moves during the pauses.
+    /// If the cable is wound in half a metre at a time, its pauses are longer than the averaging windows for rest,
+    /// and the vehicle moves during the pauses.
     ///
     /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]

@@ -11,10 +11,10 @@ use crate::filter::state::{ERRORS, State};
 use crate::relative::Relative;
 use headrace_geometry::time::MonoNs;
 
-/// A smoothed estimate.
+/// An estimate of the filter after smoothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Time of the estimate.
+    /// Time of the smoothed estimate.
     pub at: MonoNs,
     /// The smoothed state.
     pub state: State,
@@ -27,14 +27,14 @@ pub struct Backward {
     settings: Settings,
     now: Option<(u32, Estimate)>,
     later: Later,
-    /// Pieces, points and relative covariances so far, all in reverse order.
+    /// Pieces, points and relative covariances of the track so far, all in reverse order.
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
 }
 
 impl Backward {
-    /// Creates the pass with the settings of the filter.
+    /// Creates the backward pass with the settings of the filter.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -46,9 +46,9 @@ impl Backward {
         }
     }
 
-    /// Processes a step. Steps arrive in reverse order.
+    /// Processes a step of the filter. Steps arrive in reverse order.
     ///
-    /// Allocates: the point that it adds to the track.
+    /// Allocates: the point that the step adds to the track.
     pub fn take(&mut self, placed: &Placed) {
         let step = &placed.step;
         let after = self.now.filter(|(piece, _)| *piece == placed.piece).map(|(_, after)| after);
@@ -75,7 +75,7 @@ impl Backward {
         self.now.as_ref().map(|(_, now)| now)
     }
 
-    /// Returns the track of all steps.
+    /// Returns the smoothed track built from all steps.
     pub fn finish(mut self) -> Track {
         self.end_piece();
         Track::of_reversed(self.pieces, self.points, self.relatives, self.settings.epoch)

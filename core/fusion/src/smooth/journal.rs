@@ -9,14 +9,14 @@ use super::step::{Placed, Step, Words};
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::time::DurNs;
 
-/// Writing end of the queue.
+/// Writing end of the queue of filter steps, held by the filter.
 pub struct Journal {
     queue: Arc<Shared>,
     piece: u32,
     clock: u32,
 }
 
-/// Reading end of the queue; returns records in the order of writing.
+/// Reading end of the queue of filter steps; returns records in the order of writing.
 #[derive(Clone)]
 pub struct JournalReader {
     queue: Arc<Shared>,
@@ -37,7 +37,7 @@ impl Journal {
         (Self { queue: Arc::clone(&queue), piece: 0, clock: 0 }, JournalReader { queue })
     }
 
-    /// Begins a new piece of the track, whose first estimate is unrelated to earlier ones.
+    /// Begins a new piece of the track, whose first estimate is unrelated to earlier estimates.
     pub fn begin(&mut self) {
         self.piece = self.piece.saturating_add(1);
     }
@@ -47,7 +47,7 @@ impl Journal {
         self.clock = self.clock.saturating_add(1);
     }
 
-    /// Writes a step.
+    /// Writes a step of the filter to the queue.
     ///
     /// A step is dropped if it is not finite or if the queue is full. The track then breaks: later steps can no
     /// longer correct earlier ones.

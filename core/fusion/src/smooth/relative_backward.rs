@@ -10,15 +10,15 @@ use crate::filter::state::{ERRORS, Errors};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Gap of an epoch to which no earlier pass is related, because the cable has slipped since.
+/// Gap to the previous head pass of an epoch that no earlier pass is related to, because the cable has slipped since.
 pub const UNTIED: DurNs = DurNs(i64::MAX);
-/// Standard deviation of the relative chainage error of such an epoch, m.
+/// Standard deviation of the relative chainage error of an epoch without a related earlier pass, m.
 const UNTIED_M: f64 = 1e3;
 
 /// An epoch that waits until the backward pass reaches the previous head pass.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
-    /// Index of the epoch in the results.
+    /// Index of the epoch in the list of results.
     number: usize,
     at: MonoNs,
     /// Time since the previous pass of the heads.
@@ -27,19 +27,19 @@ struct Moment {
     own: [Errors; 3],
     /// Cross-covariances of these errors with all errors at the current epoch of the backward pass.
     with: [Errors; 3],
-    /// Time from the current epoch to this one, s, and their relative covariance.
+    /// Time from the backward pass's current epoch to this epoch, s, and the relative covariance of both.
     age_s: f64,
     relative: Relative,
 }
 
-/// Waiting epochs, the latest first.
+/// Epochs that wait for the backward pass to reach their previous head pass, the latest first.
 #[derive(Debug, Clone, Default)]
 pub struct Later {
     waiting: Vec<Moment>,
     newest: Option<MonoNs>,
 }
 
-/// Index of an epoch in the results, and its covariance relative to the previous head pass.
+/// Index of an epoch in the list of results, and the epoch's covariance relative to the previous head pass.
 pub type Answer = (usize, Relative);
 
 impl Later {
@@ -50,7 +50,7 @@ impl Later {
 
     /// Adds an epoch that waits for the epoch one `gap` earlier.
     ///
-    /// If there is no room, it removes the epoch that has waited longest and returns its relative covariance.
+    /// If there is no room, removes the epoch that has waited longest and returns that epoch's relative covariance.
     pub fn note(
         &mut self,
         number: usize,
@@ -90,7 +90,7 @@ impl Later {
         });
     }
 
-    /// Ends a piece of the track, and returns the relative covariances of all waiting epochs.
+    /// Ends a piece of the track, and returns the relative covariances of all epochs still waiting.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;
@@ -98,7 +98,7 @@ impl Later {
 }
 
 impl Moment {
-    /// Extrapolates the relative covariance linearly in time to the full gap.
+    /// Extrapolates the relative covariance linearly in time to the full gap between two head passes.
     fn answer(&self) -> Answer {
         if self.gap == UNTIED {
             return (self.number, Relative::along(UNTIED_M));
@@ -128,7 +128,7 @@ mod tests {
 
     /// Epochs arrive latest first. An epoch is due if it is at least one step before the epoch that was added last.
     #[test]
-    fn earlier_epoch_is_added_once_it_is_one_step_away() {
+    fn backward_pass_adds_an_earlier_epoch_once_it_is_one_step_away() {
         let at = |s: u64| MonoNs(1_000_000_000 * s);
         let mut later = Later::default();
         assert!(later.is_due(at(100)));

@@ -1,4 +1,4 @@
-//! A step between two estimates of the filter, and the record of a step.
+//! A step between two estimates of the filter, and its encoding as a record for smoothing.
 
 use crate::filter::factors::Factors;
 use crate::filter::inertial::{LEG_NUMBERS, Leg};
@@ -7,62 +7,62 @@ use crate::filter::state::{ERRORS, Errors, STATE_NUMBERS, State};
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of values in a covariance's factors.
+/// Number of values in the factors of a covariance.
 const FACTOR_NUMBERS: usize = ERRORS * (ERRORS + 1) / 2;
-/// Number of header words of a record: both times, the kind of change, piece, clock and gap.
+/// Number of header words of a record: start and end time, kind of change, piece number, clock number and pass gap.
 const HEADER: usize = 6;
-/// Number of words of a record.
+/// Number of 64-bit words in the record of a step.
 pub const WORDS: usize = HEADER + 3 + 2 * STATE_NUMBERS + FACTOR_NUMBERS + LEG_NUMBERS;
 
-/// A record. Words are integers, or floats as their bits. Words that a short step does not need are unused.
+/// The record of a step. Words are integers, or floats as their bits. Words that a step does not need are unused.
 pub type Words = [u64; WORDS];
 
 /// Change between two estimates for other reasons than a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most are legs, and few are kept at a time")]
 pub enum Move {
-    /// Propagation over a leg.
+    /// Propagation by the inertial motion of a leg.
     Leg(Leg),
     /// Addition to the variances of errors that had been underestimated.
     Widened(Errors),
-    /// No change: this is the last estimate of its piece.
+    /// No change, because this is the last estimate of its piece of the track.
     End,
 }
 
 /// A step from an estimate that includes its measurements to the prediction for the next measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Start time.
+    /// Start time of the step.
     pub at: MonoNs,
-    /// End time.
+    /// End time of the step.
     pub to: MonoNs,
-    /// Estimate at the beginning.
+    /// Estimate at the beginning of the step.
     pub state: State,
     /// Covariance of the errors of `state`.
     pub factors: Factors<ERRORS>,
-    /// Change during the step.
+    /// Change of the estimate during the step.
     pub by: Move,
-    /// Predicted estimate at the end, before the measurements at that time.
+    /// Predicted estimate at the end of the step, before the measurements at that time.
     pub predicted: State,
 }
 
-/// A step with its context in the dive.
+/// A step of the filter with its context in the dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
-    /// The step.
+    /// The step of the filter.
     pub step: Step,
     /// Position of the inertial unit on the vehicle, m. The estimate refers to this position.
     pub unit_at: Vec3<Body>,
     /// Time between two passes of the heads over the same position.
     pub gap: DurNs,
-    /// Number of the piece; a piece is a run of contiguous steps.
+    /// Number of the track's piece; a piece is a run of contiguous steps.
     pub piece: u32,
     /// Number of times the clock has been set back.
     pub clock: u32,
 }
 
 impl Step {
-    /// Whether all numbers are finite and no variance is negative.
+    /// Whether all numbers of the step are finite and no variance is negative.
     pub fn is_sound(&self) -> bool {
         self.state.is_sound() && self.predicted.is_sound() && self.factors.is_sound()
     }
@@ -85,7 +85,7 @@ impl Move {
         }
     }
 
-    /// Returns the covariance predicted for the end, bit-identical to the filter's.
+    /// Returns the covariance predicted for the end of the step, bit-identical to the filter's.
     pub fn predict(&self, settings: &Settings, factors: &Factors<ERRORS>) -> Factors<ERRORS> {
         let mut predicted = *factors;
         if let Self::Leg(leg) = self {
@@ -128,7 +128,7 @@ impl Placed {
         words
     }
 
-    /// Parses a record; `None` if the record is malformed.
+    /// Parses the record of a step; `None` if the record is malformed.
     pub fn of_words(words: &Words) -> Option<Self> {
         let (header, numbers) = words.split_first_chunk::<HEADER>()?;
         let [at, to, kind, piece, clock, gap] = *header;

@@ -13,13 +13,13 @@ use crate::filter::state::{ERRORS, State};
 use headrace_geometry::frames::{Point3, Rot, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of errors: position, speed, sensor bias.
+/// Number of errors in the test's state: position, speed, sensor bias.
 const N: usize = 3;
 const TIMES: usize = 12;
 const ALL: usize = N * TIMES;
 const START: [f64; N] = [4.0, 0.25, 0.09];
 const WHITE: [f64; N] = [0.0, 0.01, 1e-4];
-/// Time and variance of a jump in position.
+/// Time and variance of a simulated jump in position.
 const JUMP: (usize, f64) = (7, 30.0);
 const FADING: f64 = 0.9;
 const NOISE: f64 = 0.04;
@@ -51,7 +51,7 @@ struct Known {
     covariance: SMatrix<f64, ALL, ALL>,
 }
 
-/// Solves for all times at once: adds up the information of the start, steps and measurements, and inverts the sum.
+/// Solves for all times at once by adding the information of start, steps and measurements, and inverting the sum.
 fn all_at_once() -> Known {
     let mut information = SMatrix::<f64, ALL, ALL>::zeros();
     let mut vector = SVector::<f64, ALL>::zeros();
@@ -139,7 +139,8 @@ fn smoother_equals_batch_least_squares() {
     };
     let last = filtered.last().unwrap();
     let (mut mean, mut factors) = (last.mean, last.factors);
-    // For each later time: columns of the cross-covariance between the errors at that time and the current errors.
+    // For each later time, the columns of the cross-covariance between the errors at that time and the current
+    // errors.
     let unit = |m: usize| core::array::from_fn(|i| if i == m { 1.0 } else { 0.0 });
     let mut later = vec![(TIMES - 1, core::array::from_fn::<[f64; N], N, _>(|m| factors.along(&unit(m))))];
     for time in (0..TIMES - 1).rev() {

@@ -25,7 +25,7 @@ pub(super) struct Point {
     sd: PoseSd,
 }
 
-/// A part of the track without breaks.
+/// A part of the track in which no estimate is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piece {
     clock: u32,
@@ -52,7 +52,8 @@ impl Point {
 }
 
 impl Piece {
-    /// Begins a piece that starts after this many points and relative covariances, both in reverse order.
+    /// Begins a piece that starts after this many of the track's points and relative covariances, both in reverse
+    /// order.
     pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
         Self {
             clock: placed.clock,
@@ -88,7 +89,7 @@ impl Track {
         track
     }
 
-    /// Whether each point belongs to one piece, in order.
+    /// Whether each point belongs to exactly one piece, and the pieces are in order.
     fn is_divided(&self) -> bool {
         let begins = self.pieces.iter().map(|piece| piece.points.start).chain([self.points.len()]);
         let ends = [0].into_iter().chain(self.pieces.iter().map(|piece| piece.points.end));
@@ -100,7 +101,7 @@ impl Track {
         self.pieces.len()
     }
 
-    /// Number of points.
+    /// Number of points on the track.
     pub fn len(&self) -> usize {
         self.points.len()
     }
@@ -110,9 +111,9 @@ impl Track {
         self.points.is_empty()
     }
 
-    /// Returns the fix at time `at`, read from the clock after it has been set back `clock` times.
+    /// Returns the fix at time `at` of the clock that has been set back `clock` times.
     ///
-    /// Errors: the part of the fix that is too uncertain or missing at that time.
+    /// Errors: the part of the fix that is too uncertain or missing at time `at`.
     pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {
         let begun = |piece: &&Piece| {
             piece.clock == clock && self.points_of(piece).first().is_some_and(|first| first.at <= at)
@@ -171,7 +172,7 @@ fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     }
 }
 
-/// Navigation along a given track, which uses no readings for its fixes.
+/// Navigation that takes its fixes from a smoothed track instead of from readings.
 pub struct TrackNavigation {
     track: Track,
     consistency: [Option<Consistency>; MAX_SOURCES],
@@ -203,7 +204,7 @@ impl Navigation for TrackNavigation {
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        // After a clock reset, the first ping needs a fix before this method has received a reading with the new
+        // After a clock reset, the first ping needs a fix before this navigation has received a reading with the new
         // time.
         if self.received.since(at) > CLOCK_JUMP {
             return Err(NoFix::Heading);
@@ -232,10 +233,10 @@ mod tests {
         turn * Rot::identity()
     }
 
-    /// Point of a drive after `t` s. The speed along the tunnel is 0.5 m/s, and the vehicle turns left by 0.2
-    /// rad/s.
+    /// Point on the track of a drive, `t` seconds after its start. The speed along the tunnel is 0.5 m/s, and the
+    /// vehicle turns left by 0.2 rad/s.
     ///
-    /// The speed in the state grows by 0.1 m/s per second, to test its interpolation.
+    /// The speed stored in the point grows by 0.1 m/s per second, to test its interpolation.
     fn point(t: f64, from_x_m: f64) -> Point {
         let mut state = State::at_rest(Point3::new(from_x_m + 0.5 * t, 1.0, 2.0), turned(0.2 * t));
         state.velocity_mps = Vec3::new(0.4 + 0.1 * t, 0.0, 0.0);
@@ -277,17 +278,17 @@ mod tests {
             let off_m = [place.x() - (0.5 * t - ahead_m), place.y() - (1.0 - aside_m), place.z() - 2.0];
             assert!(off_m.iter().all(|off_m| off_m.abs() < 1e-9), "{t}: {place:?}");
             assert!(rotation_vector(fix.pose.attitude * turned(0.2 * t).inverse()).norm() < 1e-9, "{t}");
-            // The relative variance grows from 0.01 to 0.04 m^2.
+            // In the first drive, the relative variance grows from 0.01 to 0.04 m^2.
             let variance_m2 = 0.01 + 0.015 * t.min(2.0);
             assert!((fix.relative.sd_m(Vec3::zero()) - math::sqrt(variance_m2)).abs() < 1e-9, "{t}");
-            // At the unit's position, the errors of the two visits are independent.
+            // At the inertial unit's position, the errors of the two visits are independent.
             let revisit_m = fix.revisit.sd_m(fix.pose.attitude * unit_at());
             assert!((revisit_m - 0.1 * math::sqrt(2.0)).abs() < 1e-9, "{t}: {revisit_m}");
         }
     }
 
     #[test]
-    fn fix_outside_every_drive_fails() {
+    fn fix_at_a_time_outside_every_drive_fails() {
         let track = track();
         let lacks = |clock: u32, t: f64| track.fix(clock, at(t)).err();
         for (clock, t) in
@@ -319,7 +320,7 @@ mod tests {
             [1.5, 10.5].map(|t| navigation.fix(at(t)).map_or(-1.0, |fix| fix.pose.position.x() - 0.5 * t))
         };
         let is = |found: [f64; 2], drives: [f64; 2]| {
-            // The vehicle's origin is at most 0.3 m behind the unit.
+            // The vehicle's origin is at most 0.3 m behind the inertial unit.
             found.iter().zip(drives).all(|(found, drive)| (found - drive).abs() <= 0.3 + 1e-9)
         };
         let none = -1.0;

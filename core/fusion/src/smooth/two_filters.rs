@@ -1,8 +1,8 @@
-//! A second filter beside the navigating one, for smoothing.
+//! A second filter beside the navigation filter, whose steps are recorded for smoothing.
 //!
-//! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigating filter applies only a share of
-//! each wall correction and so discards some correlation on purpose. A backward pass over its steps would diverge.
-//! The second filter gets the same readings, applies wall corrections in full and records its steps.
+//! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigation filter applies only a share of each
+//! wall correction and so discards some correlation on purpose. A backward pass over the navigation filter's steps
+//! would diverge. The second filter gets the same readings, applies wall corrections in full and records its steps.
 
 use super::journal::Journal;
 use crate::filter::FilterNavigation;
@@ -20,9 +20,9 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
 
-/// Two filters: the navigating one, and one whose steps are recorded for smoothing.
+/// The navigation filter, and a second filter whose steps are recorded for smoothing.
 ///
-/// Fixes and all other outputs are bit-identical to those of the navigating filter alone.
+/// Fixes and all other outputs are bit-identical to those of the navigation filter alone.
 pub struct TwoFilterNavigation {
     navigating: FilterNavigation,
     recorded: FilterNavigation,
@@ -37,7 +37,7 @@ pub fn smoothable(profile: Profile, site: Site, settings: Settings, journal: Jou
 }
 
 impl TwoFilterNavigation {
-    /// Creates both filters without readings.
+    /// Creates both filters, which have no readings yet.
     pub fn new(profile: Profile, site: Site, settings: Settings, journal: Journal) -> Self {
         Self {
             navigating: FilterNavigation::new(profile.clone(), site, settings),

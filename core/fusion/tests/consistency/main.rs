@@ -1,5 +1,5 @@
-//! The filter's errors against its standard deviations, in seeded dives that vary everything that varies in the
-//! field.
+//! Compares the filter's errors with its standard deviations, in seeded dives with varied motion, sensors, settings
+//! and faults.
 //!
 //!     cargo test --release -p headrace_fusion --test consistency two_thousand -- --ignored --nocapture
 //!
@@ -20,9 +20,9 @@ use std::ops::Range;
 use tally::{Tally, share};
 use world::{Fault, Log, Motion, Recipe};
 
-/// Seeds of the test that always runs; the full set has ten times as many.
+/// Seeds of the dives in the test that always runs; the full set has ten times as many seeds.
 const FEW: Range<u64> = 0..200;
-/// Seeds of dives with a velocity log, whose behaviour is one of four in turn.
+/// Seeds of dives with a velocity log; in turn, the log is sound or has one of three faults.
 const WITH_LOG: Range<u64> = 0..80;
 /// Seeds of dives with a hovering vehicle.
 const HOVERING: Range<u64> = 0..24;
@@ -52,7 +52,7 @@ fn of<'a>(all: &'a [(Recipe, Tally)], pick: &dyn Fn(&Recipe) -> bool) -> Vec<&'a
     all.iter().filter(|(recipe, _)| pick(recipe)).map(|(_, tally)| tally).collect()
 }
 
-/// Prints a row of the table.
+/// Prints a row of the table of errors, for the dives that `pick` selects.
 fn row(name: &str, all: &[(Recipe, Tally)], pick: &dyn Fn(&Recipe) -> bool) {
     let of = of(all, pick);
     let most = |of_one: fn(&Tally) -> f64| of.iter().map(|tally| of_one(tally)).fold(0.0, f64::max);
@@ -105,7 +105,7 @@ fn table(all: &[(Recipe, Tally)]) {
 }
 
 #[test]
-fn errors_are_within_5_sd_or_reported() {
+fn navigation_errors_are_within_5_sd_or_reported() {
     let all = dives(FEW, Recipe::of);
     table(&all);
     let silent = |is_declared: bool| {
@@ -122,7 +122,8 @@ fn errors_are_within_5_sd_or_reported() {
     assert!(unsure <= 0.08, "{unsure}");
 }
 
-/// A log that hangs, is wrong by a fifth or follows drifting silt may make the filter uncertain, but never wrong.
+/// A velocity log that hangs, is wrong by a fifth or follows drifting silt may make the filter uncertain, but never
+/// wrong.
 #[test]
 fn wrong_velocity_log_causes_no_unreported_error() {
     let all = dives(WITH_LOG, Recipe::with_log);
@@ -138,7 +139,7 @@ fn wrong_velocity_log_causes_no_unreported_error() {
 
 /// If a count is stationary for minutes, the vehicle is mostly hovering.
 #[test]
-fn hovering_vehicle_keeps_a_certain_position() {
+fn hovering_vehicle_keeps_a_small_position_uncertainty() {
     let all = dives(HOVERING, Recipe::hovering);
     table(&all);
     let unsure = share(&of(&all, &|_| true), |tally| [tally.unsure, tally.epochs]);

@@ -11,19 +11,20 @@ use headrace_sensor::reading::Reading;
 
 use crate::world::{Dive, Recipe, VELOCITY_LOG, seconds, sensor};
 
-/// Settling times of the estimate, s: errors are compared after the first, and passes after the second.
+/// Settling times of the estimate, s: absolute errors are checked after the first, errors between passes after the
+/// second.
 const SETTLED_S: f64 = 10.0;
 const COMPARED_S: f64 = 20.0;
 /// Time between two passes of the heads over the same position, s.
 const PASS_S: f64 = 2.2;
-/// Errors beyond this many standard deviations must be reported.
+/// Errors of the estimate beyond this many standard deviations must be reported.
 const FAR_SDS: f64 = 5.0;
-/// Limit for twice the standard deviation between passes, above which the loop reports a doubtful position, m.
+/// Limit for twice the standard deviation between head passes, m; above it, the loop reports a doubtful position.
 ///
-/// It is a fifth of a target of 1 m.
+/// The limit is a fifth of a coverage target of 1 m.
 const DOUBTFUL_M: f64 = 0.2;
 
-/// Results of a dive.
+/// Statistics of the filter's errors in a dive.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tally {
     /// Number of epochs, number of epochs with a fix, and number of fixes within two standard deviations.
@@ -36,7 +37,7 @@ pub(crate) struct Tally {
     /// s.
     pub(crate) silent: u64,
     pub(crate) first_silent_s: Option<f64>,
-    /// Largest error in standard deviations: of the chainage, and between passes.
+    /// Largest chainage errors in standard deviations: absolute, and between head passes.
     pub(crate) worst: f64,
     pub(crate) worst_pass: f64,
     /// Largest errors of chainage and speed while there is a fix, m, m/s.
@@ -58,7 +59,7 @@ pub(crate) fn run(recipe: Recipe, mut trace: Option<&mut String>) -> Tally {
     let dive = Dive::new(recipe);
     let mut nav = FilterNavigation::new(dive.profile.clone(), dive.site, recipe.settings());
     let (mut tally, mut last, mut errors) = (Tally::default(), None, VecDeque::new());
-    // Like the loop, this withholds repeated readings of a stuck unit or log.
+    // As in the loop, repeated readings of a stuck inertial unit or velocity log are withheld from the filter.
     let mut stuck = [(StuckSensor::default(), false); VELOCITY_LOG + 1];
     for (valid, source, reading) in dive.events() {
         let (stuck, hangs) = &mut stuck[source];

@@ -1,6 +1,6 @@
 //! Dives drawn from seeds: a true motion, and readings of sensors with known errors.
 //!
-//! It shares no code with the simulator, and only the wall, the site and the units with the filter.
+//! This module shares no code with the simulator. With the filter, it shares only the wall, the site and the units.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -14,9 +14,9 @@ use headrace_sensor::reading::{EchoRange, Level, Reading, SonarReturn, TetherLen
 pub(crate) const IMU: usize = 0;
 pub(crate) const TETHER: usize = 1;
 pub(crate) const DEPTH: usize = 2;
-/// First of four echosounders: left, right, down, up.
+/// Source number of the first of four echosounders: left, right, down, up.
 pub(crate) const ECHOES: usize = 3;
-/// First of two heads.
+/// Source number of the first of two heads.
 pub(crate) const HEADS: usize = 7;
 
 pub(crate) const VELOCITY_LOG: usize = 9;
@@ -37,15 +37,15 @@ pub(crate) enum Motion {
     BackAndForth,
 }
 
-/// Sensor that hangs, sticks or is silent for a while.
+/// Fault of a dive: the sensor that hangs, sticks or is silent for a while.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,
     /// The inertial unit repeats its last readings.
     ImuHangs,
-    /// The counter's wheel is stuck while the cable runs.
+    /// The cable counter's wheel is stuck while the cable runs.
     CableSticks,
-    /// The counter is silent.
+    /// The cable counter is silent.
     CableSilent,
     /// The depth sensor repeats its last reading.
     DepthHangs,
@@ -56,12 +56,12 @@ pub(crate) enum Fault {
 /// Behaviour of the velocity log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Log {
-    /// There is no log.
+    /// There is no velocity log.
     None,
     Sound,
-    /// The log repeats its last reading for a while.
+    /// The velocity log repeats its last reading for a while.
     Hangs,
-    /// The log always shows a fifth too much.
+    /// The velocity log always shows a fifth too much.
     Scaled,
     /// For a while, the log follows silt that drifts at 0.15 m/s.
     Drifts,
@@ -80,7 +80,7 @@ impl Fault {
         [Self::None, Self::ImuHangs, Self::CableSticks, Self::CableSilent, Self::DepthHangs, Self::EchoHangs];
 }
 
-/// Parameters of a dive.
+/// Parameters of a simulated dive, drawn from its seed.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a factor of its own")]
 pub(crate) struct Recipe {
@@ -91,7 +91,7 @@ pub(crate) struct Recipe {
     pub(crate) speed_mps: f64,
     pub(crate) slack_m: f64,
     pub(crate) slack_period_s: f64,
-    /// Whether the slack is a single sine instead of a sum of three.
+    /// Whether the cable's slack is a single sine over time instead of a sum of three sines.
     pub(crate) slack_is_sine: bool,
     /// Whether the vehicle file declares slack and inertial noise correctly.
     pub(crate) is_declared: bool,
@@ -146,7 +146,7 @@ impl Draws {
 }
 
 impl Recipe {
-    /// Returns the recipe for a seed.
+    /// Returns the dive parameters for a seed.
     pub(crate) fn of(seed: u64) -> Self {
         let mut draws = Draws(seed.wrapping_mul(0xD134_2543_DE82_EF95));
         let log_between = |draws: &mut Draws, least: f64, most: f64| {
@@ -182,13 +182,13 @@ impl Recipe {
         }
     }
 
-    /// Returns the recipe for a seed, with a velocity log that is sound or has one of three faults, in turn.
+    /// Returns the dive parameters for a seed, with a velocity log that is sound or has one of three faults, in turn.
     pub(crate) fn with_log(seed: u64) -> Self {
         Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
 
-    /// Returns a recipe in which the vehicle hovers for five minutes. The vehicle file declares the cable
-    /// correctly.
+    /// Returns the parameters of a dive in which the vehicle hovers for five minutes. The vehicle file declares the
+    /// cable correctly.
     pub(crate) fn hovering(seed: u64) -> Self {
         let recipe = Self::of(seed);
         let slack_m = recipe.slack_m.min(0.06);
@@ -196,12 +196,12 @@ impl Recipe {
         Self { duration_s: 300.0, motion: Motion::ALL[seed as usize % 2], ..hovers }
     }
 
-    /// Fastest change of the slack if it is a single sine, m/s.
+    /// Fastest change of the cable's slack if the slack is a single sine, m/s.
     pub(crate) fn slack_rate_mps(&self) -> f64 {
         self.slack_m * math::TAU / self.slack_period_s
     }
 
-    /// Noise of the inertial unit.
+    /// Noise of the simulated inertial unit.
     pub(crate) fn inertial(&self) -> InertialNoise {
         let unit =
             |rate: f64, turn_on: f64, in_run: f64, force: f64, force_on: f64, force_run: f64| InertialNoise {
@@ -217,7 +217,7 @@ impl Recipe {
         }
     }
 
-    /// Settings in the vehicle file.
+    /// Noise settings as the simulated vehicle file states them.
     pub(crate) fn settings(&self) -> Settings {
         let usual = Settings::default();
         if !self.is_declared {
@@ -233,19 +233,19 @@ impl Recipe {
 /// Function that adds the readings of a source. Inputs: period, s, phase, s, source, and its reading at a time, s.
 type Every<'a> = dyn FnMut(f64, f64, usize, &mut dyn FnMut(f64) -> Option<Reading>) + 'a;
 
-/// A sum of sines, each with amplitude, angular frequency and phase.
+/// A sum of sine functions of time, each with amplitude, angular frequency and phase.
 type Sines = Vec<(f64, f64, f64)>;
 
 fn value(sines: &Sines, t: f64) -> f64 {
     sines.iter().map(|(a, w, p)| a * math::sin(w * t + p)).sum()
 }
 
-/// A dive with the true motion that follows from its recipe.
+/// A simulated dive, with the true motion that follows from its parameters.
 pub(crate) struct Dive {
     pub(crate) recipe: Recipe,
     pub(crate) profile: Profile,
     pub(crate) site: Site,
-    /// Distance along the tunnel at times [`STEP_S`] apart, m.
+    /// Vehicle's true distance along the tunnel at times [`STEP_S`] apart, m.
     way_m: Vec<f64>,
     slack: Sines,
     swaying: [Sines; 5],
@@ -254,7 +254,7 @@ pub(crate) struct Dive {
     tilts: [Sines; 3],
 }
 
-/// Time between the points of a trajectory, s.
+/// Time between two stored points of the true trajectory, s.
 const STEP_S: f64 = 0.005;
 
 impl Dive {
@@ -291,7 +291,7 @@ impl Dive {
         Self { recipe, profile, site, way_m, slack, swaying, biases, wander, tilts }
     }
 
-    /// Returns the chainage of the body, m.
+    /// Returns the vehicle's true chainage at a time, m.
     pub(crate) fn chainage_m(&self, t: f64) -> f64 {
         let place = (t.max(0.0) / STEP_S).min((self.way_m.len() - 2) as f64);
         let before = place as usize;
@@ -319,7 +319,7 @@ impl Dive {
         (unit(t + H_S) - unit(t - H_S)).scaled(0.5 / H_S)
     }
 
-    /// Returns all readings, in order of time.
+    /// Returns the readings of all sensors, in order of time.
     pub(crate) fn events(&self) -> Vec<(MonoNs, usize, Reading)> {
         let mut events = Vec::new();
         let mut every =
@@ -493,7 +493,7 @@ impl Dive {
     }
 }
 
-/// Returns the distance along the tunnel at times [`STEP_S`] apart, m.
+/// Returns the vehicle's true distance along the tunnel at times [`STEP_S`] apart, m.
 fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
     let steps = (recipe.duration_s / STEP_S) as usize + 4;
     let speed = recipe.speed_mps;
@@ -525,7 +525,7 @@ fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
             }
         }
     };
-    // The speed follows the demanded speed with two lags of 0.5 s each.
+    // The vehicle's speed follows the demanded speed with two lags of 0.5 s each.
     let (mut first, mut second, mut x) = (0.0, 0.0, 0.0);
     let mut way_m = Vec::with_capacity(steps);
     for k in 0..steps {

@@ -3,7 +3,7 @@
 use super::profile::{Piece, Profile, ProfileError};
 use crate::math::{self, PI, TAU};
 
-/// Base of the Ceran tunnel, m (Jorge et al. 2021, §7.3).
+/// Base width of the Ceran tunnel, m (Jorge et al. 2021, §7.3).
 const CERAN_BASE_M: f64 = 10.4;
 /// Radius of the Ceran tunnel's trimmed circle, m (Jorge et al. 2021, §7.3).
 const CERAN_RADIUS_M: f64 = 6.05;

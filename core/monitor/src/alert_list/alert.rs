@@ -24,7 +24,7 @@ pub enum AlertState {
     Cleared,
 }
 
-/// Change of an alert.
+/// Kind of change of an alert.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertChange {
@@ -38,12 +38,12 @@ pub enum AlertChange {
     Rectified,
     /// The alert has ended.
     Cleared,
-    /// The alert's place, extent, figures or priority have changed.
+    /// The alert's place, extent, figures or priority has changed.
     Changed,
 }
 
 impl AlertChange {
-    /// Word used in JSON.
+    /// Word used for the change in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Raised => "raised",
@@ -59,69 +59,69 @@ impl AlertChange {
 /// Acknowledgement of an alert: person and time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Acknowledgement {
-    /// Person or device.
+    /// Person or device that acknowledged the alert.
     pub by: Who,
     /// Time of the acknowledgement.
     pub at: MonoNs,
 }
 
-/// Figures for an alert's texts.
+/// Figures with which an alert's texts are made.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Figures {
-    /// No figures.
+    /// The alert has no figures.
     None,
     /// Missed stretch: causes, arc length of the largest hole, m, and the speed advised when the alert was
     /// raised, m/s.
     ///
     /// The speed is zero if no speed was advised.
     Missed(CauseFigures, f64, f64),
-    /// Stretch without a verdict.
+    /// Figures of a stretch without a verdict.
     CannotSay(Stretch),
-    /// Speed and advice.
+    /// Present speed and speed advice.
     Advice(AdviceFigures),
-    /// Missing requirements for a position.
+    /// Requirements that are missing for a position.
     MissingRequirement(NoFix),
     /// Position error, m, and whether staying stationary would reduce it.
     Error(f64, bool),
-    /// Observation about the dive as a whole.
+    /// Observation about the dive as a whole, such as a contradicted design profile.
     Deviation(Occurrences),
-    /// A doubtful setting.
+    /// A vehicle file setting that the measurements contradict.
     Setting(SettingDoubt, Occurrences),
-    /// Remaining amount: m, seconds or percent.
+    /// Remaining cable (m), time (seconds) or battery charge (percent).
     Left(f64),
 }
 
 /// An alert in the list.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ListedAlert {
-    /// Number from 1; never reused.
+    /// Number of the alert, from 1; never reused.
     pub number: u32,
-    /// Kind.
+    /// Kind of the alert.
     pub kind: ListKind,
-    /// Priority.
+    /// Priority of the alert.
     pub priority: Priority,
-    /// State in its life cycle.
+    /// State of the alert in its life cycle.
     pub state: AlertState,
     /// Time at which the alert was first raised.
     pub since: MonoNs,
-    /// Time at which the condition ceased to hold.
+    /// Time at which the alert's condition ceased to hold.
     pub rectified: Option<MonoNs>,
     /// Time at which the alert ended.
     pub cleared: Option<MonoNs>,
-    /// Acknowledgement, if any.
+    /// Acknowledgement of the alert, if any.
     pub acknowledged: Option<Acknowledgement>,
     /// Time until which the alert's sound is silenced.
     pub silenced_until: Option<MonoNs>,
     /// Sensor that the alert names.
     pub source: Option<SourceId>,
-    /// Index of the stretch's first section, and index after its last section.
+    /// Index of the missed stretch's first section, and index after its last section.
     pub stretch: Option<(i64, i64)>,
-    /// Place of the vehicle when the alert was raised, m; `None` for an alert with a stretch.
+    /// Chainage of the vehicle when the alert was raised, m; `None` for an alert with a stretch.
     pub x_m: Option<f64>,
     /// Number of times that the alert was raised. For missed stretches: number of stretches that the alert
     /// represents.
     pub count: u32,
-    /// Number of runs of flagged sections in the alert that aren't cleared yet.
+    /// Number of the alert's runs of flagged sections that aren't cleared yet.
     pub(super) open_runs: u32,
     /// Number of the alert into which this alert was merged.
     pub merged_into: Option<u32>,

@@ -16,22 +16,22 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Time after the first update from which data or positions that never arrived count as missing.
+/// Grace period after the first update. Data or positions that haven't arrived by its end count as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
-/// Time for which `CannotSay` stays active after its stretch has last grown.
+/// Time for which the alert `CannotSay` stays active after its stretch without a verdict last grew.
 const GROWS: DurNs = DurNs(10_000_000_000);
-/// Remaining cable, time and charge, percent, at or below which a warning, an alarm and an emergency alarm
-/// are raised.
+/// Thresholds for the remaining cable, time and charge, percent, at which a warning, an alarm and an
+/// emergency alarm are raised.
 ///
 /// A negative share means that the limit is exceeded.
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
 const TIME_PCT: [f64; 3] = [10.0, 0.0, -1.0];
 const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
-/// Dead band: the remaining amount must rise by this much above the limit of the warning, percent, before the
-/// alert ends.
+/// Dead band: before the alert ends, the remaining amount must rise by this much above the limit of the
+/// warning, percent.
 const MORE_PCT: f64 = 2.0;
 
-/// An update, with the state as of that time.
+/// An advice update, with the live state at that time.
 pub(crate) struct Beat<'a> {
     pub(crate) at: MonoNs,
     /// Live state whose `now` is the time of the update.
@@ -39,7 +39,7 @@ pub(crate) struct Beat<'a> {
     pub(crate) setting: Option<SettingDoubt>,
 }
 
-/// A condition that may hold.
+/// Result of checking a condition: whether it holds.
 pub(super) struct Seen {
     pub(super) kind: ListKind,
     pub(super) source: Option<SourceId>,
@@ -112,7 +112,8 @@ impl AlertList {
             .advice
             .as_ref()
             .map_or(Figures::None, |advice| Figures::Advice(AdviceFigures::of(advice, speed_mps)));
-        // Slightly over v_max the alert stays as it is: that range of speeds is its dead band.
+        // Slightly over v_max the alert neither begins nor ends, because that range of speeds is the alert's
+        // dead band.
         let is_over = condition == Condition::Over && self.is_active(ListKind::TooFast, None);
         let too_fast = condition == Condition::TooFast || is_over;
         self.observe(at, &Seen::of(ListKind::TooFast, too_fast, figures), to);
@@ -132,13 +133,14 @@ impl AlertList {
         self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
         let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread)
             && (self.had.sure_position || is_late);
-        let error = Figures::Error(state.confidence_sd * state.pass_sd_m, state.stand_s > 0);
+        let error = Figures::Error(state.target.error_m(state.pass_sd_m), state.stand_s > 0);
         self.observe(at, &Seen::of(ListKind::PositionDoubtful, is_spread, error), to);
     }
 
     fn take_unsure(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, .. } = *beat;
-        // Stretches at the ends of the coverage extent are reported once the vehicle has left them.
+        // Stretches at the ends of the coverage extent (the tunnel that the vehicle has visited) are reported
+        // once the vehicle has left them.
         let now = state.unsure.filter(|stretch| stretch.why != Unsure::NotInspected);
         let before = self.had.unsure;
         if now.is_some() && now != before.map(|(stretch, _)| stretch) {
@@ -175,7 +177,7 @@ impl AlertList {
         }
     }
 
-    /// Adds the observations made at the end of a dive, without a hold time.
+    /// Adds alerts for the observations made at the end of a dive, without a hold time.
     ///
     /// If an observation has an alert already, only the alert's figures change.
     pub(crate) fn take_observations_at_end(
@@ -203,7 +205,7 @@ impl AlertList {
         let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
         let is_silent =
             |source: u16| matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent);
-        // If no sensor delivers data, that is one situation, not one for each sensor.
+        // If no sensor delivers data, that is a single situation with one alert, not one per sensor.
         let all_silent = state.sources > 0 && sources().all(is_silent);
         self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);
         // A sensor is silent if it delivers nothing while another one does.
@@ -272,12 +274,12 @@ impl AlertList {
         }
     }
 
-    /// Length of cable left beyond the vehicle's place, m; `None` if the length of the cable is unknown.
+    /// Length of cable left beyond the vehicle's chainage, m; `None` if the length of the cable is unknown.
     pub(super) fn cable_left_m(&self, x_m: Option<f64>) -> Option<f64> {
         self.limits.cable_m.zip(x_m).map(|(cable_m, x_m)| cable_m - x_m.max(0.0))
     }
 
-    /// Time left, seconds; `None` if the dive's duration is unlimited.
+    /// Remaining dive time, seconds; `None` if the dive's duration is unlimited.
     pub(super) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
         let all = self.limits.dive_time?;
         Some((all - self.begun.map_or(DurNs(0), |begun| at.since(begun))).as_secs_f64())
@@ -287,7 +289,7 @@ impl AlertList {
         self.timers.get(timer::place(kind, source)).is_some_and(|timer| timer.number != 0)
     }
 
-    /// Applies an observed condition to its situation, and raises or ends its alert when due.
+    /// Updates the timer of a condition's situation, and raises or ends the alert when that is due.
     pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);
@@ -351,7 +353,7 @@ impl AlertList {
 }
 
 impl Figures {
-    /// Figures of a continuing situation: the present figures, but the highest speed so far.
+    /// Figures of a continuing situation: the present ones, except that the speed is the highest so far.
     ///
     /// Once the pilot has slowed down, the present speed would no longer show by how much the limit was
     /// exceeded.

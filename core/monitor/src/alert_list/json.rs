@@ -17,49 +17,49 @@ use crate::source::SourceInfo;
 use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
 use headrace_geometry::time::MonoNs;
 
-/// Maximum number of alerts in a list.
+/// Maximum number of alerts in the JSON list.
 pub const MOST_SHOWN: usize = 64;
-/// Cleared alerts are added while the list is shorter than this.
+/// Cleared alerts are added to the JSON list up to this length.
 const RECENT: usize = 20;
 
 /// An alert in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ListedAlertJson {
-    /// Number from 1; never reused.
+    /// Number of the alert, from 1; never reused.
     pub number: u32,
-    /// `emergency_alarm`, `alarm`, `warning` or `caution`.
+    /// Priority: `emergency_alarm`, `alarm`, `warning` or `caution`.
     pub priority: &'static str,
-    /// `coverage`, `speed`, `position`, `sensor`, `recording` or `setting`.
+    /// Class: `coverage`, `speed`, `position`, `sensor`, `recording` or `setting`.
     pub class: &'static str,
-    /// Kind.
+    /// Kind of the alert.
     pub kind: &'static str,
-    /// Problem.
+    /// Text of the problem that the alert reports.
     pub text: String,
     /// Action to take; empty if there is none.
     pub advice: String,
-    /// `active`, `rectified` or `cleared`.
+    /// State: `active`, `rectified` or `cleared`.
     pub state: AlertState,
     /// Time at which the alert was first raised, seconds on the log's clock.
     pub since_s: f64,
-    /// Time at which the condition ceased to hold.
+    /// Time at which the alert's condition ceased to hold, seconds on the log's clock.
     pub rectified_s: Option<f64>,
-    /// Time at which the alert ended.
+    /// Time at which the alert ended, seconds on the log's clock.
     pub cleared_s: Option<f64>,
-    /// Acknowledgement, if any.
+    /// Acknowledgement of the alert, if any.
     pub acknowledged: Option<AcknowledgedJson>,
-    /// Time until which the alert's sound is silenced.
+    /// Time until which the alert's sound is silenced, seconds on the log's clock.
     pub silenced_until_s: Option<f64>,
-    /// Whether the alert sounds now.
+    /// Whether the alert's sound is on now.
     pub sounds: bool,
     /// Whether somebody must still acknowledge the alert.
     pub needs_acknowledgement: bool,
-    /// Beginning of the alert's stretch, or place of the vehicle when the alert was raised, m.
+    /// Beginning of the alert's stretch, or chainage of the vehicle when the alert was raised, m.
     pub from_m: Option<f64>,
     /// End of the alert's stretch, m.
     pub to_m: Option<f64>,
-    /// Place to go back to, m.
+    /// Place to go back to in order to pass the missed stretch again, m.
     pub back_to_m: Option<f64>,
-    /// Largest speed for passing the stretch again, m/s.
+    /// Largest speed for passing the alert's stretch again, m/s.
     pub at_most_mps: Option<f64>,
     /// Id of the sensor that the alert names.
     pub sensor: Option<String>,
@@ -71,37 +71,37 @@ pub struct ListedAlertJson {
     pub occurrences: Option<u64>,
     /// Chainage of the first occurrence, m.
     pub first_m: Option<f64>,
-    /// Largest deviation, m; 0 for a doubtful setting.
+    /// Largest deviation among the observation's occurrences, m; 0 for a doubtful setting.
     pub worst_m: Option<f64>,
-    /// Doubtful setting, as last judged; `None` for other alerts.
+    /// Doubtful setting, as judged most recently; `None` for other alerts.
     pub setting: Option<SettingJson>,
     /// Number of the alert into which this alert was merged.
     pub merged_into: Option<u32>,
 }
 
-/// A setting that ranges contradict.
+/// A vehicle file setting that the measured ranges contradict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SettingJson {
     /// `range_scale`, `head_turned`, `head_pitched`, `head_yawed`, `wrong_way_round` or `swapped`.
     pub what: &'static str,
-    /// Name of the source; `None` if no single source has the setting.
+    /// Name of the sensor that has the doubtful setting; `None` if no single source has the setting.
     pub source: Option<String>,
-    /// Name of the other source, for two swapped sources.
+    /// Name of the other sensor, if two sensors are swapped.
     pub other: Option<String>,
-    /// Ratio of measured ranges to those of the design; `None` for other settings.
+    /// Ratio of measured ranges to the ranges that the design predicts; `None` for other settings.
     pub range_ratio: Option<f64>,
     /// Angle to be added to the angle in the vehicle file, degrees; `None` for other settings.
     ///
     /// It is an angle about the head's axis, a pitch or a yaw.
     pub angle_deg: Option<f64>,
-    /// Difference from the correct value, in standard deviations.
+    /// Difference between the file's value and the correct one, in standard deviations.
     pub sure_ratio: f64,
 }
 
 /// Acknowledgement of an alert, with person and time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AcknowledgedJson {
-    /// Person or device.
+    /// Person or device that acknowledged the alert.
     pub by: String,
     /// Time of the acknowledgement, seconds on the log's clock.
     pub at_s: f64,
@@ -110,26 +110,26 @@ pub struct AcknowledgedJson {
 /// Counts of alerts that have not ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct AlertCountsJson {
-    /// Alerts that somebody must still acknowledge.
+    /// Number of alerts that somebody must still acknowledge.
     pub unacknowledged: u32,
-    /// Alerts whose condition holds.
+    /// Number of alerts whose condition holds.
     pub active: u32,
-    /// Alerts of this priority that have not ended.
+    /// Number of emergency alarms that have not ended.
     pub emergency_alarm: u32,
-    /// See `emergency_alarm`.
+    /// Number of alarms that have not ended.
     pub alarm: u32,
-    /// See `emergency_alarm`.
+    /// Number of warnings that have not ended.
     pub warning: u32,
-    /// See `emergency_alarm`.
+    /// Number of cautions that have not ended.
     pub caution: u32,
 }
 
 /// Remaining cable, time and charge. An unknown amount is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct LeftJson {
-    /// Length of cable left beyond the vehicle's place, m.
+    /// Length of cable left beyond the vehicle's chainage, m.
     pub cable_m: Option<f64>,
-    /// Time left, seconds; negative after the end of the planned dive time.
+    /// Remaining dive time, seconds; negative after the end of the planned dive time.
     pub time_s: Option<f64>,
     /// Charge of the battery, percent.
     pub battery_pct: Option<f64>,
@@ -138,19 +138,19 @@ pub struct LeftJson {
 /// A note in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoteJson {
-    /// Number from 1.
+    /// Number of the note, from 1.
     pub number: u32,
-    /// Time, seconds on the log's clock.
+    /// Time of the note, seconds on the log's clock.
     pub at_s: f64,
-    /// Author.
+    /// Author of the note.
     pub by: String,
-    /// Text; empty for a mark or a voice note.
+    /// Text of the note; empty for a mark or a voice note.
     pub text: String,
-    /// Recording; `None` unless this is a voice note.
+    /// Recording that belongs to the note; `None` unless this is a voice note.
     pub voice: Option<SpokenJson>,
-    /// Place of the vehicle, m; `None` without a position.
+    /// Chainage of the vehicle, m; `None` without a position.
     pub chainage_m: Option<f64>,
-    /// Place of the vehicle as stationing, such as 1+240.50.
+    /// Chainage of the vehicle as stationing, such as 1+240.50.
     pub station: Option<String>,
 }
 
@@ -164,7 +164,7 @@ pub struct SpokenJson {
 }
 
 impl NoteJson {
-    /// Note as text for display.
+    /// Text that displays show for the note.
     pub fn words(&self) -> String {
         match &self.voice {
             Some(SpokenJson { seconds: Some(seconds), .. }) => format!("voice, {seconds} s"),
@@ -220,7 +220,7 @@ impl Figures {
 }
 
 impl ListedAlert {
-    /// The alert in JSON, at `now`.
+    /// The alert as JSON, with its state at time `now`.
     pub fn json(&self, around: &TextContext<'_>, now: MonoNs) -> ListedAlertJson {
         let (from_m, to_m) = self.bounds_m(around.section_m);
         let seconds = |at: Option<MonoNs>| at.map(MonoNs::as_secs_f64);
@@ -292,7 +292,7 @@ impl AlertList {
         counts
     }
 
-    /// Remaining cable, time and charge, as of a live state.
+    /// Remaining cable, time and charge at the time of a live state.
     pub fn left(&self, state: &LiveState) -> LeftJson {
         LeftJson {
             cable_m: self.cable_left_m(state.chainage_m),

@@ -9,18 +9,18 @@ pub use headrace_vehicle::AlertClass;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Priority {
-    /// For information; needs no acknowledgement.
+    /// Caution: for information; needs no acknowledgement.
     Caution,
-    /// The situation needs attention before it becomes worse.
+    /// Warning: the situation needs attention before it becomes worse.
     Warning,
-    /// The situation needs action now.
+    /// Alarm: the situation needs action now.
     Alarm,
-    /// The vehicle may be lost.
+    /// Emergency alarm: the vehicle may be lost.
     EmergencyAlarm,
 }
 
 impl Priority {
-    /// Word used in JSON.
+    /// Word used for the priority in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Caution => "caution",
@@ -36,13 +36,13 @@ impl Priority {
 pub enum ListKind {
     /// Sections are flagged as missed.
     Missed,
-    /// Newly judged sections get no verdict.
+    /// Newly judged sections are undecided: they neither pass nor fail.
     CannotSay,
     /// The speed is over v_max.
     TooFast,
-    /// No speed meets the target.
+    /// No speed meets the coverage target.
     NoSpeed,
-    /// The present turn misses the target although the speed is within v_max.
+    /// The present turn of the heads misses the target although the speed is within v_max.
     TurnFails,
     /// There is no position.
     NoPosition,
@@ -56,13 +56,13 @@ pub enum ListKind {
     SensorSilent,
     /// A head doesn't turn.
     SensorStalled,
-    /// Successive returns of a head disagree: they are noise.
+    /// Successive returns of a head disagree, so they are noise.
     HeadScattered,
     /// A head's range stays constant although it must change at the vehicle's place.
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
-    /// The cable counter differs from the inertial unit or from a velocity log: one of them is wrong.
+    /// The cable counter differs from the inertial unit or from a velocity log, so one of them is wrong.
     CableDoubted,
     /// Ranges contradict a setting of the vehicle file.
     SettingDoubted,
@@ -72,11 +72,11 @@ pub enum ListKind {
     ProfileContradicted,
     /// A log recording fails.
     NotRecorded,
-    /// Little cable is left.
+    /// Little cable is left on the drum.
     CableLeft,
-    /// Little time is left.
+    /// Little of the planned dive time is left.
     TimeLeft,
-    /// Little charge is left.
+    /// Little battery charge is left.
     BatteryLeft,
     /// A head turns and pings without detecting the wall.
     SensorDeaf,
@@ -85,7 +85,7 @@ pub enum ListKind {
 }
 
 impl ListKind {
-    /// All kinds.
+    /// All kinds of alerts.
     pub const ALL: [Self; 24] = [
         Self::Missed,
         Self::CannotSay,
@@ -113,7 +113,7 @@ impl ListKind {
         Self::SensorHung,
     ];
 
-    /// Word used in JSON.
+    /// Word used for the alert kind in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Missed => "missed",
@@ -143,7 +143,7 @@ impl ListKind {
         }
     }
 
-    /// Class, which decides muting and hold times.
+    /// Class of the alert kind, which decides muting and hold times.
     pub fn class(self) -> AlertClass {
         match self {
             Self::Missed | Self::CannotSay => AlertClass::Coverage,
@@ -168,7 +168,7 @@ impl ListKind {
         }
     }
 
-    /// Priority when the alert is raised. It may rise later as cable, time or charge runs out.
+    /// Priority of the alert when it is raised. It may rise later as cable, time or charge runs out.
     pub fn priority(self) -> Priority {
         match self {
             Self::CannotSay | Self::TurnFails => Priority::Caution,

@@ -9,14 +9,14 @@ use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::SourceId;
 
-/// Context for publishing changes.
+/// Context for publishing changes of alerts.
 pub(crate) struct Telling<'a> {
     pub(crate) notices: &'a mut Vec<Notice>,
     pub(crate) stream: &'a mut ResultStream,
 }
 
 impl Telling<'_> {
-    /// Publishes a change. Allocates: never.
+    /// Publishes a change of an alert. Allocates: never.
     ///
     /// The digest includes a notice even if the queue has no room for it.
     pub(super) fn tell(&mut self, alert: &ListedAlert, change: AlertChange, at: MonoNs) {
@@ -49,7 +49,7 @@ fn digest(stream: &mut ResultStream, alert: &ListedAlert, change: AlertChange, a
 }
 
 impl Figures {
-    /// Figure that represents the alert's figures in digests.
+    /// The one figure that represents the alert in digests of results.
     fn first(&self) -> f64 {
         match *self {
             Self::None => 0.0,
@@ -94,7 +94,7 @@ impl AlertList {
             merged_into: None,
             figures,
         };
-        // `make_room` has freed an entry.
+        // `make_room` has freed an entry of the alert list.
         if self.alerts.len() < self.alerts.capacity() {
             self.alerts.push(alert);
         }
@@ -112,8 +112,8 @@ impl AlertList {
             self.share_one(at, to);
         }
         let oldest = self.alerts.iter().position(|alert| !alert.is_live());
-        // If all alerts are live, most of them are missed stretches: the list has far more entries than there
-        // are other situations.
+        // If all alerts in a full list are live, most of them are missed stretches, because there are far
+        // fewer other situations.
         let oldest =
             oldest.or_else(|| self.alerts.iter().position(|alert| alert.priority == Priority::Caution));
         if let Some(oldest) = oldest {
@@ -122,8 +122,8 @@ impl AlertList {
         }
     }
 
-    /// Reactivates an alert: its condition holds again before an acknowledgement, or continues with other
-    /// figures.
+    /// Reactivates an alert whose condition holds again before anybody has acknowledged it, or updates its
+    /// figures while the condition continues.
     pub(super) fn hold_again(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         (alert.state, alert.rectified) = (AlertState::Active, None);

@@ -16,7 +16,7 @@ pub const MOST_LISTED: usize = 256;
 /// Time for which a sound is silenced. Source: MSC.302(87).
 pub const SILENCE: DurNs = DurNs(30_000_000_000);
 
-/// Data and positions seen so far.
+/// Record of which kinds of data and positions have arrived so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     pub(super) position: bool,
@@ -36,17 +36,17 @@ pub struct AlertList {
     pub(super) raised: u32,
     /// Number of cleared alerts no longer kept.
     pub(super) dropped: u64,
-    /// Number of each run's alert, or zero, by run of flagged sections.
+    /// For each run of flagged sections: number of its alert, or zero.
     pub(super) by_run: Vec<u32>,
-    /// Timers, by situation.
+    /// Timers that raise and end alerts, by situation.
     pub(super) timers: Vec<Timer>,
-    /// Time of the first update.
+    /// Time of the first advice update.
     pub(super) begun: Option<MonoNs>,
-    /// Data and positions seen so far.
+    /// Record of the data and positions that have arrived so far.
     pub(super) had: Had,
-    /// Largest speed advised at the last update, m/s; zero if none.
+    /// Largest speed advised at the last advice update, m/s; zero if none.
     pub(super) v_max_mps: f64,
-    /// Place of the vehicle at the last update, m.
+    /// Chainage of the vehicle at the last advice update, m.
     pub(super) x_m: Option<f64>,
     pub(super) recording_fails: bool,
     pub(super) battery_pct: Option<f64>,
@@ -109,7 +109,7 @@ impl AlertList {
         self.battery_pct
     }
 
-    /// Place of the vehicle at the last update, m.
+    /// Chainage of the vehicle at the last advice update, m.
     pub(crate) fn x_m(&self) -> Option<f64> {
         self.x_m
     }

@@ -26,4 +26,4 @@ pub use list::{AlertList, MOST_LISTED, SILENCE};
 pub(super) use runs::RunInput;
 pub use texts::TextContext;
 
-pub use super::observations::Occurrences;
+pub use super::observations::{Occurrence, Occurrences};

@@ -8,10 +8,11 @@ use crate::pilot_text::CauseFigures;
 use headrace_coverage::{RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;
 
-/// A changed run, with its figures at the time of the change.
+/// A changed run of flagged sections, with its figures at the time of the change.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunInput {
-    /// Index of the event at which the run was judged. For an update: index of the event after the update.
+    /// Index of the event at which the run was judged. If it was judged at an advice update: index of the
+    /// event after the update.
     pub(crate) event: usize,
     /// Whether the run was judged at an update before that event.
     pub(crate) at_beat: bool,
@@ -19,13 +20,13 @@ pub(crate) struct RunInput {
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
     pub(super) stretch: (i64, i64),
-    /// Causes, and arc length of the largest hole, m.
+    /// Causes of the missed run, and arc length of its largest hole, m.
     pub(super) causes: Option<(CauseFigures, f64)>,
     pub(super) merged_into: Option<RunId>,
 }
 
 impl RunInput {
-    /// Input for a run after a judgement; `None` if there is no such run.
+    /// Alert input for a run that a judgement changed; `None` if there is no such run.
     pub(crate) fn of(
         (event, at_beat): (usize, bool),
         at: MonoNs,
@@ -40,7 +41,7 @@ impl RunInput {
 }
 
 impl AlertList {
-    /// Applies a run's change.
+    /// Applies a changed run of flagged sections to the alert list.
     pub(crate) fn take_run(&mut self, input: &RunInput, to: &mut Telling<'_>) {
         let at = input.at;
         match input.change {
@@ -63,7 +64,7 @@ impl AlertList {
     }
 
     fn set_alert_of(&mut self, id: RunId, number: u32) {
-        // The capacity suffices: there are no more runs than sections.
+        // The capacity of `by_run` suffices, because there are no more runs than sections.
         while self.by_run.len() <= id.0 as usize && self.by_run.len() < self.by_run.capacity() {
             self.by_run.push(0);
         }
@@ -76,7 +77,8 @@ impl AlertList {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
-        // If a later pass has left only this part of a stretch missed, the stretch already has an alert.
+        // A run that a later pass has split off from a missed stretch is covered by the alert of that
+        // stretch.
         let (from, until) = input.stretch;
         let has = |alert: &&ListedAlert| {
             alert.kind == ListKind::Missed
@@ -151,7 +153,7 @@ impl AlertList {
         }
     }
 
-    /// Merges the alert `high`, which ends, into the alert `low`.
+    /// Merges the alert `high` into the alert `low`. The alert `high` ends.
     fn merge(&mut self, low: u32, high: u32, at: MonoNs, to: &mut Telling<'_>) {
         let Some(gone) = self.get_mut(high) else { return };
         let before = *gone;
@@ -166,7 +168,7 @@ impl AlertList {
         kept.stretch = both.map(|(one, other)| (one.0.min(other.0), one.1.max(other.1))).or(kept.stretch);
         kept.count += before.count;
         kept.open_runs += before.open_runs;
-        // An unacknowledged alert must not disappear behind an acknowledged one.
+        // If either alert still needs acknowledgement, the merged alert needs it, too.
         if before.needs_acknowledgement() {
             (kept.acknowledged, kept.silenced_until) = (None, before.silenced_until);
         }
@@ -178,8 +180,8 @@ impl AlertList {
         to.tell(&kept, AlertChange::Changed, at);
     }
 
-    /// Merges the newest missed stretch into its nearest neighbour, which frees an entry of a list full of
-    /// live alerts.
+    /// Merges the newest missed stretch into its nearest neighbour. This frees an entry in a list that is
+    /// full of live alerts.
     pub(super) fn share_one(&mut self, at: MonoNs, to: &mut Telling<'_>) {
         let stretches = || {
             let missed = self.alerts.iter().filter(|alert| alert.kind == ListKind::Missed && alert.is_live());

@@ -12,7 +12,7 @@ use headrace_sensor::reading::SourceId;
 use headrace_vehicle::{AlertTiming, ClassTiming, LimitsConfig};
 use proptest::prelude::*;
 
-/// A list, and the context for its changes.
+/// An alert list for a test, and the context in which its changes are published.
 struct Bench {
     list: AlertList,
     notices: Vec<Notice>,
@@ -31,7 +31,7 @@ impl Bench {
         }
     }
 
-    /// The same list after its state has passed through a snapshot.
+    /// The same alert list after its state has been saved to a snapshot and restored.
     fn restored(self) -> Self {
         let mut saver = Saver::default();
         self.list.save(&mut saver);
@@ -58,10 +58,10 @@ impl Bench {
     }
 }
 
-/// Possible events.
+/// Events that the random alert test may generate.
 #[derive(Debug, Clone, Copy)]
 enum Happens {
-    /// An update, with the conditions that hold.
+    /// An advice update, with the conditions that hold.
     Beat([bool; 3]),
     AcknowledgeNewest,
     AcknowledgeAll,
@@ -69,7 +69,7 @@ enum Happens {
     Snapshot,
 }
 
-/// One kind for each of three priorities. Each kind has a single situation.
+/// One alert kind for each of three priorities. Each kind has a single situation.
 const KINDS: [ListKind; 3] = [ListKind::TooFast, ListKind::NotRecorded, ListKind::TurnFails];
 const BEAT_MS: u64 = 200;
 
@@ -79,12 +79,12 @@ const BEAT_MS: u64 = 200;
 struct Oracle {
     history: Vec<(u64, bool)>,
     is_caution: bool,
-    /// Number, state, acknowledged, silenced until and count of each alert.
+    /// For each alert: number, state, whether it is acknowledged, time until which it is silenced, and count.
     all: Vec<(u32, &'static str, bool, u64, u32)>,
 }
 
 impl Oracle {
-    /// Times for which the condition has held and for which it hasn't, up to now.
+    /// Durations for which the condition has held, and for which it hasn't, up to now.
     ///
     /// Breaks shorter than `least_ms` count as time for which the condition held.
     fn spells_ms(&self, least_ms: u64) -> (Option<u64>, Option<u64>) {
@@ -94,7 +94,7 @@ impl Oracle {
             back.last().map(|(at, _)| *at)
         };
         let off = off_from(self.history.len()).map(|from| now - from);
-        // The first time at which the condition held after the last long break.
+        // The first time at which the condition held after the last break that was long enough to count.
         let (mut on, mut break_from) = (None, None);
         for (at, held) in &self.history {
             if *held {
@@ -118,7 +118,7 @@ impl Oracle {
             "active unacknowledged" | "active acknowledged" | "active caution"
                 if off.is_some_and(|off| off >= off_ms) =>
             {
-                // A situation starts afresh after its alert has ended.
+                // A condition starts afresh after its alert has ended.
                 self.history.clear();
                 self.all.last_mut().unwrap().1 =
                     if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };
@@ -169,8 +169,8 @@ fn happens() -> impl Strategy<Value = Happens> {
 }
 
 proptest! {
-    /// After any conditions and operator commands, every alert is in the state that the table of MSC.302(87)
-    /// gives.
+    /// After an arbitrary sequence of conditions and operator commands, every alert is in the state that the
+    /// table of MSC.302(87) gives.
     #[test]
     fn alert_life_cycle_follows_the_msc_table(
         steps in proptest::collection::vec((happens(), 1usize..8), 1..120),
@@ -296,9 +296,9 @@ fn higher_priority_needs_a_new_acknowledgement() {
     assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
 }
 
-/// Later occurrences change the figures of the alert that goes on. They are no change of the list.
+/// Later occurrences only update the figures of the active alert. They publish no notice.
 #[test]
-fn occurrences_update_the_figures_without_a_notice() {
+fn later_occurrences_update_the_alert_figures_and_publish_no_notice() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
     let mut beat = |bench: &mut Bench, at: MonoNs, occurrences: Occurrences| {
@@ -318,18 +318,19 @@ fn occurrences_update_the_figures_without_a_notice() {
 }
 
 #[test]
-fn contradiction_found_at_the_end_of_a_dive_has_one_alert() {
+fn contradiction_found_at_the_end_of_a_dive_raises_one_alert() {
     let mut bench = Bench::new(1.0, 5.0);
     let (mut observations, at) = (Observations::default(), MonoNs(9));
-    observations.note(ObservedKind::ProfileContradicted, at, 7.0, 0.4);
-    observations.note_of(Some(SourceId(1)), ObservedKind::HeadConstant, at, 7.0, 0.4);
+    let first = Occurrence { x_m: 7.0, off_m: 0.4 };
+    observations.note(ObservedKind::ProfileContradicted, at, first);
+    observations.note_of(Some(SourceId(1)), ObservedKind::HeadConstant, at, first);
     for (count, worst_m) in [(1, 0.4), (2, 0.5)] {
         bench.with(|list, to| list.take_observations_at_end(&observations, at, to));
         let alerts: Vec<_> =
             bench.list.iter().map(|alert| (alert.kind, alert.since, alert.figures)).collect();
         let figures = Figures::Deviation(Occurrences { count, first_m: 7.0, worst_m });
         assert_eq!(alerts, [(ListKind::ProfileContradicted, at, figures)]);
-        observations.note(ObservedKind::ProfileContradicted, at, 8.0, 0.5);
+        observations.note(ObservedKind::ProfileContradicted, at, Occurrence { x_m: 8.0, off_m: 0.5 });
     }
     assert_eq!(bench.notices.len(), 1);
 }
@@ -342,7 +343,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
     bench.run(0, RunChange::Changed, (40, 64), None);
     bench.run(0, RunChange::Changed, (40, 52), None);
     assert_eq!(stretch(&bench), Some((40, 52)), "the far end was passed again");
-    // A second pass covers the middle. The alert then has two runs.
+    // A second pass covers the middle of the missed stretch. The alert then has two runs.
     bench.run(1, RunChange::Raised, (48, 52), None);
     bench.run(0, RunChange::Changed, (40, 44), None);
     assert_eq!((stretch(&bench), bench.list.iter().count()), (Some((40, 52)), 1));
@@ -352,7 +353,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
 }
 
 #[test]
-fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
+fn alert_of_merged_runs_keeps_the_lower_number_and_stays_unacknowledged() {
     let mut bench = Bench::new(0.0, 0.0);
     bench.run(0, RunChange::Raised, (10, 11), None);
     bench.run(1, RunChange::Raised, (14, 15), None);
@@ -362,7 +363,8 @@ fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
     let [kept, gone] = [1, 2].map(|number| *bench.list.get(number).unwrap());
     assert_eq!((kept.stretch, kept.count, kept.needs_acknowledgement()), (Some((10, 15)), 2, true));
     assert_eq!((gone.state, gone.merged_into), (AlertState::Cleared, Some(1)));
-    // A later pass covers the middle, so the alert has two runs. Then both are covered.
+    // A later pass covers the middle of the missed stretch, so its alert has two runs. Then both runs are
+    // covered.
     bench.run(2, RunChange::Raised, (13, 15), None);
     bench.run(0, RunChange::Changed, (10, 12), None);
     assert_eq!(bench.list.raised(), 2);

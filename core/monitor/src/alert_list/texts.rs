@@ -1,10 +1,10 @@
-//! Texts of alerts, from the same table as the pilot's other lines. Allocates: outlets only, never within a
-//! tick.
+//! Texts of alerts, from the same table of words as the pilot's other messages. Allocates: outlets only,
+//! never within a tick.
 
 use super::alert::{AlertState, Figures, ListedAlert};
 use super::kind::ListKind;
 use crate::head_descriptions::HeadDescriptions;
-use crate::observations::Occurrences;
+use crate::observations::{Occurrence, Occurrences};
 use crate::pilot_text::{
     actions_text, advice_text, cause_text, clock_text, no_position_text, observation_text, setting_text,
     speed_text, station,
@@ -14,46 +14,34 @@ use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
 use headrace_coverage::{Sections, Stretch};
 use headrace_geometry::tunnel::Profile;
 
-/// Properties of the dive that the texts need.
+/// Properties of the dive that the alert texts need.
 #[derive(Debug, Clone, Copy)]
 pub struct TextContext<'a> {
-    /// Sources, for their ids.
+    /// Sources, for the sensor ids that alert texts name.
     pub sources: &'a [SourceInfo],
     /// Tunnel profile, for clock positions.
     pub profile: &'a Profile,
-    /// Length of a section, m.
+    /// Length of a tunnel section, m.
     pub section_m: f64,
-    /// Target T, m.
-    pub target_m: f64,
-    /// Confidence: number of standard deviations of the hole by which a verdict must clear the target.
-    pub confidence_sd: f64,
-    /// Sections, for the place to go back to.
+    /// Sections of the tunnel, from which the place to go back to is found.
     pub sections: &'a Sections,
-    /// Names and other settings of the heads.
+    /// Names of the heads, and the alternative settings that could be advised.
     pub heads: &'a HeadDescriptions,
 }
 
 impl<'a> TextContext<'a> {
-    /// Context for the texts of a dive's alerts.
+    /// Context from which the texts of a dive's alerts are made.
     pub(crate) fn of(
         sources: &'a [SourceInfo],
         profile: &'a Profile,
         sections: &'a Sections,
         heads: &'a HeadDescriptions,
     ) -> Self {
-        Self {
-            sources,
-            profile,
-            section_m: sections.section_m(),
-            target_m: sections.target_m(),
-            confidence_sd: sections.confidence_sd(),
-            sections,
-            heads,
-        }
+        Self { sources, profile, section_m: sections.section_m(), sections, heads }
     }
 
     fn unsure(&self, stretch: &Stretch) -> UnsureStretch {
-        UnsureStretch::from_sections(stretch, self.section_m, self.confidence_sd)
+        UnsureStretch::of(stretch, self.sections)
     }
 
     fn name(&self, source: usize) -> String {
@@ -70,7 +58,7 @@ impl ListedAlert {
         }
     }
 
-    /// Text of the problem.
+    /// Text of the problem that the alert reports.
     pub fn text(&self, around: &TextContext<'_>) -> String {
         let name = self.source.map(|source| around.name(source.index())).unwrap_or_default();
         let place = match self.bounds_m(around.section_m) {
@@ -86,7 +74,7 @@ impl ListedAlert {
                 format!("CAN'T SAY {place}: {}", unsure_text(&around.unsure(stretch)))
             }
             (ListKind::TooFast, Figures::Advice(figures)) => {
-                // The present speed is on every screen.
+                // The text omits the present speed, which every screen shows.
                 format!("TOO FAST: up to {:.2} m/s", figures.speed_mps.abs())
             }
             (ListKind::TurnFails, Figures::Advice(figures)) => {
@@ -99,7 +87,10 @@ impl ListedAlert {
             (_, Figures::MissingRequirement(lacking)) => no_position_text(*lacking),
             (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
             (kind, Figures::Deviation(Occurrences { first_m, worst_m, .. })) => match kind.observed() {
-                Some(kind) => place_first(&observation_text(kind, &name, *first_m, *worst_m), *first_m),
+                Some(kind) => {
+                    let worst = Occurrence { x_m: *first_m, off_m: *worst_m };
+                    place_first(&observation_text(kind, &name, worst), *first_m)
+                }
                 None => String::new(),
             },
             (_, Figures::Setting(doubt, Occurrences { first_m, .. })) => {
@@ -116,7 +107,7 @@ impl ListedAlert {
         }
     }
 
-    /// Text of the action; empty if there is none or if the alert has ended.
+    /// Text of the action against the alert's problem; empty if there is none or if the alert has ended.
     pub fn advice(&self, around: &TextContext<'_>) -> String {
         if self.state != AlertState::Active {
             return String::new();
@@ -158,7 +149,7 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
     }
 }
 
-/// Puts the place first in a text about this chainage, m.
+/// Prepends the place to a text about this chainage, m.
 fn place_first(text: &str, x_m: f64) -> String {
     let place = station(x_m);
     let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();

@@ -6,26 +6,27 @@ use super::kind::ListKind;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 
-/// Number of situations: one of each kind, and one per sensor for kinds that name a sensor.
+/// Number of situations that can raise an alert: one of each kind, and one per sensor for kinds that name a
+/// sensor.
 pub(super) const COUNT: usize = ListKind::ALL.len() * MAX_SOURCES;
 
-/// Index of a situation's timer.
+/// Index of the timer for a situation that can raise an alert.
 pub(super) fn place(kind: ListKind, source: Option<SourceId>) -> usize {
     kind as usize * MAX_SOURCES + source.map_or(0, |source| source.index() % MAX_SOURCES)
 }
 
-/// Timer of a situation.
+/// Timer that decides when a situation's alert is raised and ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Timer {
     /// Number of the active alert; zero if no alert is active.
     pub(super) number: u32,
     /// Time since which the condition has held, short breaks included.
     on: Option<MonoNs>,
-    /// Beginning of the present break.
+    /// Beginning of the present break in the condition.
     off: Option<MonoNs>,
 }
 
-/// Action that is due.
+/// Action on the alert that its timer requires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Due {
     /// Raise: the condition has held long enough.
@@ -34,12 +35,12 @@ pub(super) enum Due {
     GoesOn,
     /// End: the condition has been absent long enough.
     End,
-    /// No action.
+    /// No action on the alert.
     Nothing,
 }
 
 impl Timer {
-    /// Updates the timer at `at`.
+    /// Updates the timer at time `at`.
     ///
     /// A break shorter than `off` doesn't end an alert. A break shorter than `hold` doesn't restart the hold
     /// time.

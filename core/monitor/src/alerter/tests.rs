@@ -10,6 +10,7 @@ use headrace_fusion::relative::Relative;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::tunnel::shapes;
+use headrace_sampling::Target;
 use headrace_sensor::reading::Reading;
 use headrace_vehicle::{AlertTiming, LimitsConfig};
 
@@ -17,7 +18,7 @@ const AT: MonoNs = MonoNs(9_000_000_000);
 
 /// Live state after an update with this position error between passes.
 ///
-/// The target is half a metre, with two standard deviations.
+/// The target is half a metre, and the confidence is two standard deviations.
 fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
     let pose = Pose { position: Point3::new(12.5, 0.0, 3.0), attitude: Rot::identity() };
     let relative = Relative::along(pass_error_m);
@@ -40,14 +41,14 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
     let entry = AdviceEntry { at: AT, chainage_m: None, speed_mps: 0.07, advice: advice(&situation) };
     let advised = Advised { entries: vec![entry], ..Advised::default() };
     let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
-    let mut alerter = Alerter::new(list, &LiveState::new(0.5, 2.0, 0, 0), Vec::new(), 0, false);
+    let mut alerter = Alerter::new(list, &LiveState::new(Target::new(0.5), 0, 0), Vec::new(), 0, false);
     alerter.tick(&placed, &found, &advised, MonoNs(9_050_000_000));
     alerter.state
 }
 
-/// Two standard deviations may be at most a fifth of the target.
+/// The position is doubtful once two standard deviations exceed a fifth of the target.
 #[test]
-fn position_is_doubtful_if_passes_are_uncertain_or_the_cable_is_distrusted() {
+fn position_is_doubtful_if_the_pass_error_is_large_or_the_cable_counter_is_distrusted() {
     let spread = PositionState::Doubtful(PositionDoubt::Spread);
     let cable = PositionState::Doubtful(PositionDoubt::Cable);
     for (pass_error_m, is_cable_doubted, lacking, expected) in [
@@ -69,13 +70,13 @@ fn position_is_doubtful_if_passes_are_uncertain_or_the_cable_is_distrusted() {
 
 const NOW: MonoNs = MonoNs(9_000_000_000);
 
-/// The run of a section without samples. It is raised at the event with this index, or at the update
-/// before that event.
+/// The run of a section without samples. It is raised at event number `event`, or, with `at_beat`, at the
+/// advice update before that event.
 fn run(event: usize, at_beat: bool) -> RunInput {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
     let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 100 };
-    let mut sections = Sections::new(0.25, 0.5, 0.0, 20.0);
+    let mut sections = Sections::new(0.25, Target::new(0.5), 0.0, 20.0);
     let mut told: Option<(RunId, RunChange)> = None;
     let request = Request {
         section: 4,
@@ -98,7 +99,8 @@ fn run(event: usize, at_beat: bool) -> RunInput {
     RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
 }
 
-/// Inputs of a tick: a run, a command that acknowledges all alerts, and readings at ten events.
+/// Test inputs of a tick: one changed run, a command that acknowledges all alerts, and readings at ten
+/// events.
 struct Bench {
     alerter: Alerter,
     run: RunInput,
@@ -117,14 +119,14 @@ impl Bench {
         let command = Command::Acknowledge { alert: 0, by: crate::console::Who::default() };
         let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
         Self {
-            alerter: Alerter::new(list, &LiveState::new(0.5, 2.0, 0, 3), Vec::new(), 1, false),
+            alerter: Alerter::new(list, &LiveState::new(Target::new(0.5), 0, 3), Vec::new(), 1, false),
             run,
             command: ReceivedCommand { before: command_before, at: NOW, command },
             events: (0..10).map(event).collect(),
         }
     }
 
-    /// Applies inputs up to the update before the event with this index, or the whole tick.
+    /// Applies the inputs up to the advice update before event number `beat`, or those of the whole tick.
     ///
     /// Returns the number of alerts raised, the number of those acknowledged, the number of commands
     /// without effect, and the last reading's time.
@@ -143,7 +145,7 @@ impl Bench {
 }
 
 #[test]
-fn command_precedes_the_results_of_the_next_event() {
+fn command_is_applied_before_the_results_of_the_next_event() {
     for (before, acknowledged) in [(4, 0), (5, 0), (6, 1), (9, 1)] {
         let found = Bench::new(run(5, false), before).until(None);
         assert_eq!(found, (1, acknowledged, 1 - acknowledged as u64, Some(9)), "{before}");
@@ -151,7 +153,7 @@ fn command_precedes_the_results_of_the_next_event() {
 }
 
 #[test]
-fn update_includes_only_earlier_inputs() {
+fn alerter_update_applies_only_inputs_before_the_update() {
     let at =
         |run: RunInput, command_before: usize, beat: usize| Bench::new(run, command_before).until(Some(beat));
     assert_eq!(at(run(4, false), 9, 5), (1, 0, 0, Some(4)));

@@ -1,8 +1,8 @@
 //! A ring for loom, which explores all orders of memory accesses and all effects of weak memory ordering.
 //!
 //! The indices are loom's atomics, with the same memory orderings as in ringbuf. The bytes are visible as
-//! soon as they are stored. The model is still as weak as ringbuf: only the indices decide which bytes a
-//! reader may see.
+//! soon as they are stored. The model still shows every behaviour of ringbuf, because only the indices decide
+//! which bytes a reader may see.
 
 use std::sync::atomic::AtomicU8;
 use std::sync::atomic::Ordering::Relaxed;
@@ -26,7 +26,8 @@ impl Shared {
     }
 }
 
-/// Writing end. It caches its own index: with an additional load, loom would miss orders of accesses.
+/// Writing end. It caches its own index, because an additional load would make loom miss some orders of
+/// accesses.
 pub struct ModelProducer {
     shared: Arc<Shared>,
     write: usize,
@@ -90,8 +91,8 @@ impl ByteConsumer for ModelConsumer {
     }
 }
 
-/// A reading end that claims that all bytes are present, so that a protocol doesn't wait for the whole
-/// packet.
+/// A reading end that claims that all bytes are present, so that the ring's protocol doesn't wait for the
+/// whole packet.
 ///
 /// Models of deliberately broken protocols use it. loom must detect that they fail.
 pub struct Hasty(pub ModelConsumer);
@@ -114,12 +115,12 @@ impl ByteConsumer for Hasty {
     }
 }
 
-/// Ring of the loop, built on the model.
+/// The packet ring of the loop, built on loom's model of a byte ring.
 pub fn packets(capacity: usize) -> (Port<ModelProducer>, ModelReader) {
     packets_by(capacity, |consumer| consumer)
 }
 
-/// Ring of the loop, built on the model with another reading end.
+/// The packet ring of the loop, built on the model, with a substituted reading end.
 pub fn packets_by<R: ByteConsumer>(
     capacity: usize,
     reading: impl FnOnce(ModelConsumer) -> R,
@@ -128,7 +129,7 @@ pub fn packets_by<R: ByteConsumer>(
     (Port::on(producer), ModelReader(PortReader::on(reading(consumer))))
 }
 
-/// Reading end of the loop's ring, built on the model.
+/// Reading end of the loop's packet ring, built on the model.
 pub struct ModelReader<R: ByteConsumer = ModelConsumer>(PortReader<R>);
 
 impl<R: ByteConsumer> ModelReader<R> {
@@ -141,7 +142,7 @@ impl<R: ByteConsumer> ModelReader<R> {
     }
 }
 
-/// Runs a model. Prints and returns its number of executions.
+/// Runs a loom model. Prints and returns its number of executions.
 pub fn explore(name: &str, preemptions: Option<usize>, model: impl Fn() + Sync + Send + 'static) -> usize {
     let executions = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let count = std::sync::Arc::clone(&executions);

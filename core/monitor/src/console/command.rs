@@ -6,9 +6,9 @@ use super::text::ShortText;
 use crate::voice::MAX_VOICE_S;
 use serde::{Deserialize, Serialize};
 
-/// Longest packet.
+/// Longest command packet, bytes.
 pub const MAX_COMMAND_BYTES: usize = 512;
-/// Longest note, bytes.
+/// Longest text of a note, bytes.
 pub const MAX_NOTE_BYTES: usize = 240;
 
 /// Author of a command: initials, a name, or a device.
@@ -16,7 +16,7 @@ pub type Who = ShortText<16>;
 /// Text of a note.
 pub type NoteText = ShortText<MAX_NOTE_BYTES>;
 
-/// A command.
+/// A command to the loop from the operator, the program or other equipment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "copied into preallocated room; a box would allocate")]
 pub enum Command {
@@ -24,41 +24,41 @@ pub enum Command {
     Acknowledge {
         /// Number of the alert.
         alert: u32,
-        /// Author.
+        /// Author of the acknowledgement.
         by: Who,
     },
     /// Silences all sounding alerts for 30 s.
     Silence {
-        /// Author.
+        /// Person or device that silences the alerts.
         by: Who,
     },
-    /// Adds a note at the present place.
+    /// Adds a note with the vehicle's present chainage.
     Note {
-        /// Text; empty for a mark.
+        /// Text of the note; empty for a mark.
         text: NoteText,
-        /// Author.
+        /// Author of the note.
         by: Who,
     },
-    /// Adds a voice note at the present place, when its recording begins.
+    /// Adds a voice note with the vehicle's present chainage, when its recording begins.
     Voice {
         /// Id that ties the note to its recording; never 0.
         id: u32,
-        /// Author.
+        /// Author of the voice note.
         by: Who,
     },
     /// Sent by the program: the recording of a voice note is in the log.
     Voiced {
-        /// Id of the note.
+        /// Id of the voice note.
         id: u32,
         /// Length of the recording, seconds, 1 to 60.
         seconds: u32,
     },
     /// Sent by the program: a log recording fails, or works again.
     Recording {
-        /// Whether a recording fails.
+        /// Whether a log recording fails at present.
         fails: bool,
     },
-    /// Sent by other equipment: remaining resources of the vehicle.
+    /// Sent by other equipment: remaining battery charge of the vehicle.
     Limits {
         /// Charge of the vehicle's battery, percent.
         battery_pct: f64,
@@ -71,16 +71,16 @@ pub enum Command {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("reading a command, at byte {at}: expected {expected}")]
 pub struct CommandError {
-    /// Index of the first wrong byte.
+    /// Index of the first byte that no command allows.
     pub at: usize,
-    /// Input allowed at this place.
+    /// Description of the input allowed at that byte.
     pub expected: &'static str,
 }
 
-/// Keys of a command.
+/// JSON keys of a command.
 const KEYS: [&str; 8] = ["do", "alert", "by", "text", "fails", "battery_pct", "id", "seconds"];
 
-/// Values of the keys read so far.
+/// Values of the command's keys read so far.
 #[derive(Default)]
 struct Values {
     what: Option<Who>,
@@ -96,7 +96,8 @@ struct Values {
 }
 
 impl Command {
-    /// Whether an operator may send this command. Only the program sends the others.
+    /// Whether an operator may send this command. All other commands are sent by the program or other
+    /// equipment only.
     pub fn is_operators(&self) -> bool {
         matches!(
             self,
@@ -117,7 +118,7 @@ impl Command {
         }
     }
 
-    /// Parses a packet: one JSON object with exactly the keys of its command. Allocates: never.
+    /// Parses a packet: one JSON object with exactly the keys that its command requires. Allocates: never.
     ///
     /// Errors: the first deviation from that form.
     pub fn parse(bytes: &[u8]) -> Result<Self, CommandError> {
@@ -131,7 +132,7 @@ impl Command {
         values.command().map_err(|expected| CommandError { at: 0, expected })
     }
 
-    /// The command as a JSON packet.
+    /// Returns the command as a JSON packet.
     pub fn to_json(&self) -> String {
         let mut json = String::with_capacity(64);
         let by = |json: &mut String, by: &Who| quote(json, ",\"by\":", by.as_str());
@@ -173,7 +174,7 @@ impl Command {
     }
 }
 
-/// Appends a key and its text, which has no control characters.
+/// Appends a JSON key and its text value, which has no control characters.
 fn quote(json: &mut String, key: &str, text: &str) {
     json.push_str(key);
     json.push('"');
@@ -187,7 +188,7 @@ fn quote(json: &mut String, key: &str, text: &str) {
 }
 
 impl Values {
-    /// Builds the command. Its keys must be complete, and there must be no others.
+    /// Builds the command from the values read. All of its keys must be present, and no others.
     fn command(self) -> Result<Command, &'static str> {
         let Self { what, alert, by, text, fails, battery_pct, id, seconds } = self;
         let what = what.ok_or("the key \"do\"")?;
@@ -225,7 +226,7 @@ impl Values {
     }
 }
 
-/// A position in a text.
+/// Position of the parser in a JSON text.
 struct Scan<'a> {
     text: &'a str,
     at: usize,
@@ -322,7 +323,7 @@ impl Scan<'_> {
         self.number().parse().map_err(|_| CommandError { at, expected: "a number of an alert, or 0 for all" })
     }
 
-    /// A whole number from 1 to `most`.
+    /// A whole number from 1 to `most` in a JSON text.
     fn of_voice(&mut self, most: u32, expected: &'static str) -> Result<u32, CommandError> {
         let at = self.at;
         let number: Option<u32> = self.number().parse().ok();
@@ -367,7 +368,7 @@ impl Scan<'_> {
     fn escaped(&mut self) -> Option<char> {
         match self.next()? {
             char @ ('"' | '\\' | '/') => Some(char),
-            // The text's check for control characters refuses these later.
+            // A later check of the whole text refuses control characters.
             'b' | 'f' | 'n' | 'r' | 't' => Some('\n'),
             'u' => {
                 let first = self.unit()?;

@@ -14,15 +14,15 @@ const MOST_OF_TICK: usize = 256;
 /// Traffic statistics of the console.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ConsoleCounts {
-    /// Number of packets.
+    /// Number of packets from the console.
     pub packets: u64,
-    /// Number of packets that are not a command.
+    /// Number of console packets that are not a valid command.
     pub invalid: u64,
     /// Number of commands without effect: the alert doesn't exist, or needs no acknowledgement.
     pub without_effect: u64,
 }
 
-/// The console as a source.
+/// The console as a packet source.
 #[derive(Debug, Resource)]
 pub(crate) struct Console {
     pub(crate) source: SourceId,
@@ -45,7 +45,7 @@ pub(crate) struct ReceivedCommand {
 pub(crate) struct Commands(pub(crate) Vec<ReceivedCommand>);
 
 impl Default for Commands {
-    /// Allocates: at startup, all memory of the list.
+    /// Creates an empty list of commands. Allocates: at startup, all memory of the list.
     fn default() -> Self {
         Self(Vec::with_capacity(MOST_OF_TICK))
     }
@@ -56,7 +56,7 @@ impl Console {
         Self { source, counts: ConsoleCounts::default() }
     }
 
-    /// Adds a packet that comes before the event with this index.
+    /// Adds a console packet that comes before the event with this index.
     pub(crate) fn take(&mut self, packet: Packet<'_>, before: usize, commands: &mut Commands) {
         self.counts.packets += 1;
         match Command::parse(packet.bytes) {

@@ -7,7 +7,7 @@ fn who(text: &str) -> Who {
 }
 
 #[test]
-fn commands_are_read_as_documented() {
+fn console_commands_are_parsed_as_documented() {
     let note = |text: &str| Command::Note { text: NoteText::new(text).unwrap(), by: who("AB") };
     for (json, command) in [
         (r#"{"do":"acknowledge","alert":12,"by":"AB"}"#, Command::Acknowledge { alert: 12, by: who("AB") }),
@@ -62,7 +62,7 @@ fn note_refused_by_a_full_queue_is_not_counted() {
 }
 
 #[test]
-fn invalid_command_is_refused_with_the_place_of_the_error() {
+fn error_for_an_invalid_command_gives_the_first_wrong_byte() {
     let long = format!(r#"{{"do":"note","text":"{}","by":"AB"}}"#, "x".repeat(241));
     let longest = format!(r#"{{"do":"time"{}}}"#, " ".repeat(500));
     for json in [
@@ -131,7 +131,7 @@ proptest! {
     }
 
     #[test]
-    fn any_packet_is_parsed_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+    fn random_console_packets_are_parsed_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
         if Command::parse(&bytes).is_ok() {
             prop_assert!(serde_json::from_slice::<serde_json::Value>(&bytes).is_ok());
         }

@@ -1,4 +1,4 @@
-//! Short texts stored inline.
+//! Short texts stored inline, without allocation.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -17,13 +17,13 @@ impl<const BYTES: usize> Default for ShortText<BYTES> {
 }
 
 impl<const BYTES: usize> ShortText<BYTES> {
-    /// A text; `None` if it is too long or has control characters.
+    /// Makes a text from a string; `None` if the string is too long or has control characters.
     pub fn new(text: &str) -> Option<Self> {
         let mut all = Self::default();
         text.chars().all(|char| all.push(char)).then_some(all)
     }
 
-    /// The beginning of a text, as far as it fits, without control characters.
+    /// Makes a text from the beginning of a string, as far as it fits, without control characters.
     pub fn cut(text: &str) -> Self {
         let mut all = Self::default();
         let mut fits = text.chars().filter(|char| !char.is_control());
@@ -43,10 +43,10 @@ impl<const BYTES: usize> ShortText<BYTES> {
         true
     }
 
-    /// The text.
+    /// The text as a string slice.
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..usize::from(self.len)).unwrap_or_default();
-        // Only whole characters are appended.
+        // The buffer is valid UTF-8, because only whole characters are appended.
         core::str::from_utf8(bytes).unwrap_or_default()
     }
 }

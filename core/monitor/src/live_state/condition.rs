@@ -7,13 +7,14 @@ use headrace_fusion::NoFix;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::advice::Reason;
 
-/// Ratio to v_max above which a speed is over v_max.
+/// Ratio of the speed to v_max above which the condition is "over v_max".
 ///
 /// The margin covers the measurement error and the advice's own margin.
 const OVER: f64 = 1.02;
-/// Ratio to v_max below which a speed is clearly below v_max.
+/// Ratio of the speed to v_max below which the speed is clearly below v_max.
 const UNDER: f64 = 0.97;
-/// Ratio to v_max above which a speed is too fast. A pilot who follows the advice stays below this ratio.
+/// Ratio of the speed to v_max above which the speed is too fast. A pilot who follows the advice stays below
+/// this ratio.
 const TOO_FAST: f64 = 1.05;
 
 /// Present condition. If several conditions hold, the first one in this list counts.
@@ -21,15 +22,17 @@ const TOO_FAST: f64 = 1.05;
 pub enum Condition {
     /// No sensor has delivered data.
     NoData,
-    /// No data has arrived for this long.
+    /// No data has arrived for this duration.
     Old(DurNs),
     /// There is no position, for this reason.
     NoPosition(NoFix),
-    /// No head is inside the tunnel, whose nearer end is at this chainage (m). The position is reliable.
+    /// No head is inside the tunnel, whose nearer end is at this chainage (m). The position itself is
+    /// reliable.
     Outside(f64),
     /// No profiling head delivers readings.
     NoSonar,
-    /// All wall here has passed, and the position is reliable: any speed is fine.
+    /// All wall that the heads see here has the verdict pass, and the position is reliable: any speed is
+    /// fine.
     Passed,
     /// The vehicle is going back to this chainage (m) too fast for coverage. From there it will pass a missed
     /// stretch again.
@@ -40,7 +43,7 @@ pub enum Condition {
     TooFast,
     /// The present turn misses the target although the speed is within v_max.
     TurnFails,
-    /// Samples placed now can't be judged.
+    /// Samples placed at present can't be judged, because the position is doubtful.
     CannotSay(PositionDoubt),
     /// The speed is slightly over v_max.
     Over,
@@ -50,20 +53,20 @@ pub enum Condition {
     Good,
 }
 
-/// Colour of a condition.
+/// Colour of the lamp that shows how serious a condition is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Lamp {
-    /// Continue: all is well.
+    /// Green: the pilot can continue, all is well.
     Green,
-    /// Take care.
+    /// Amber: the pilot should take care.
     Amber,
-    /// Act now.
+    /// Red: the pilot must act now.
     Red,
 }
 
 impl Condition {
-    /// Word used in JSON.
+    /// Word used for the condition in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NoData => "no_data",
@@ -83,7 +86,7 @@ impl Condition {
         }
     }
 
-    /// Colour of the condition.
+    /// Colour of the lamp for the condition.
     pub fn lamp(self) -> Lamp {
         match self {
             Self::Good | Self::Passed | Self::GoingBack(_) => Lamp::Green,
@@ -104,12 +107,12 @@ impl LiveState {
         self.condition() == Condition::CannotSay(PositionDoubt::Spread) && self.stand_s > 0
     }
 
-    /// Whether the spacing T that is forecast at the present speed is above this limit, m, or unbounded.
+    /// Whether the spacing T of samples forecast at the present speed exceeds this limit, m, or is unbounded.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }
 
-    /// Present condition.
+    /// Present condition. Conditions declared first in [`Condition`] take precedence.
     pub fn condition(&self) -> Condition {
         let Some(age) = self.age() else { return Condition::NoData };
         if self.is_old() {
@@ -130,7 +133,7 @@ impl LiveState {
         let going_back = self.back_to_m.filter(|_| self.position == PositionState::Ok);
         let Some(v_max_mps) = self.v_max_mps() else {
             return match advice.reason {
-                // A head that isn't turning, or hasn't turned for long enough yet, gives no evidence.
+                // A head that isn't turning, or has only just begun to turn, counts as delivering no sonar data.
                 Reason::NoReturns => Condition::NoSonar,
                 Reason::NoHeadingOrFix => Condition::NoPosition(NoFix::Heading),
                 Reason::AngularStep | Reason::HelixPitch => {
@@ -144,8 +147,9 @@ impl LiveState {
         }
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
-            // The forecast is latched for a second. The present turn may already be better.
-            _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
+            // `will_exceed` stays set for a second, although the forecast for the present turn may be within
+            // the target again.
+            _ if advice.will_exceed && self.turn_exceeds(self.target.max_hole_m) && share <= OVER => {
                 Condition::TurnFails
             }
             PositionState::Doubtful(doubt) => Condition::CannotSay(doubt),

@@ -1,5 +1,5 @@
-//! The live state as JSON. It has plain values with units in their names, ages up to the tick, and a mark on
-//! stale data.
+//! The live state as JSON. It has plain values with units in their names. Ages are measured up to the tick,
+//! and stale data is marked.
 //!
 //! `docs/reference/live-state.schema.json` is the schema. Allocates: outlets' threads only, never the loop's.
 
@@ -26,19 +26,20 @@ pub struct LiveStateJson {
     pub age_s: Option<f64>,
     /// Whether the state is to be shown as stale.
     pub old: bool,
-    /// Present condition, as a word.
+    /// Present condition of the dive, as a word.
     pub condition: &'static str,
     /// Colour of the condition.
     pub lamp: Lamp,
-    /// The position.
+    /// Position of the vehicle, with its state.
     pub position: PositionJson,
-    /// Speed along the tunnel, positive inwards, m/s; `None` without a position.
+    /// Speed of the vehicle along the tunnel, positive inwards, m/s; `None` without a position.
     pub speed_mps: Option<f64>,
     /// Largest speed that meets the target, m/s; `None` if there is none.
     pub v_max_mps: Option<f64>,
     /// Reason that limits the speed; `None` before the first advice.
     pub reason: Option<&'static str>,
-    /// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
+    /// Margins of speed and turn, the part of the target that position errors use up, and the share of lost
+    /// returns.
     pub margins: MarginsJson,
     /// Forecast of the present turn.
     pub turn: Option<TurnJson>,
@@ -60,33 +61,35 @@ pub struct LiveStateJson {
     pub alerts_hidden: usize,
 }
 
-/// A position.
+/// Position of the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PositionJson {
-    /// `ok`, `doubtful` or `none`.
+    /// State of the position: `ok`, `doubtful` or `none`.
     pub state: &'static str,
-    /// Reason for the state.
+    /// Reason for which the position is doubtful or missing.
     ///
     /// A doubtful position has `cable` or `spread`. A missing one has `no_heading`, `no_chainage` or
     /// `no_place_in_section`.
     pub why: Option<&'static str>,
-    /// Chainage, m.
+    /// Chainage of the vehicle, m.
     pub chainage_m: Option<f64>,
-    /// Chainage as stationing.
+    /// Chainage of the vehicle as stationing, such as 1+240.50.
     pub station: Option<String>,
-    /// Standard deviation of chainage, m.
+    /// Standard deviation of the chainage, m.
     pub chainage_sd_m: Option<f64>,
-    /// Standard deviation of the place in the cross-section, m.
+    /// Standard deviation of the vehicle's place in the cross-section, m.
     pub place_sd_m: Option<f64>,
-    /// Standard deviation of yaw, degrees.
+    /// Standard deviation of the vehicle's yaw, degrees.
     pub yaw_sd_deg: Option<f64>,
-    /// Standard deviation of the position of one pass relative to the next, m; `None` without a position.
+    /// Standard deviation of the position at one pass of a head relative to the next pass, m; `None` without
+    /// a position.
     pub pass_sd_m: Option<f64>,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if that isn't needed.
     pub stand_s: u32,
 }
 
-/// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
+/// Margins of speed and turn, the part of the target that position errors use up, and the share of lost
+/// returns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MarginsJson {
     /// v_max minus the present speed, m/s; negative if the speed is too fast.
@@ -95,7 +98,8 @@ pub struct MarginsJson {
     pub turn_m: Option<f64>,
     /// Part of the target used up by position errors, m.
     ///
-    /// This is the confidence times the standard deviation of one pass relative to the next.
+    /// It is the confidence times the standard deviation of the position at one pass relative to the next
+    /// pass.
     pub position_m: Option<f64>,
     /// Share of lost returns; `None` unless they limit the speed.
     pub lost_share: Option<f64>,
@@ -104,11 +108,11 @@ pub struct MarginsJson {
 /// Forecast of the present turn at the present speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TurnJson {
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
-    /// Forecast T, m; `None` if it is unbounded.
+    /// Forecast spacing T, m; `None` if it is unbounded.
     pub predicted_t_m: Option<f64>,
-    /// Whether the forecast T will exceed the target.
+    /// Whether the forecast spacing T will exceed the target.
     pub will_exceed: bool,
     /// Largest step along the wall, m.
     pub t_y_m: f64,
@@ -118,12 +122,12 @@ pub struct TurnJson {
     pub phase_error_deg: Option<f64>,
 }
 
-/// A sensor.
+/// State of a sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorJson {
-    /// Id.
+    /// Id of the sensor.
     pub id: String,
-    /// State.
+    /// State of the sensor, as a word.
     pub state: SensorState,
     /// Age of the sensor's last reading, seconds; `None` if there is none.
     pub age_s: Option<f64>,
@@ -131,7 +135,7 @@ pub struct SensorJson {
     pub is_head: bool,
 }
 
-/// Metres of the coverage extent.
+/// Metres of the coverage extent by verdict, and their sum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MetresJson {
     /// Metres by verdict.
@@ -141,20 +145,20 @@ pub struct MetresJson {
     pub way_m: f64,
 }
 
-/// A stretch.
+/// A stretch of tunnel without a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StretchJson {
-    /// Reason: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`,
-    /// `contradicted_profile`, `other_size` or `no_wall`.
+    /// Reason for the missing verdict: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`,
+    /// `distrusted_head`, `contradicted_profile`, `other_size` or `no_wall`.
     pub why: &'static str,
-    /// Beginning, m.
+    /// Beginning of the stretch, m.
     pub from_m: f64,
-    /// End, m.
+    /// End of the stretch, m.
     pub to_m: f64,
 }
 
 impl LiveState {
-    /// The state in JSON, with the alerts of the same dive. See
+    /// The live state as JSON, with the alerts of the same dive. See
     /// [`DiveView::live_state_json`](crate::view::DiveView::live_state_json).
     pub fn json(&self, around: &TextContext<'_>, alerts: &AlertList) -> LiveStateJson {
         let TextContext { sources, section_m, .. } = *around;
@@ -180,12 +184,12 @@ impl LiveState {
             reason: advice.map(|advice| advice.reason.as_str()),
             margins: MarginsJson {
                 speed_mps: less(self.v_max_mps(), self.speed_mps.map(f64::abs)),
-                turn_m: less(Some(self.target_m), predicted_m),
-                position_m: pass_sd_m.map(|sd_m| self.confidence_sd * sd_m),
+                turn_m: less(Some(self.target.max_hole_m), predicted_m),
+                position_m: pass_sd_m.map(|sd_m| self.target.error_m(sd_m)),
                 lost_share: self.lost_share(),
             },
             turn: advice.map(|advice| TurnJson {
-                target_m: self.target_m,
+                target_m: self.target.max_hole_m,
                 predicted_t_m: predicted_m,
                 will_exceed: advice.will_exceed,
                 t_y_m: advice.t_y_m,

@@ -9,6 +9,7 @@ use headrace_fusion::NoFix;
 use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::Target;
 use headrace_sampling::advice::{Advice, Reason};
 use headrace_sampling::head::HeadSet;
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
@@ -30,7 +31,7 @@ pub enum PositionDoubt {
 }
 
 impl PositionDoubt {
-    /// Word used in JSON.
+    /// Word used for the doubt in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Cable => "cable",
@@ -44,14 +45,14 @@ impl PositionDoubt {
 pub enum PositionState {
     /// There is no position, for this reason.
     None(NoFix),
-    /// There is a position, but it makes the samples placed by it doubtful, for this reason.
+    /// There is a position, but samples placed by it are doubtful, for this reason.
     Doubtful(PositionDoubt),
     /// The position is reliable.
     Ok,
 }
 
 impl PositionState {
-    /// Word used in JSON: `none`, `doubtful` or `ok`.
+    /// Word used for the availability in JSON: `none`, `doubtful` or `ok`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::None(_) => "none",
@@ -60,7 +61,7 @@ impl PositionState {
         }
     }
 
-    /// Number used in published data.
+    /// Number used for the availability in published data.
     pub(crate) fn number(self) -> u64 {
         match self {
             Self::Ok => 0,
@@ -73,15 +74,15 @@ impl PositionState {
 /// Metres of the coverage extent by verdict. Their sum is the extent.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LiveMetres {
-    /// Metres that pass.
+    /// Metres of sections that pass.
     pub pass_m: f64,
-    /// Metres that fail.
+    /// Metres of sections that fail.
     pub fail_m: f64,
-    /// Metres without a verdict of pass or fail.
+    /// Metres of sections without a verdict of pass or fail.
     pub cannot_say_m: f64,
-    /// Metres that further driving may still fill.
+    /// Metres still open: further driving may fill their holes.
     pub open_m: f64,
-    /// Metres that not all heads have passed, where the vehicle began or turned back.
+    /// Metres where some heads have not been, because the vehicle began or turned back there.
     pub not_inspected_m: f64,
 }
 
@@ -101,7 +102,7 @@ pub(crate) struct ActiveObservation {
     pub(crate) occurrences: Occurrences,
 }
 
-/// All observations that hold now.
+/// List of all observations that hold now.
 pub(crate) type ActiveObservations = [Option<ActiveObservation>; MOST_OBSERVATIONS];
 
 /// Slowest practical speed, m/s. A lower advised speed counts as no speed.
@@ -111,24 +112,24 @@ pub const LEAST_MPS: f64 = 0.005;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorState {
-    /// No reading so far.
+    /// No reading has arrived so far.
     Never,
-    /// No reading for longer than [`OLD_AFTER`].
+    /// No reading has arrived for longer than [`OLD_AFTER`].
     Silent,
-    /// A head whose readings all come from one angle.
+    /// The sensor is a head whose readings all come from one angle.
     Stalled,
-    /// A head that turns and pings without detecting the wall.
+    /// The sensor is a head that turns and pings without detecting the wall.
     Deaf,
     /// The sensor repeats its last reading.
     Hung,
-    /// A head that is distrusted.
+    /// The sensor is a head that is distrusted.
     Distrusted,
-    /// Readings arrive.
+    /// The sensor's readings arrive.
     Ok,
 }
 
 impl SensorState {
-    /// Word used in JSON.
+    /// Word used for the sensor's state in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Never => "never",
@@ -151,11 +152,11 @@ pub struct LiveState {
     pub at: Option<MonoNs>,
     /// Availability of a position.
     pub position: PositionState,
-    /// Chainage; `None` without a position.
+    /// Chainage of the vehicle; `None` without a position.
     pub chainage_m: Option<f64>,
     /// Standard deviations of the pose; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
-    /// Standard deviation of the position of one pass relative to the next.
+    /// Standard deviation of the position at one pass of a head relative to the next pass.
     pub pass_sd_m: f64,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if that isn't needed.
     ///
@@ -163,12 +164,10 @@ pub struct LiveState {
     pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,
-    /// The advice; `None` before the first.
+    /// Speed advice at the last update; `None` before the first.
     pub advice: Option<Advice>,
-    /// Target T.
-    pub target_m: f64,
-    /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
-    pub confidence_sd: f64,
+    /// Coverage target, with the confidence of verdicts.
+    pub target: Target,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Largest distance of a head before or behind the vehicle's origin, m.
@@ -177,12 +176,13 @@ pub struct LiveState {
     pub metres: LiveMetres,
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
-    /// Whether all wall that the heads see here has passed. The vehicle's chainage and the verdicts decide
-    /// this.
+    /// Whether every part of the wall visible to the heads here has the verdict pass. The vehicle's chainage
+    /// and the verdicts decide this.
     pub passed: bool,
-    /// Place to which the vehicle goes back for a missed stretch, m; `None` unless it is on the way there.
+    /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
+    /// way there.
     pub back_to_m: Option<f64>,
-    /// Observations that hold.
+    /// Observations about the dive that hold now.
     pub(crate) observations: ActiveObservations,
     /// Bitmask of the sources that are profiling heads.
     pub heads: u64,
@@ -192,7 +192,7 @@ pub struct LiveState {
     pub deaf: u64,
     /// Bitmask of the sources that repeat a reading.
     pub hung: u64,
-    /// Number of sources.
+    /// Number of sources of the dive.
     pub sources: u16,
     /// Receive time of each source's last reading.
     pub heard: [Option<MonoNs>; MAX_SOURCES],
@@ -201,12 +201,12 @@ pub struct LiveState {
 stateful!(LiveState {
     state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, observations, turning, deaf, hung;
     slots: heard;
-    fixed: target_m, confidence_sd, length_m, heads_reach_m, heads, sources;
+    fixed: target, length_m, heads_reach_m, heads, sources;
 });
 
 impl LiveState {
     /// State before the first update, in a tunnel of unlimited length.
-    pub(crate) fn new(target_m: f64, confidence_sd: f64, heads: u64, sources: u16) -> Self {
+    pub(crate) fn new(target: Target, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
             at: None,
@@ -217,8 +217,7 @@ impl LiveState {
             stand_s: 0,
             speed_mps: None,
             advice: None,
-            target_m,
-            confidence_sd,
+            target,
             length_m: f64::INFINITY,
             heads_reach_m: 0.0,
             metres: LiveMetres::default(),
@@ -235,7 +234,7 @@ impl LiveState {
         }
     }
 
-    /// End of the tunnel beyond which all heads are, m; `None` if a head may be inside.
+    /// Chainage of the tunnel's end beyond which all heads are, m; `None` if a head may be inside the tunnel.
     pub fn outside_m(&self) -> Option<f64> {
         let x_m = self.chainage_m?;
         let beyond = x_m > self.length_m + self.heads_reach_m;
@@ -258,7 +257,7 @@ impl LiveState {
         self.heard.get(source).copied().flatten().map(|heard| DurNs(self.now.since(heard).0.max(0)))
     }
 
-    /// State of a sensor, by its source.
+    /// State of the sensor with this source.
     pub fn sensor(&self, source: usize) -> SensorState {
         let bit = |set: u64| {
             u32::try_from(source).is_ok_and(|source| set.checked_shr(source).unwrap_or(0) & 1 == 1)
@@ -282,7 +281,7 @@ impl LiveState {
         (0..usize::from(self.sources)).filter(is_silent)
     }
 
-    /// Sensors in a state, in the order of sources.
+    /// Sensors that are in the given state, in the order of sources.
     pub fn sensors_that_are(&self, state: SensorState) -> impl Iterator<Item = usize> + '_ {
         (0..usize::from(self.sources)).filter(move |source| self.sensor(*source) == state)
     }
@@ -299,23 +298,23 @@ impl LiveState {
         Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
     }
 
-    /// Share of lost returns; `None` unless compensating for the losses costs at least a fifth of the speed.
+    /// Share of lost returns; `None` unless they reduce the largest speed by at least a fifth.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Share of the speed that remains if losses cost a fifth of it.
+        /// Threshold: share of the speed that remains if losses cost a fifth of it.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;
         (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
     }
 
-    /// Bitmask of the kinds of observations that hold.
+    /// Bitmask of the kinds of observations that hold now.
     pub(crate) fn observation_bits(&self) -> u64 {
         self.observations.iter().flatten().fold(0, |bits, known| bits | 1 << known.kind as u64)
     }
 }
 
-/// Bitmask of the sources that belong to a set of heads. `sources` are the heads' sources, in order of head
-/// number.
+/// Bitmask of the sources that belong to a set of heads. `sources` lists the source of each head, in order of
+/// head number.
 pub(crate) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
     let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
     numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))

@@ -17,7 +17,7 @@ fn status(state: &LiveState) -> PilotLine {
     status_line(state, &profile, &two(), &|source| ["sonar_0", "sonar_1", "tether"][source].to_owned())
 }
 
-/// States that together show every part of the status.
+/// Live states that together show every part of the status line.
 fn states() -> Vec<LiveState> {
     let good = test_state();
     let speed = |mps: f64| {
@@ -92,7 +92,7 @@ fn speed_just_over_the_limit_has_enough_digits_to_differ() {
     assert_eq!(speed_decimals(None, Some(0.1)), 2);
 }
 
-/// Slower isn't always better: below their planned speed, heads run out of phase.
+/// A lower speed isn't always better: below their planned speed, heads run out of phase.
 #[test]
 fn remedy_for_an_unsure_stretch_depends_on_speed_and_phase() {
     let helps = |speed_mps: f64, fits_mps: f64, is_uneven: bool| {
@@ -137,7 +137,7 @@ fn unsure_stretch_is_shown_with_reason_and_remedy() {
     insta::assert_snapshot!(text);
 }
 
-/// Alert of an observation, as raised at the first update.
+/// Alert for an observation, as raised at the first update.
 fn raised(kind: ObservedKind) -> ListedAlertJson {
     let mut state = test_state();
     let occurrences = Occurrences { count: 3, first_m: 12.5, worst_m: 0.4 };
@@ -163,7 +163,7 @@ fn observation_has_a_line_when_its_alert_is_raised() {
 }
 
 #[test]
-fn line_breaks_between_words_and_before_the_action() {
+fn pilot_line_breaks_between_words_and_before_the_action() {
     let line = PilotLine {
         place: "0+014.25".to_owned(),
         speed: String::new(),

@@ -1,4 +1,4 @@
-//! Converts bytes to readings.
+//! Converts the bytes of sensor packets to readings.
 
 use bevy_ecs::prelude::{Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
@@ -13,7 +13,7 @@ use crate::messages::Event;
 #[derive(Debug, Default, Resource)]
 pub(super) struct Events(pub(super) Vec<Event>);
 
-/// The operator's input.
+/// The operator's input, as a source of commands.
 #[derive(SystemParam)]
 pub(super) struct Operator<'w> {
     console: ResMut<'w, Console>,

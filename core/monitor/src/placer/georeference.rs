@@ -7,19 +7,20 @@ use super::decode::Events;
 use super::navigate::{Positioned, PositionedList};
 use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
 use crate::head_health::Heard;
-use crate::messages::{Aim, Event, Hidden, Outcome, PlacedItem, PlacedPing, Placement, Update};
-use crate::resources::{Target, TunnelDesign};
+use crate::messages::{Event, Hidden, Outcome, PlacedItem, PlacedPing, Placement, Update};
+use crate::resources::{Plan, TunnelDesign};
 use headrace_coverage::deviation::off_m;
 use headrace_coverage::{Loss, PassError};
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Mount, head_direction};
 use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS, SILENT_AFTER};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// A head: number, mount, measured motion, losses and occluded angles.
+/// Query for a head: number, mount, measured motion, losses and occluded angles.
 type Heads<'w, 's> = Query<'w, 's, HeadParts>;
 type HeadParts = (
     &'static Head,
@@ -37,7 +38,7 @@ pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
     tunnel: Res<'_, TunnelDesign>,
-    target: Res<'_, Target>,
+    plan: Res<'_, Plan>,
     mut heads: Heads<'_, '_>,
     mut placed: ResMut<'_, PlacedList>,
 ) {
@@ -45,7 +46,7 @@ pub(super) fn georeference(
     for item in &positioned.0 {
         match *item {
             Positioned::Beat { at, fix, doubts, sd, before } => {
-                let situation = situation(at, fix, &tunnel, &target, &heads);
+                let situation = situation(at, fix, &tunnel, &plan, &heads);
                 let placement = Placement::Update(Update { at, situation, doubts, fix, sd });
                 placed.0.push(PlacedItem { event: before, placement });
             }
@@ -66,7 +67,7 @@ pub(super) fn georeference(
     }
 }
 
-/// Places a head's ping.
+/// Georeferences a head's ping.
 fn place(
     event: &Event,
     sonar: &SonarReturn,
@@ -106,7 +107,7 @@ fn place(
     ping
 }
 
-/// Counts a ping that was aimed at wall within range.
+/// Counts a ping that was aimed at wall within range, for the head's loss statistics.
 fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel: &TunnelDesign) {
     match ping.outcome {
         Outcome::Sample { point, arc_m } => {
@@ -123,7 +124,8 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
     }
 }
 
-/// Angle beside the occluded angles at which the vehicle may also return echoes, radians.
+/// Margin on either side of the occluded angles, radians. Beams within it may also return echoes from the
+/// vehicle.
 const BESIDE_RAD: f64 = 0.09;
 /// A return at an occluded angle is from the vehicle if its range is below this share of the range to the
 /// wall.
@@ -152,7 +154,7 @@ fn outcome(
         return sample(range_m);
     }
     let wall = tunnel.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
-    let aim = wall.map(|wall| Aim { x_m: origin.x() + wall.range_m * beam.x(), arc_m: wall.arc_m });
+    let aim = wall.map(|wall| WallPoint { x_m: origin.x() + wall.range_m * beam.x(), arc_m: wall.arc_m });
     let wall_m = wall.map(|wall| wall.range_m);
     if let Some(range_m) = range_m.filter(|range_m| wall_m.is_none_or(|wall| *range_m > VEHICLE_SHARE * wall))
     {
@@ -168,7 +170,7 @@ fn outcome(
     Outcome::Lost(loss, aim)
 }
 
-/// Longest range at the head's range setting in this water, m.
+/// Longest range at the head's range setting, corrected for the speed of sound in this water, m.
 fn longest_m(sonar: &SonarReturn, tunnel: &TunnelDesign) -> f64 {
     tunnel.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps)
 }
@@ -177,7 +179,7 @@ fn situation(
     at: MonoNs,
     fix: Result<Fix, NoFix>,
     tunnel: &TunnelDesign,
-    target: &Target,
+    plan: &Plan,
     heads: &Heads<'_, '_>,
 ) -> Situation {
     let mut motions = [None; MAX_HEADS];
@@ -211,7 +213,7 @@ fn situation(
         pose: fix.ok().map(|fix| fix.pose),
         speed_mps: fix.map_or(0.0, |fix| fix.speed_mps),
         pass_error_m: fix.map_or(0.0, |fix| PassError::of(&fix).worst_m(&tunnel.profile)),
-        layout: target.layout,
+        layout: plan.layout,
         configured: heads.iter().len(),
         heads: motions,
         deaf,
@@ -232,6 +234,7 @@ mod tests {
     use headrace_geometry::site::Site;
     use headrace_geometry::time::DurNs;
     use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::Target;
     use headrace_sampling::layout::HeadLayout;
     use headrace_sensor::device::{SensorInfo, SensorKind};
     use headrace_sensor::reading::SourceId;
@@ -267,7 +270,7 @@ mod tests {
             );
             assert!(matches!(heard(Some(range_m), false), Outcome::Sample { .. }), "{range_m}");
         }
-        // A return from more than half the distance of the wall is not from the vehicle.
+        // A return from more than half the wall's distance is not from the vehicle.
         assert!(matches!(heard(Some(1.6), true), Outcome::Sample { .. }));
         assert!(matches!(heard(None, true), Outcome::Lost(Loss::Occluded, Some(_))));
         assert!(matches!(heard(None, false), Outcome::Lost(Loss::Missing, Some(_))));
@@ -279,8 +282,7 @@ mod tests {
     fn head_angles_are_extrapolated_to_the_update() {
         const RATE_RADPS: f64 = 0.785;
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
-        // Each head makes 400 pings in 8 s. The first number is its first ping's time, the second its turn
-        // rate.
+        // For each head, which makes 400 pings in 8 s: time of its first ping, and turn rate.
         let heads = [(1.0, RATE_RADPS), (3.0, -RATE_RADPS), (0.5, RATE_RADPS)];
         let mut world = World::new();
         for (number, (from_s, rate_radps)) in heads.into_iter().enumerate() {
@@ -296,10 +298,10 @@ mod tests {
         }
         let (tunnel, other) = (tunnel(), OtherSettings::default());
         let layout = HeadLayout::PhaseShift;
-        let target = Target { target_m: 0.5, layout, planned_speed_mps: 0.0, other };
+        let plan = Plan { target: Target::new(0.5), layout, planned_speed_mps: 0.0, other };
         let mut state = SystemState::<Heads<'_, '_>>::new(&mut world);
         let query = state.get_mut(&mut world).unwrap();
-        let found = situation(at(10.53), Err(NoFix::Heading), &tunnel, &target, &query);
+        let found = situation(at(10.53), Err(NoFix::Heading), &tunnel, &plan, &query);
         for (motion, (from_s, rate_radps)) in found.heads.iter().zip(heads).take(2) {
             let motion = motion.unwrap();
             let off_rad = motion.angle_rad - 1.0 - rate_radps * (10.53 - from_s);

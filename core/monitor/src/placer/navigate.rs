@@ -1,4 +1,4 @@
-//! Converts readings to fixes.
+//! Converts sensor readings to fixes of the vehicle.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{Query, Res, ResMut, Resource, Single};
@@ -14,12 +14,12 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::Reading;
 
-/// A multiple of [`ADVICE_PERIOD`], or a sonar ping, with its fix.
+/// A sonar ping, or an advice update at a multiple of [`ADVICE_PERIOD`], with its fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Positioned {
     /// A sonar ping. The fix is for the ping's time of validity.
     Ping { event: usize, sensor: Entity, fix: Result<Fix, NoFix> },
-    /// A multiple of the advice period has passed. `before` is the index of the next event.
+    /// An advice update at a multiple of the advice period. `before` is the index of the next event.
     Beat { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
 }
 
@@ -27,7 +27,7 @@ pub(super) enum Positioned {
 #[derive(Debug, Resource)]
 pub(super) struct PositionedList(pub(super) Vec<Positioned>);
 
-/// Poses at the updates.
+/// Result stream of the vehicle's poses at the updates.
 #[derive(Debug, Default, Resource)]
 pub(crate) struct Poses(pub(crate) ResultStream);
 
@@ -139,7 +139,7 @@ mod tests {
 
     /// Updates come five times a second, from the first packet on.
     #[test]
-    fn each_update_is_due_once_and_a_gap_gives_only_the_latest() {
+    fn each_update_is_due_once_and_only_the_latest_is_due_after_a_gap() {
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
         let mut next = None;
         for (now_s, beat_s) in [
@@ -147,7 +147,7 @@ mod tests {
             (1.199, None),
             (1.2, Some(1.2)),
             (1.21, None),
-            // Time goes back, then catches up.
+            // Time on the packets' clock goes back, then catches up.
             (0.3, None),
             (1.39, None),
             (1.43, Some(1.4)),

@@ -14,32 +14,32 @@ const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;
 /// Time constant of the low-pass filter, s. Faster changes are sensor noise.
 const SLOWNESS_S: f64 = 60.0;
 
-/// The current speed of sound.
+/// The current speed of sound, measured or assumed.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct SoundSpeed {
-    /// Depth sensor that supplies the speed; `None` if the site's speed applies.
+    /// Depth sensor that supplies the speed of sound; `None` if the site's speed applies.
     source: Option<SourceId>,
     site_mps: f64,
     now_mps: f64,
     heard: Option<MonoNs>,
-    /// Minimum and maximum speed so far, m/s.
+    /// Minimum and maximum speed of sound used so far, m/s.
     span_mps: [f64; 2],
 }
 
 stateful!(SoundSpeed { state: now_mps, heard, span_mps; fixed: source, site_mps; });
 
 impl SoundSpeed {
-    /// Creates the state with the site's speed, which applies until `source` supplies another.
+    /// Creates the state with the site's speed of sound, which applies until `source` supplies another.
     pub(crate) fn new(site_mps: f64, source: Option<SourceId>) -> Self {
         Self { source, site_mps, now_mps: site_mps, heard: None, span_mps: [site_mps; 2] }
     }
 
-    /// Minimum and maximum speed used for ranges, m/s.
+    /// Minimum and maximum speed of sound used for ranges, m/s.
     pub(crate) fn span_mps(&self) -> [f64; 2] {
         self.span_mps
     }
 
-    /// Updates the speed from a depth sensor, and corrects sonar readings.
+    /// Updates the speed of sound from a depth sensor, and corrects sonar readings.
     ///
     /// Later stages rescale ranges to the site's speed. The speed stated by the device is therefore
     /// multiplied by the ratio of the site's speed to the current one.
@@ -74,7 +74,7 @@ impl SoundSpeed {
     }
 
     fn corrected(&self, device_mps: f64) -> f64 {
-        // Without a measured speed the reading is unchanged, bit for bit.
+        // Without a measured speed of sound the reading is unchanged, bit for bit.
         if self.heard.is_none() { device_mps } else { device_mps * (self.site_mps / self.now_mps) }
     }
 }
@@ -93,7 +93,7 @@ mod tests {
         Decoded { valid_at: MonoNs(0) + DurNs::from_secs_f64(at_s), reading: Reading::Pressure(water) }
     }
 
-    /// Corrected range, m, if a device that assumes 1500 m/s reports 4 m.
+    /// Corrected range, m, of a device that assumes 1500 m/s and reports 4 m.
     fn metres(sound: &mut SoundSpeed, site: &Site) -> f64 {
         let echo = EchoRange { range_m: Some(4.0), confidence: 1.0, sound_speed_mps: 1500.0 };
         let mut decoded = Decoded { valid_at: MonoNs(0), reading: Reading::Echo(echo) };

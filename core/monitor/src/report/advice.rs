@@ -1,4 +1,4 @@
-//! Advice in the report.
+//! Speed advice in the report.
 
 use serde::Serialize;
 
@@ -6,66 +6,65 @@ use crate::advice_log::AdviceEntry;
 use headrace_sampling::advice::{Alternative, Left};
 use headrace_sampling::margin::Margins;
 
-/// Advice at one time.
+/// Speed advice at one time of the dive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AdviceReport {
-    /// Seconds on the log's clock.
+    /// Time of the advice, seconds on the log's clock.
     pub at_s: f64,
-    /// Chainage, m.
+    /// Chainage of the vehicle, m.
     pub chainage_m: Option<f64>,
-    /// Speed, m/s.
+    /// Speed of the vehicle, m/s.
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
-    /// Speed below which heads apart along the hull run out of phase, m/s; zero if a lower speed always
-    /// helps.
+    /// Speed below which heads at different places along the hull run out of phase, m/s; zero if a lower
+    /// speed always helps.
     pub from_mps: f64,
-    /// Of the speeds that meet the target, the one nearest to the present speed, m/s; `None` if the present
-    /// speed meets it.
+    /// Speed nearest to the present speed that meets the target, m/s; `None` if the present speed meets it.
     pub nearest_mps: Option<f64>,
-    /// Limiting factor.
+    /// Factor that limits the speed.
     pub reason: &'static str,
-    /// T predicted at the present speed, m.
+    /// Spacing T predicted at the present speed, m.
     pub predicted_t_m: Option<f64>,
-    /// Whether the present turn will exceed the target at the present speed.
+    /// Whether the present turn of the heads will exceed the target at the present speed.
     pub will_exceed: bool,
     /// Largest phase error of a head, as an angle of its turn, degrees.
     pub phase_error_deg: Option<f64>,
-    /// Hours at `v_max_mps` for the rest of the tunnel.
+    /// Hours needed for the rest of the tunnel at `v_max_mps`.
     pub needed_h: Option<f64>,
-    /// Whether the remaining time is enough.
+    /// Whether the remaining dive time is enough for the rest of the tunnel.
     pub suffices: Option<bool>,
-    /// Remedy if a lower speed does not help: `centre`, `steady`, or a mode.
+    /// Remedy if a lower speed does not help: `centre`, `steady`, or the name of a scan mode.
     pub remedy: Option<String>,
-    /// Speeds possible in each mode of the heads.
+    /// Speeds possible in each scan mode of the heads.
     pub alternatives: Vec<AlternativeReport>,
     /// Speed at which the present mode meets the target if the heads are set in phase again for this speed,
     /// m/s.
     pub restart_for_mps: Option<f64>,
-    /// Largest speeds with the margins added one by one.
+    /// Largest speeds that meet the target with the margins added one after the other.
     pub margins: Option<MarginsReport>,
 }
 
-/// Largest speeds with margins added one after the other.
+/// Largest speeds that meet the target with the margins added one after the other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarginsReport {
-    /// Speeds, m/s.
+    /// Largest speed for each number of margins, m/s.
     #[serde(flatten)]
     pub margins: Margins,
-    /// Margin that costs most speed.
+    /// The margin that costs most speed.
     pub costliest: &'static str,
 }
 
-/// Speed possible in one mode of the heads.
+/// Speed possible in one scan mode of the heads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlternativeReport {
-    /// Mode.
+    /// Name of the scan mode.
     pub mode: String,
-    /// Largest speed that meets the target, m/s.
+    /// Largest speed that meets the target in this mode, m/s.
     pub v_max_mps: f64,
-    /// Hours at that speed for the rest of the tunnel.
+    /// Hours needed for the rest of the tunnel at that speed.
     pub needed_h: Option<f64>,
-    /// Whether the remaining time is enough.
+    /// Whether the remaining dive time is enough for the rest of the tunnel.
     pub suffices: Option<bool>,
 }
 

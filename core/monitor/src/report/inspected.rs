@@ -18,20 +18,20 @@ pub struct CoverageExtentReport {
     pub from_m: Option<f64>,
     /// End of the extent's last section, m.
     pub to_m: Option<f64>,
-    /// Length, m: the sum of the metres by verdict.
+    /// Length of the extent, m: the sum of the metres by verdict.
     pub length_m: f64,
 }
 
 /// Reason for which a dive is no inspection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotInspectedReport {
-    /// `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
+    /// Reason: `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
     pub reason: &'static str,
     /// Requirement that was missing most often for returns without a position.
     ///
     /// One of `no_heading`, `no_chainage` and `no_place_in_section`.
     pub missing: Option<&'static str>,
-    /// Share of pings without a position.
+    /// Share of pings that have no position.
     pub without_position_share: f64,
     /// Sources that never delivered a reading.
     pub silent_sources: Vec<String>,
@@ -69,7 +69,7 @@ pub(super) fn not_inspected(dive: &Loop) -> Option<NotInspectedReport> {
     })
 }
 
-/// Pings of profiling heads, whatever their outcome.
+/// Number of pings of profiling heads, whatever their outcome.
 pub(super) fn pings(tally: &Tally) -> u64 {
     tally.samples + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced
 }

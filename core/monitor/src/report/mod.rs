@@ -8,6 +8,7 @@ use super::console::ConsoleCounts;
 use super::head_descriptions::HeadDescriptions;
 use super::other_targets::OtherTargetReport;
 use super::run::Loop;
+use super::section_row::SectionRow;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
 use headrace_geometry::time::MonoNs;
@@ -15,31 +16,28 @@ use headrace_geometry::time::MonoNs;
 mod advice;
 mod inspected;
 mod runs;
-mod sections;
 mod smoothing;
 mod sources;
-mod spread;
+pub(crate) mod spread;
 mod survey;
 mod unsure;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use inspected::{CoverageExtentReport, NotInspectedReport};
 pub use runs::{ReturnReport, RunReport, go_back};
-pub use sections::{DeviationReport, SectionReport};
 pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};
 pub use spread::SpreadReport;
-use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::NoVerdictReport;
 
-/// Version of the report schema.
+/// Version of the report's JSON schema.
 pub const REPORT_VERSION: u32 = 9;
 
 /// A whole report. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Version of this schema.
+    /// Version of the report's JSON schema.
     pub report_version: u32,
     /// Reason for which the dive is no inspection; `None` if the dive is an inspection.
     pub not_inspected: Option<NotInspectedReport>,
@@ -47,7 +45,7 @@ pub struct Report {
     pub log: Option<LogReport>,
     /// Digest of all results, 16 hexadecimal digits.
     pub digest: String,
-    /// Target T, m.
+    /// Coverage target T, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
@@ -55,12 +53,12 @@ pub struct Report {
     pub confidence_sd: u32,
     /// Coverage extent: the part of the tunnel that the metres by verdict cover.
     pub coverage_extent: CoverageExtentReport,
-    /// The dive as a whole.
+    /// Summary figures of the dive as a whole.
     pub dive: DiveReport,
     /// Metres by verdict, and spacings over all sections.
     pub summary: SummaryReport,
     /// Every section of the coverage extent, in the order of chainage.
-    pub sections: Vec<SectionReport>,
+    pub sections: Vec<SectionRow>,
     /// Runs of neighbouring flagged sections, in the order of their numbers.
     pub runs: Vec<RunReport>,
     /// Stretches that neither pass nor fail although no more samples will come, in the order of chainage.
@@ -80,17 +78,17 @@ pub struct Report {
     pub alert_list: Vec<ListedAlertJson>,
     /// Number of cleared alerts left out for lack of room.
     pub alerts_dropped: u64,
-    /// Notes made during the dive.
+    /// Notes that the crew made during the dive.
     pub notes: Vec<NoteJson>,
     /// Number of notes left out for lack of room.
     pub notes_dropped: u32,
-    /// Traffic of the operator's input; `None` without any.
+    /// Traffic statistics of the operator's input; `None` without any input.
     pub console: Option<ConsoleReport>,
-    /// Advice history.
+    /// Speed advice history.
     pub advice: Vec<AdviceReport>,
     /// Number of advice entries dropped for lack of room.
     pub advice_dropped: u64,
-    /// Traffic of each source.
+    /// Traffic statistics of each source.
     pub sources: Vec<SourceReport>,
     /// Effect of smoothing on the verdicts; `None` without smoothing.
     pub smoothing: Option<SmoothingReport>,
@@ -99,32 +97,32 @@ pub struct Report {
 /// The log that a dive was read from or written to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LogReport {
-    /// Path as given.
+    /// Path of the log, as given by the user.
     pub path: String,
     /// SHA-256, hexadecimal. For a recording in parts, it is that of the concatenated parts.
     pub sha256: String,
-    /// Number of messages from sources.
+    /// Number of messages from sources in the log.
     pub messages: u64,
-    /// Losses in plain text. Each text has the time span of the loss.
+    /// Losses of logged data, in plain text. Each text has the time span of the loss.
     pub losses: Vec<String>,
-    /// Irregularities and how they were handled, in plain text. They lost no data.
+    /// Irregularities in the log that lost no data, and how they were handled, in plain text.
     pub notes: Vec<String>,
     /// Files of a recording in parts, in order.
     pub parts: Vec<PartReport>,
 }
 
-/// A part of a recording.
+/// A file of a recording in parts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct PartReport {
-    /// Path.
+    /// Path of the file.
     pub path: String,
-    /// SHA-256, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Number of messages from sources.
+    /// Number of messages from sources in the file.
     pub messages: u64,
 }
 
-/// The dive as a whole.
+/// Summary figures of the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiveReport {
     /// Time from the first to the last packet, seconds.
@@ -143,15 +141,15 @@ pub struct DiveReport {
     pub sound_speed_least_mps: f64,
     /// Maximum speed of sound used for ranges, m/s.
     pub sound_speed_most_mps: f64,
-    /// Samples on the wall.
+    /// Number of samples on the wall.
     pub samples_valid: u64,
-    /// Valid samples dropped because their cells were full.
+    /// Number of valid samples dropped because their cells of the sample store were full.
     pub samples_thinned: u64,
-    /// Pings without a sample, by reason.
+    /// Number of pings without a sample, by reason.
     pub samples_rejected: RejectedReport,
 }
 
-/// Pings that gave no sample.
+/// Numbers of pings that gave no sample, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct RejectedReport {
     /// No return although the wall was within range.
@@ -170,41 +168,41 @@ pub struct RejectedReport {
     pub doubtful_returns: u64,
 }
 
-/// Metres by verdict, and spacings.
+/// Metres by verdict, and spacings of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SummaryReport {
     /// Metres of sections that passed.
     pub pass_m: f64,
-    /// Metres that failed.
+    /// Metres of sections that failed.
     pub fail_m: f64,
-    /// Metres undecided within the error of the hole.
+    /// Metres of sections undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// Metres still open.
+    /// Metres of sections still open.
     pub open_m: f64,
-    /// Metres that not all heads have passed, where the vehicle began or turned back.
+    /// Metres of sections where some heads have not been, because the vehicle began or turned back there.
     pub not_inspected_m: f64,
-    /// Number of fails that were flagged.
+    /// Number of failed sections that were flagged.
     pub flags_raised: u32,
     /// Number of flags that a later pass cleared.
     pub flags_cleared: u32,
-    /// Distance between passes.
+    /// Distance along the tunnel between passes of heads over the same arc length.
     pub t_x: SpreadReport,
-    /// Distance between neighbours of one sweep.
+    /// Distance between neighbouring samples of one sweep.
     pub t_y: SpreadReport,
-    /// Lattice diagonal.
+    /// Diagonal of the lattice formed by neighbouring samples of neighbouring passes.
     pub t: SpreadReport,
-    /// Holes of the sections.
+    /// Diameter of the largest hole in each section.
     pub hole: SpreadReport,
 }
 
 /// A declared opening of the wall.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OpeningReport {
-    /// Display name.
+    /// Display name of the opening.
     pub name: String,
-    /// Beginning, m.
+    /// Beginning of the opening, m.
     pub from_m: f64,
-    /// End, m.
+    /// End of the opening, m.
     pub to_m: f64,
     /// Arc length at which the opening begins, m; `None` for the whole perimeter.
     pub arc_from_m: Option<f64>,
@@ -212,12 +210,12 @@ pub struct OpeningReport {
     pub arc_length_m: Option<f64>,
 }
 
-/// Traffic of the operator's input.
+/// Traffic statistics of the operator's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct ConsoleReport {
-    /// Number of packets.
+    /// Number of packets from the operator's input.
     pub packets: u64,
-    /// Number of packets that are not a command.
+    /// Number of packets that are not a valid command.
     pub invalid: u64,
     /// Number of commands without effect.
     pub without_effect: u64,
@@ -228,22 +226,19 @@ impl Report {
     pub fn of(dive: &Loop) -> Self {
         let (coverage, log) = (dive.view().coverage(), dive.advice_log());
         let sections = &coverage.sections;
-        let of_the_way =
-            || sections.sections_of(coverage.frontier.way()).filter_map(|k| Some((k, sections.get(k)?)));
+        let way = || sections.sections_of(coverage.frontier.way());
         let report = Self {
             report_version: REPORT_VERSION,
             not_inspected: inspected::not_inspected(dive),
             log: None,
             digest: format!("{:016x}", dive.view().digest()),
-            target_m: sections.target_m(),
+            target_m: sections.target().max_hole_m,
             section_m: sections.section_m(),
-            confidence_sd: confidence(sections.confidence_sd()),
+            confidence_sd: confidence(sections.target().confidence_sd),
             coverage_extent: inspected::way_report(coverage),
             dive: dive_report(dive),
-            summary: summarise(sections.section_m(), of_the_way().map(|(_, section)| section)),
-            sections: of_the_way()
-                .map(|(k, section)| sections::section_report(sections, k, section, dive))
-                .collect(),
+            summary: summarise(sections.section_m(), way().filter_map(|index| sections.get(index))),
+            sections: way().filter_map(|index| dive.view().section_row(index)).collect(),
             runs: runs::run_reports(dive),
             no_verdict: unsure::unsure_reports(coverage),
             go_back: runs::go_back(sections),
@@ -283,7 +278,7 @@ impl Report {
         }
     }
 
-    /// Whether any received data were lost before they gave results.
+    /// Whether any received data were lost before they were used.
     pub fn lost_data(&self) -> bool {
         let rejected = &self.dive.samples_rejected;
         let dropped =
@@ -299,7 +294,7 @@ impl SummaryReport {
     }
 }
 
-/// Alerts that the list still keeps, as of the end of the dive.
+/// Alerts that the list still holds, in their state at the end of the dive.
 fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
     let around = dive.view().surroundings();
     let now = dive.view().span().map_or(MonoNs(0), |(_, last)| last);
@@ -311,7 +306,7 @@ fn console_report(counts: ConsoleCounts) -> Option<ConsoleReport> {
     (packets > 0).then_some(ConsoleReport { packets, invalid, without_effect })
 }
 
-/// Confidence as a whole number, like the setting.
+/// Confidence as a whole number, as in the setting.
 fn confidence(confidence_sd: f64) -> u32 {
     u32::try_from(headrace_geometry::math::round_to_i64(confidence_sd)).unwrap_or(0)
 }
@@ -379,10 +374,10 @@ fn summarise<'a>(section_m: f64, sections: impl Iterator<Item = &'a Section>) ->
         not_inspected_m,
         flags_raised: raised,
         flags_cleared: cleared,
-        t_x: spread_report(&t_x),
-        t_y: spread_report(&t_y),
-        t: spread_report(&t),
-        hole: spread_report(&hole),
+        t_x: SpreadReport::from(&t_x),
+        t_y: SpreadReport::from(&t_y),
+        t: SpreadReport::from(&t),
+        hole: SpreadReport::from(&hole),
     }
 }
 

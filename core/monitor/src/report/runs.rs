@@ -9,34 +9,34 @@ use headrace_coverage::{Action, Again, Cause, Run, RunId, Runs, Sections, Verdic
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
-/// Neighbouring flagged sections.
+/// A run of neighbouring flagged sections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
     /// Number of the run, which never changes.
     pub id: u32,
-    /// Main cause: that of most sections of the run.
+    /// Main cause: the one that applies to most sections of the run.
     pub cause: Cause,
     /// All causes of the run's sections: first the main one, then the others by frequency.
     pub causes: Vec<Cause>,
     /// Figures for the causes that the text names. Each comes from a section with that cause.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Source ids of the silent heads. They are those of the section with the largest hole, or of the section
-    /// that represents silence as a cause.
+    /// Source ids of the heads that were silent in the section with the largest hole, or in the section that
+    /// represents silence as a cause.
     pub silent_sources: Vec<String>,
-    /// Beginning, m.
+    /// Beginning of the run, m.
     pub start_m: f64,
-    /// End, m.
+    /// End of the run, m.
     pub end_m: f64,
     /// Metres of the run that fail.
     pub failed_m: f64,
-    /// Diameter of the largest hole, m. In a cleared run, the diameter before the run was cleared.
+    /// Diameter of the run's largest hole, m. For a cleared run, the diameter before it was cleared.
     pub hole_m: f64,
     /// Chainage of that hole's centre, m.
     pub hole_x_m: f64,
     /// Clock position of the hole's centre, looking along the tunnel.
     pub hole_clock: String,
-    /// Time of the run's first flag, seconds on the log's clock.
+    /// Time at which the run was first flagged, seconds on the log's clock.
     pub raised_s: f64,
     /// Time at which the last section of the run ceased to fail, seconds on the log's clock.
     pub cleared_s: Option<f64>,
@@ -44,10 +44,10 @@ pub struct RunReport {
     pub merged_into: Option<u32>,
 }
 
-/// A stretch to pass again.
+/// A stretch that the vehicle should pass again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReturnReport {
-    /// Number of the run in this stretch.
+    /// Number of the run that makes up this stretch.
     pub run: u32,
     /// Chainage of the stretch's far end, m.
     pub from_m: f64,
@@ -57,16 +57,17 @@ pub struct ReturnReport {
     ///
     /// On the way from there, all heads pass the whole stretch.
     pub back_to_m: f64,
-    /// Action against the main cause.
+    /// Action against the run's main cause.
     pub action: Action,
-    /// All actions, in the order of the run's causes.
+    /// All actions against the run's causes, in the order of the causes.
     pub actions: Vec<Action>,
-    /// Maximum speed for passing again, m/s.
+    /// Maximum speed for passing the stretch again, m/s.
     ///
     /// It is the planned speed if that meets the target. It is zero if no speed meets the target in this
     /// mode.
     pub at_most_mps: f64,
-    /// Duration at that speed, seconds. It includes a second pass if the vehicle has to roll to each side.
+    /// Duration of passing the stretch at that speed, seconds. It includes a second pass if the vehicle has
+    /// to roll to each side.
     pub takes_s: Option<f64>,
 }
 
@@ -114,7 +115,8 @@ fn head_ids(dive: &Loop) -> Vec<String> {
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// Stretches to pass again by the present verdicts: all open runs, from the far end to the portal.
+/// Stretches to pass again according to the present verdicts: all runs not yet cleared, from the far end to
+/// the portal.
 pub fn go_back(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());

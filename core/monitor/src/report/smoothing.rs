@@ -2,16 +2,17 @@
 
 use serde::Serialize;
 
-/// Verdicts of a dive with the trajectory of the filter alone, compared with those after smoothing.
+/// Verdicts of a dive with the trajectory that the navigation filter alone gives, compared with those after
+/// smoothing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmoothingReport {
-    /// Digest of the results with the filter alone.
+    /// Digest of the results with the navigation filter alone.
     pub filter_digest: String,
-    /// Number of estimates that were smoothed.
+    /// Number of state estimates that were smoothed.
     pub estimates: u64,
     /// Number of contiguous pieces of the smoothed trajectory.
     pub pieces: u64,
-    /// Metres by verdict with the filter alone.
+    /// Metres by verdict with the navigation filter alone.
     pub before: MetresReport,
     /// Metres by verdict after smoothing.
     pub after: MetresReport,
@@ -19,40 +20,40 @@ pub struct SmoothingReport {
     pub changed: Vec<ChangeReport>,
 }
 
-/// Metres by verdict.
+/// Metres of tunnel by verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MetresReport {
     /// Metres of sections that passed.
     pub pass_m: f64,
-    /// Metres that failed.
+    /// Metres of sections that failed.
     pub fail_m: f64,
-    /// Metres undecided within the error of the hole.
+    /// Metres of sections undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// Metres still open.
+    /// Metres of sections still open.
     pub open_m: f64,
-    /// Metres that not all heads have passed.
+    /// Metres of sections where some heads have not been.
     pub not_inspected_m: f64,
 }
 
-/// A section whose verdict has changed.
+/// A section whose verdict smoothing has changed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangeReport {
-    /// Beginning, m.
+    /// Beginning of the section, m.
     pub start_m: f64,
-    /// End, m.
+    /// End of the section, m.
     pub end_m: f64,
-    /// Verdict with the filter alone; `None` if no head passed the section on its trajectory.
+    /// Verdict with the navigation filter alone; `None` if no head passed the section on its trajectory.
     pub before: Option<JudgedReport>,
     /// Verdict after smoothing; `None` if no head passed the section on the smoothed trajectory.
     pub after: Option<JudgedReport>,
 }
 
-/// A verdict and its hole.
+/// A section's verdict and largest hole.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JudgedReport {
-    /// `pass`, `fail`, `cannot_say` or `open`.
+    /// Verdict: `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
-    /// Diameter of the largest hole, m; `None` if the hole wasn't measured.
+    /// Diameter of the section's largest hole, m; `None` if the hole wasn't measured.
     pub hole_m: Option<f64>,
     /// Standard deviation of the diameter, m.
     pub hole_sd_m: f64,

@@ -1,4 +1,4 @@
-//! Sources in the report.
+//! Statistics of the sources in the report.
 
 use headrace_geometry::time::MonoNs;
 use serde::Serialize;
@@ -6,14 +6,14 @@ use serde::Serialize;
 use crate::run::Loop;
 use headrace_sensor::device_clock::ClockReport;
 
-/// Traffic of a source.
+/// Traffic statistics of a source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SourceReport {
-    /// Name.
+    /// Name of the source.
     pub id: String,
-    /// Kind of device.
+    /// Kind of device that the source is.
     pub plugin: String,
-    /// Number of packets.
+    /// Number of packets from the source.
     pub packets: u64,
     /// Number of whole and valid frames.
     pub frames: u64,
@@ -31,7 +31,7 @@ pub struct SourceReport {
     pub longest_gap_s: f64,
     /// Time from the source's last packet to the dive's last reading, seconds; `None` without packets.
     pub silent_at_end_s: Option<f64>,
-    /// Packets per second.
+    /// Mean number of packets per second.
     pub rate_hz: f64,
     /// Device clock statistics; `None` if the source sends no timestamps.
     pub device_clock: Option<DeviceClockReport>,

@@ -1,4 +1,4 @@
-//! Soundings by node of a survey grid, in the report.
+//! Samples by node of a survey grid, in the report.
 
 use serde::Serialize;
 
@@ -6,31 +6,31 @@ use crate::resources::Coverage;
 use headrace_coverage::soundings::ENOUGH;
 use headrace_geometry::tunnel::Profile;
 
-/// Samples by node of a square grid over the passed sections.
+/// Samples by node of a square grid over the sections of the coverage extent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SurveyReport {
     /// Edge of a node along the tunnel, m.
     pub node_m: f64,
     /// Edge of a node round the perimeter, m.
     pub around_m: f64,
-    /// Minimum samples per node.
+    /// Number of samples that a node needs.
     pub enough: u16,
-    /// Number of nodes passed.
+    /// Number of nodes in the coverage extent.
     pub nodes: u32,
-    /// Share of the passed nodes that have enough samples; `None` without nodes.
+    /// Share of these nodes that have enough samples; `None` if there are no nodes.
     pub enough_share: Option<f64>,
-    /// Number of nodes without a sample.
+    /// Number of nodes in the coverage extent without a sample.
     pub empty: u32,
     /// Node counts by row along the tunnel.
     pub rows: Vec<NodeRowReport>,
-    /// The first empty nodes, in the order of chainage.
+    /// The first nodes without a sample, in the order of chainage.
     pub holidays: Vec<HolidayReport>,
 }
 
 /// A row of nodes round the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NodeRowReport {
-    /// Beginning, m.
+    /// Beginning of the row, m.
     pub start_m: f64,
     /// Number of nodes in the row.
     pub nodes: u32,
@@ -51,7 +51,7 @@ pub struct HolidayReport {
     pub clock: String,
 }
 
-/// Maximum number of empty nodes listed. The field `empty` counts all of them.
+/// Maximum number of nodes without a sample that are listed. The field `empty` counts all of them.
 const LISTED: usize = 1000;
 
 pub(super) fn survey(coverage: &Coverage, profile: &Profile) -> SurveyReport {

@@ -1,4 +1,4 @@
-//! Unsure stretches in the report.
+//! Unsure stretches in the report: neighbouring sections that neither pass nor fail.
 
 use serde::Serialize;
 
@@ -8,20 +8,20 @@ use crate::resources::Coverage;
 /// Neighbouring sections that neither pass nor fail, for the same reason, although no more samples will come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoVerdictReport {
-    /// Reason: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`,
-    /// `contradicted_profile`, `other_size` or `no_wall`.
+    /// Reason for the missing verdict: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`,
+    /// `distrusted_head`, `contradicted_profile`, `other_size` or `no_wall`.
     pub why: &'static str,
-    /// Beginning, m.
+    /// Beginning of the stretch, m.
     pub start_m: f64,
-    /// End, m.
+    /// End of the stretch, m.
     pub end_m: f64,
     /// Metres of the stretch that are unsure.
     pub no_verdict_m: f64,
-    /// Largest hole, m.
+    /// Diameter of the stretch's largest hole, m.
     pub hole_m: f64,
-    /// Standard deviation of that hole, m.
+    /// Standard deviation of that diameter, m.
     pub hole_sd_m: f64,
-    /// The stretch, for the report as text.
+    /// The unsure stretch, for the report as text.
     #[serde(skip)]
     pub stretch: UnsureStretch,
 }

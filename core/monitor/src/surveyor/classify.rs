@@ -15,7 +15,7 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Places near the vehicle at which the wall was found to deviate from the design.
+/// Places near the vehicle at which the wall deviates from the design profile.
 #[derive(Debug, Default, Resource)]
 pub(crate) struct NearWall(pub(crate) Relief);
 
@@ -29,7 +29,7 @@ impl Stateful for NearWall {
     }
 }
 
-/// Classification of a placed item.
+/// Classification of a placed ping or update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Class {
     /// A ping without a placed return.
@@ -40,12 +40,12 @@ pub(crate) enum Class {
     Update([Option<Distrust>; MAX_HEADS]),
 }
 
-/// Classification of each item of the tick, in order.
+/// Classification of each placed ping and update of the tick, in order.
 #[derive(Debug, Resource)]
 pub(crate) struct Classified(pub(crate) Vec<Class>);
 
 impl Classified {
-    /// Allocates: all memory of the list.
+    /// Creates an empty list of classifications. Allocates: all memory of the list.
     pub(crate) fn with_room() -> Self {
         Self(Vec::with_capacity(2 * MAX_TICK_READINGS))
     }
@@ -80,7 +80,7 @@ pub(crate) fn classify_returns(
     debug_assert_eq!(classified.0.len(), placed.items.len());
 }
 
-/// Classifies a ping's return, and the returns that waited for this ping.
+/// Classifies a ping's return, and the head's earlier returns that waited for this ping.
 pub(super) fn classify(
     head: &mut HeadWall,
     ping: &PlacedPing,

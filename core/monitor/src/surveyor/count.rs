@@ -4,7 +4,7 @@ use crate::messages::{Outcome, PlacedPing};
 use crate::resources::Tally;
 use headrace_coverage::Loss;
 
-/// Counts a ping. Its return, if it has one, is counted once it is classified.
+/// Counts a ping. If it has a return, the return is counted once it has been classified.
 pub(super) fn count(tally: &mut Tally, ping: &PlacedPing) {
     tally.without_fix += u64::from(ping.fix.is_none());
     match ping.outcome {
@@ -28,7 +28,7 @@ mod tests {
     use headrace_fusion::NoFix;
 
     #[test]
-    fn every_ping_is_counted_once_by_its_outcome() {
+    fn every_ping_is_counted_once_under_its_outcome() {
         let mut tally = Tally::default();
         let of = |outcome: Outcome, has_fix: bool| {
             let ping = pinged(5.1, 1.0);

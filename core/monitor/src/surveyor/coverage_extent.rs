@@ -77,8 +77,8 @@ mod tests {
         MonoNs(seconds * 1_000_000_000)
     }
 
-    /// A vehicle with heads half a metre ahead and half a metre astern, at 4.5 m and 3.5 m. `heard_s` has the
-    /// times of their last pings.
+    /// A vehicle with heads half a metre ahead and half a metre astern of its origin, at 4.5 m and 3.5 m.
+    /// `heard_s` has the times of the heads' last pings.
     struct Bench {
         world: World,
         coverage: Coverage,
@@ -105,7 +105,7 @@ mod tests {
             Self { world, coverage, requests: Requests(Vec::new()) }
         }
 
-        /// Assumed places of the heads after an update at a chainage, m.
+        /// Assumed chainages of the heads, m, after an update with the vehicle at chainage `x_m`.
         fn beat(&mut self, seconds: u64, x_m: Option<f64>) -> [Option<f64>; 2] {
             let tunnel = tunnel();
             let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
@@ -116,7 +116,7 @@ mod tests {
             [places.next().flatten(), places.next().flatten()]
         }
 
-        /// Sections that a head has passed without pinging.
+        /// Indices of the sections that a head has passed without pinging.
         fn silent(&self, head: usize) -> Vec<i64> {
             let sections = 0..128;
             let passage = |index: &i64| self.coverage.sections.get(*index).unwrap().passage.silent.has(head);

@@ -4,7 +4,8 @@
 use bevy_ecs::prelude::Resource;
 
 use super::missing_samples::MissingSampleFinder;
-use headrace_coverage::{Drive, OtherSettings};
+use crate::resources::Plan;
+use headrace_coverage::Drive;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
@@ -17,14 +18,15 @@ use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
 
-/// Longest time between neighbouring passes for which the rotation of the vehicle is looked up, seconds.
+/// Longest time between neighbouring passes over which the rotation of the vehicle is computed, seconds.
 const LONGEST_S: f64 = 50.0;
-/// Relative change of the time between passes above which the fitting speed is computed again.
+/// Relative change of the time between passes above which the fitting speed, the largest one that meets the
+/// target, is computed again.
 const SAME_PASSES: f64 = 0.01;
 /// Search for the fitting speed: number of speeds tried, and ratio of each speed to the previous one.
 const SLOWER: u32 = 80;
 const SLOWER_BY: f64 = 0.97;
-/// Number of beams round a place for which the steps along the wall are computed.
+/// Number of beams in a turn for which the steps along the wall are computed.
 const RAYS: u32 = 72;
 /// Movement across the tunnel after which the steps along the wall are computed again, m.
 const MOVED_M: f64 = 0.05;
@@ -37,20 +39,7 @@ const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
-/// Target and settings by which the driving of a dive is judged.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Plan {
-    /// Speed for which the heads are set in phase, m/s; zero if none is planned.
-    pub(super) planned_mps: f64,
-    /// Target T, m.
-    pub(super) target_m: f64,
-    /// Confidence: number of standard deviations of the hole by which a pass must clear the target.
-    pub(super) confidence_sd: f64,
-    /// Effect of other head settings.
-    pub(super) other: OtherSettings,
-}
-
-/// Driving figures at the last update, and the earlier data needed for them.
+/// Driving figures at the last update, and the data kept to compute the next ones.
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Driving {
     pub(super) now: Drive,
@@ -65,7 +54,7 @@ pub(crate) struct Driving {
     steps_m: [f64; WAITS],
     /// Inputs for which the fitting speed was last computed.
     ///
-    /// They are the time between passes, seconds, the steps along the wall, m, and the target minus its
+    /// The inputs are the time between passes, seconds, the steps along the wall, m, and the target minus its
     /// margin, m.
     fitted: [f64; 3],
     looks: Looks,
@@ -75,8 +64,8 @@ pub(crate) struct Driving {
 stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, lacking; });
 
 impl Driving {
-    /// Updates the figures from the present situation, and from the same situation with no head silent or
-    /// stalled.
+    /// Updates the driving figures from the present situation, and from the same situation with no head
+    /// silent or stalled.
     ///
     /// Allocates: never.
     pub(super) fn note(
@@ -90,17 +79,17 @@ impl Driving {
             self.now.swing_m = 0.0;
             return;
         };
-        self.note_gaps(at, [situation, healthy], plan.planned_mps);
+        self.note_gaps(at, [situation, healthy], plan.planned_speed_mps);
         self.now.other = plan.other;
         self.note_fit(healthy, plan);
         let t_y_m = self.now.middle_t_y_m;
-        let sampled = Sampled { target_m: plan.target_m, t_y_m, perimeter_m: profile.perimeter_m() };
+        let sampled = Sampled { target_m: plan.target.max_hole_m, t_y_m, perimeter_m: profile.perimeter_m() };
         self.now.passes_needed = sampled.passes_needed(situation.losses_of_turning());
         self.now.lost = situation.lost_at_most;
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
-        // Two neighbouring passes may belong to heads apart along the hull.
+        // Two neighbouring passes may belong to heads at different places along the hull.
         let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
         let since = at - DurNs::from_secs_f64((self.now.healthy_gap_s + apart_s).min(LONGEST_S));
         let turned_rad = self.looks.turned_since(look, since);
@@ -108,12 +97,12 @@ impl Driving {
         self.looks.keep(at, look);
     }
 
-    /// Updates the fitting speed if the heads' passes have changed.
+    /// Updates the fitting speed, which is the largest one that meets the target, if the heads' passes have
+    /// changed.
     fn note_fit(&mut self, healthy: &Situation, plan: &Plan) {
         let now = &mut self.now;
-        let Plan { target_m, confidence_sd, .. } = *plan;
-        let sure_m =
-            target_m - position_margin_m(target_m, confidence_sd, healthy.pass_error_m, now.middle_t_y_m);
+        let margin_m = position_margin_m(plan.target, healthy.pass_error_m, now.middle_t_y_m);
+        let sure_m = plan.target.max_hole_m - margin_m;
         let passes = [now.all_gap_s, now.middle_t_y_m, sure_m];
         if passes.iter().zip(self.fitted).all(|(now, then)| (now - then).abs() <= SAME_PASSES * now.abs()) {
             return;
@@ -143,7 +132,8 @@ impl Driving {
         };
     }
 
-    /// Updates the largest steps along the wall if the vehicle or its heads' steps have changed enough.
+    /// Updates the largest steps along the wall if the vehicle's place or the heads' angular step has changed
+    /// enough.
     fn note_steps(&mut self, situation: &Situation, place_m: Yz, profile: &Profile) {
         let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
         if step_rad <= 0.0 {
@@ -188,7 +178,7 @@ impl Driving {
         let healthy_at_plan_s = gap_s(&phasing.at(plan_mps));
         let all_turn = turning == situation.configured && self.lacking.all_turn(at);
         // At a speed other than the planned one, the evenness of passes doesn't show whether the heads are in
-        // phase. The times at the planned speed are therefore compared.
+        // phase. Therefore the times between passes at the planned speed are compared.
         if all_turn && gap_at_plan_s <= IN_STEP * gap_s(&scheduled_at_plan).min(healthy_at_plan_s) {
             self.lacking.stalled = HeadSet::default();
         }
@@ -236,7 +226,7 @@ fn steps_by_wait_m(profile: &Profile, place_m: Yz, step_rad: f64, sectors: usize
     steps_m
 }
 
-/// Largest distance along the hull between turning heads, m.
+/// Distance along the hull between the foremost and the rearmost turning head, m.
 fn apart_m(situation: &Situation) -> f64 {
     let x_m = || situation.heads.iter().flatten().map(|motion| motion.mount.position.x());
     (x_m().fold(f64::NEG_INFINITY, f64::max) - x_m().fold(f64::INFINITY, f64::min)).max(0.0)
@@ -245,14 +235,17 @@ fn apart_m(situation: &Situation) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use headrace_coverage::OtherSettings;
     use headrace_geometry::frames::{Mount, Point3, Pose, Rot};
     use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::Target;
     use headrace_sampling::head::MAX_HEADS;
     use headrace_sampling::losses::LossRate;
 
     const STEP_RAD: f64 = 0.9 * math::TAU / 360.0;
 
-    /// Four heads side by side that turn in 8 s, at these angles, on a vehicle in the centre of a pipe.
+    /// Situation of four heads side by side that turn in 8 s, with these angles, on a vehicle in the centre
+    /// of a pipe.
     fn situation(angles_deg: [f64; 4], speed_mps: f64, profile: &Profile) -> Situation {
         let mut heads = [None; MAX_HEADS];
         for (slot, angle_deg) in heads.iter_mut().zip(angles_deg) {
@@ -278,25 +271,30 @@ mod tests {
         }
     }
 
+    fn plan(planned_speed_mps: f64) -> Plan {
+        let (target, layout) = (Target::new(0.5), HeadLayout::PhaseShift);
+        Plan { target, layout, planned_speed_mps, other: OtherSettings::default() }
+    }
+
     const EVEN: [f64; 4] = [0.0, 90.0, 180.0, 270.0];
 
     fn noted(driving: &mut Driving, angles_deg: [f64; 4], speed_mps: f64, planned_mps: f64) -> Drive {
         let profile = shapes::circle(3.0).unwrap();
-        let plan = Plan { planned_mps, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
+        let plan = plan(planned_mps);
         let situation = situation(angles_deg, speed_mps, &profile);
         driving.note(MonoNs(60_000_000_000), [&situation, &situation], &profile, &plan);
         driving.now
     }
 
-    /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap is half
-    /// a turn.
+    /// Four heads are a quarter of a turn apart and turn in 8 s. Without one of them, the longest gap between
+    /// the others is half a turn.
     #[test]
-    fn stalled_head_counts_as_stalled_until_back_in_phase() {
+    fn stalled_head_counts_as_stalled_until_it_is_back_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
         driving.lacking.stalled = HeadSet::default().with(1);
-        // The head is a sixteenth of a turn late.
+        // The restored head is a sixteenth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
         assert!(near(late.even_gap_s, 2.0), "if they were evenly spread");
@@ -310,8 +308,7 @@ mod tests {
     #[test]
     fn time_between_passes_is_kept_while_all_heads_are_stalled() {
         let profile = shapes::circle(3.0).unwrap();
-        let plan =
-            Plan { planned_mps: 0.2, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
+        let plan = plan(0.2);
         let mut driving = Driving::default();
         let before = noted(&mut driving, EVEN, 0.2, 0.2);
         let healthy = situation(EVEN, 0.2, &profile);
@@ -329,7 +326,7 @@ mod tests {
         let most_mps = along_m / 2.02;
         let fits_mps = |planned_mps: f64| {
             let mut driving = Driving::default();
-            // The steps are known only after the first update.
+            // The steps along the wall are known only after the first update.
             noted(&mut driving, EVEN, -0.1, planned_mps);
             let now = noted(&mut driving, EVEN, -0.1, planned_mps);
             assert!((now.fits_along_m - along_m).abs() < 1e-6 && (now.speed_mps - 0.1).abs() < 1e-12);
@@ -347,7 +344,7 @@ mod tests {
     /// The place is 1 m below the centre of a pipe of 3 m radius. Per radian, a step measures 2 m along the
     /// floor, 4 m along the ceiling and 3 m at the sides.
     #[test]
-    fn largest_step_is_found_for_each_class_of_time_between_passes() {
+    fn largest_step_is_found_for_each_class_of_waiting_time_until_the_next_pass() {
         const SMALL_RAD: f64 = 1e-4;
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -361,7 +358,8 @@ mod tests {
             near(all[0], 4.0) && all[1..].iter().all(|step| step.abs() <= 0.0),
             "all waits must be equal: {all:?}"
         );
-        // Two sectors end at the floor and at the ceiling. The middle quarter of each is at a side.
+        // Two sectors end at the floor and at the ceiling. The middle quarter of each sector is at a side of
+        // the pipe.
         let below = of([0.0, -1.0], 2);
         assert!(near(below[0], 4.0) && (3.0..3.5).contains(&below[3]), "{below:?}");
         assert!(below.windows(2).all(|pair| pair[0] > pair[1]), "decreasing from the ceiling on: {below:?}");
@@ -379,7 +377,7 @@ mod tests {
 
     /// The farther the vehicle is from the centre, the longer is a step on the opposite wall.
     #[test]
-    fn steps_are_recomputed_after_5_cm_sideways_or_a_new_head_step() {
+    fn steps_are_recomputed_after_a_5_cm_move_sideways_or_a_changed_head_step() {
         let profile = shapes::circle(3.0).unwrap();
         let mut driving = Driving::default();
         let mut t_y_m = |aside_m: f64, finer: f64| {

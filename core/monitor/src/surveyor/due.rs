@@ -7,7 +7,7 @@ use crate::resources::Coverage;
 use headrace_coverage::{HeadReach, Request};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Interval between checks of the sections around a vehicle that stays in one place.
+/// Interval between checks of the sections around a vehicle that has not moved on.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 
 /// Once a second, requests judging of the sections around the vehicle.
@@ -44,7 +44,7 @@ pub(super) fn suspect(
     }
 }
 
-/// Updates the frontier, and requests judging of the sections that are due.
+/// Updates the chainages where samples may still land, and requests judging of the sections that are due.
 pub(super) fn note_frontier(
     coverage: &mut Coverage,
     heads: impl Iterator<Item = HeadReach> + Clone,

@@ -1,10 +1,10 @@
-//! Heads, as the systems of a walk see them.
+//! Query for the heads, shared by the systems that process placed pings.
 
 use bevy_ecs::prelude::Query;
 
 use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
 
-/// A head: number, mount, hidden angles, sweep and reach.
+/// Components of a head: number, mount, hidden angles, sweep and reach.
 pub(super) type Heads<'w, 's> = Query<'w, 's, HeadParts>;
 type HeadParts = (
     &'static Head,

@@ -5,10 +5,11 @@ use bevy_ecs::prelude::{Res, ResMut};
 use super::survey::{Cursor, OutputRefs, Outputs, Requests};
 use crate::alert_list::RunInput;
 use crate::messages::Notice;
-use crate::observations::ObservedKind;
+use crate::observations::{ObservedKind, Occurrence};
 use crate::resources::{Coverage, Digests, Finder, TunnelDesign};
-use crate::result_stream::{RecordKind, ResultStream};
-use headrace_coverage::{Judging, Request, RunChange, RunId, Section, Sections};
+use crate::result_stream::RecordKind;
+use crate::section_judgement;
+use headrace_coverage::{Judging, Request, RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::reading::SourceId;
@@ -55,46 +56,21 @@ fn judge_one(
         debug_assert!(false, "section {} has changed, but doesn't exist", request.section);
         return;
     };
-    digest(&mut digests.judgements, request, change as u64, section);
+    section_judgement::record(&mut digests.judgements, request.at, request.section, change, section);
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
-        let x_m = sections.bounds_m(request.section).0;
+        let occurrence = Occurrence { x_m: sections.bounds_m(request.section).0, off_m };
         let kind = ObservedKind::ProfileContradicted;
-        if observations.note(kind, request.at, x_m, off_m) {
-            digest_observation(digests, kind, None, request.at, (x_m, off_m));
+        if observations.note(kind, request.at, occurrence) {
+            digest_observation(digests, kind, None, request.at, occurrence);
         }
     }
 }
 
-fn digest(judgements: &mut ResultStream, request: &Request, change: u64, section: &Section) {
-    judgements
-        .record(RecordKind::Section)
-        .integer(request.at.0)
-        .integer(request.section as u64)
-        .integer(change)
-        .integer(section.verdict as u64)
-        .number(section.hole.map_or(0.0, |hole| hole.diameter_m))
-        .number(section.hole_sd_m)
-        .integer(section.evidence.map_or(u64::MAX, |evidence| evidence.cause as u64))
-        .number(section.hole.map_or(0.0, |hole| hole.x_m))
-        .number(section.hole.map_or(0.0, |hole| hole.arc_m));
-    if let Some(evidence) = section.evidence {
-        judgements
-            .number(evidence.speed_mps)
-            .number(evidence.t_y_m)
-            .number(evidence.middle_t_y_m)
-            .number(evidence.missing_share)
-            .number(evidence.swing_m)
-            .integer(u64::from(evidence.silent_heads.bits()))
-            .integer(u64::from(evidence.causes.bits()))
-            .number(evidence.with_losses_mps);
-    }
-}
-
-/// Records changed runs for the list of alerts.
+/// Records changed runs of flagged sections for the list of alerts.
 ///
-/// Cleared runs come last. The alert of a cleared run passes to the runs that remain of it, so the list must
-/// have these runs first.
+/// Cleared runs come last. The runs that remain of a cleared run take over its alert, so the list must have
+/// these runs first.
 fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs: &mut Vec<RunInput>) {
     for cleared in [false, true] {
         for notice in notices {
@@ -106,16 +82,16 @@ fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs:
     }
 }
 
-/// Adds an observation to the digest: its chainage, its deviation, m, and its source if it names one.
+/// Adds an observation to the digest, with its source if it names one.
 pub(super) fn digest_observation(
     digests: &mut Digests,
     kind: ObservedKind,
     source: Option<SourceId>,
     at: MonoNs,
-    at_off_m: (f64, f64),
+    occurrence: Occurrence,
 ) {
     let record = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
-    record.number(at_off_m.0).number(at_off_m.1);
+    record.number(occurrence.x_m).number(occurrence.off_m);
     if let Some(source) = source {
         record.integer(u64::from(source.0));
     }
@@ -130,9 +106,9 @@ mod tests {
 
     const AT: MonoNs = MonoNs(7_000_000_000);
 
-    /// Judges a section without samples, at 20 m of distance from places where samples may still land.
+    /// Judges a test section without samples that lies 20 m from the places where samples may still land.
     ///
-    /// Some heads haven't passed `not_passed_m`, m.
+    /// Up to chainage `not_passed_m`, m, some heads have not been in the tunnel.
     fn judged(coverage: &mut Coverage, section: i64, not_passed_m: f64) -> (Vec<Notice>, Vec<RunInput>) {
         let request = Request {
             section,
@@ -156,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn fail_is_published_with_its_run_and_unsure_section_with_its_stretch() {
+    fn fail_publishes_its_run_and_unsure_section_publishes_its_stretch() {
         let mut coverage = coverage();
         let (notices, runs) = judged(&mut coverage, 40, -20.0);
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
@@ -164,8 +140,8 @@ mod tests {
         assert_eq!((notices, coverage.unsure), (vec![run, section], None));
         let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
         assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
-        // If not all heads have passed, there is no verdict. Neighbouring sections form one stretch, and a
-        // distant section another.
+        // A section gets no verdict if some heads have not been in it. Neighbouring sections without a
+        // verdict form one stretch, and a distant section forms another.
         for (section, from, to, sections) in [(20, 20, 21, 1), (21, 20, 22, 2), (60, 60, 61, 1)] {
             let (notices, runs) = judged(&mut coverage, section, 20.0);
             assert_eq!((notices.len(), runs.len()), (1, 0));
@@ -175,10 +151,9 @@ mod tests {
         }
     }
 
-    /// The alert of a cleared run passes to the runs that remain of it, so the list must have these runs
-    /// first.
+    /// The runs that remain of a cleared run take over its alert, so the list must have these runs first.
     #[test]
-    fn cleared_runs_come_last_and_runs_without_room_are_dropped() {
+    fn cleared_runs_come_last_and_runs_beyond_the_capacity_are_dropped() {
         let mut coverage = coverage();
         for section in [20, 40, 60] {
             judged(&mut coverage, section, -20.0);

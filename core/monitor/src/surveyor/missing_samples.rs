@@ -8,31 +8,32 @@
 use serde::{Deserialize, Serialize};
 
 use super::heads::Heads;
-use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
+use crate::messages::{Hidden, Outcome, PlacedPing};
 use crate::resources::Coverage;
 use headrace_coverage::{Cause, Causes, Drive, Loss, MissingSample, MissingSamples};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_geometry::tunnel::Profile;
+use headrace_geometry::tunnel::{Profile, WallPoint};
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 
 /// Time without a ping at a new angle after which a head's samples count as missing.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);
-/// Number of latest pings at hidden angles that decide on occlusion, and the share of lost pings that
-/// confirms it.
+/// Number of latest pings at presumably occluded angles that decide on occlusion, and the share of lost pings
+/// that confirms it.
 const HIDDEN_PINGS: u16 = 600;
 const HIDDEN_SHARE: f64 = 0.7;
-/// Capacity for pings without a fix. It suffices for over two minutes of four heads.
+/// Maximum number of pings without a fix that are kept. It suffices for over two minutes of four heads.
 const ROOM: usize = 1 << 15;
 
-/// A head as last seen turning.
+/// State of a head as last seen turning.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Turning {
-    /// Time of an update, and the head's angle, radians, rate, rad/s, and step, radians, at that time.
+    /// Time of the last update at which the head turned, and the head's angle, radians, rate, rad/s, and
+    /// step, radians, at that time.
     seen: Option<(MonoNs, f64, f64, f64)>,
     /// Time of the last ping, and of the last ping at a new angle.
     pinged: Option<MonoNs>,
@@ -41,7 +42,7 @@ struct Turning {
     noted: Option<MonoNs>,
     /// Longest range at the head's range setting, m.
     longest_m: f64,
-    /// Latest pings at angles that the vehicle is assumed to hide: number without a return, and total.
+    /// Latest pings at angles that the vehicle is assumed to occlude: number without a return, and total.
     hidden: [u16; 2],
     /// Whether the last simulated ping was lost.
     would_lose: bool,
@@ -60,7 +61,7 @@ impl Turning {
 
     /// Decides at random whether a simulated ping is lost, at the head's loss rate.
     ///
-    /// The time of the ping gives the random number.
+    /// The random number depends only on the time of the ping.
     fn would_lose(&mut self, when: MonoNs, rate: LossRate) -> bool {
         let LossRate { share, after_lost } = rate;
         // The loss rate after a return is unknown if all pings were lost, or if every loss was followed by
@@ -72,14 +73,14 @@ impl Turning {
         self.would_lose
     }
 
-    /// Whether the vehicle hides the angles that are assumed to be hidden.
+    /// Whether the vehicle really occludes the angles at which occlusion is assumed.
     fn is_hidden(&self) -> bool {
         let [lost, all] = self.hidden;
         HIDDEN_SHARE * f64::from(all) <= f64::from(lost)
     }
 }
 
-/// A ping without a fix, either real or simulated.
+/// A ping without a fix, either real or simulated for a silent head.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Away {
     at: MonoNs,
@@ -91,14 +92,14 @@ struct Away {
     is_lost: bool,
 }
 
-/// Data of earlier updates and pings.
+/// Finder of missing samples, with data of earlier updates and pings.
 #[derive(Debug, Clone)]
 pub(crate) struct MissingSampleFinder {
     heads: [Turning; MAX_HEADS],
-    /// Last update with a fix.
+    /// Time and pose of the last update with a fix.
     pose: Option<(MonoNs, Pose)>,
     away: Vec<Away>,
-    /// Whether pings were dropped for lack of room.
+    /// Whether pings without a fix were dropped for lack of room.
     forgot: bool,
     /// Heads that have stalled and have not been in phase since.
     pub(super) stalled: HeadSet,
@@ -109,7 +110,7 @@ pub(crate) struct MissingSampleFinder {
 stateful!(MissingSampleFinder { state: heads, pose, forgot, stalled, deaf; lists: away; });
 
 impl Default for MissingSampleFinder {
-    /// Allocates: at startup, all memory of the finder.
+    /// Creates a finder of missing samples. Allocates: at startup, all memory of the finder.
     fn default() -> Self {
         Self {
             heads: [Turning::default(); MAX_HEADS],
@@ -123,13 +124,14 @@ impl Default for MissingSampleFinder {
 }
 
 impl MissingSampleFinder {
-    /// Whether every head that pings does so at new angles.
+    /// Whether every head that pings also turns, so that each ping is at a new angle.
     pub(super) fn all_turn(&self, at: MonoNs) -> bool {
         let turns = |moved: MonoNs| at.since(moved).0 <= LACKING_AFTER.0;
         self.heads.iter().filter_map(|head| head.moved).all(turns)
     }
 
-    /// The situation as if no head were silent or stalled. Such heads turn on at their last rate.
+    /// The situation as if no head were silent or stalled. Such heads are assumed to continue turning at
+    /// their last rate.
     pub(super) fn healthy(&mut self, at: MonoNs, situation: &Situation, heads: &Heads<'_, '_>) -> Situation {
         let stalled = self.stalled;
         let mut healthy = *situation;
@@ -169,9 +171,10 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
     head.moved = Some(ping.valid_at);
     match ping.outcome {
         Outcome::Sample { .. } => head.note_hidden(ping.hidden == Hidden::Yes, false),
-        Outcome::Lost(loss, Some(Aim { x_m, arc_m })) => {
+        Outcome::Lost(loss, Some(WallPoint { x_m, arc_m })) => {
             head.note_hidden(loss == Loss::Occluded, true);
-            // If other pings at such angles detect the wall, a lost ping there is a missing return.
+            // If other pings at angles assumed to be occluded detect the wall, a lost ping there is a missing
+            // return.
             let heard = loss == Loss::Occluded && !head.is_hidden();
             let cause = match loss {
                 Loss::Missing if deaf.has(ping.head) => Cause::HeadSilent,
@@ -194,7 +197,7 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
     }
 }
 
-/// The form in which a head's number is stored.
+/// The integer type in which a head's number is stored.
 pub(super) fn number_of(head: usize) -> u8 {
     u8::try_from(head).unwrap_or(u8::MAX)
 }
@@ -237,7 +240,7 @@ pub(super) fn note_beat(
     let speed_mps = situation.speed_mps;
     for (number, mounted, hidden, ..) in heads {
         let Some(head) = turning.get_mut(number.0) else { continue };
-        // Until a stalled head is in phase again, its samples are missing at the place that it should have.
+        // Until a stalled head is in phase again, its scheduled angle decides where its samples are missing.
         let out_of_step = stalled.has(number.0);
         let late = |moved: &MonoNs| out_of_step || at.since(*moved).0 > LACKING_AFTER.0;
         let Some(moved) = head.moved.filter(late) else { continue };
@@ -273,7 +276,7 @@ pub(super) fn note_beat(
                 let placing = Placing { mount: &mounted.info.mount, turning: head, profile, hidden: &hides };
                 placing.lack(&pose, &ping, now, coverage);
             } else if !keep(away, Away { why: ping.why.with(Cause::PositionLost), ..ping }) {
-                // There is no room for the remaining pings of this head either, so they are skipped.
+                // There is no room for the remaining pings of this head, so they are skipped.
                 *forgot = true;
                 when = when + DurNs((self::owed(when, at, period) - 1).saturating_mul(period.0));
             }
@@ -337,7 +340,7 @@ fn unit_of(number: u64) -> f64 {
     ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Keeps a ping without a fix. Returns false if there is no room.
+/// Keeps a ping without a fix until the next fix. Returns false if there is no room.
 fn keep(away: &mut Vec<Away>, ping: Away) -> bool {
     let has_room = away.len() < away.capacity();
     if has_room {
@@ -350,7 +353,7 @@ fn hides(heads: &Heads<'_, '_>, head: usize, angle_rad: f64) -> bool {
     heads.iter().any(|(number, _, hidden, ..)| number.0 == head && hidden.hides(angle_rad))
 }
 
-/// A straight line between two fixes.
+/// Straight-line motion between two fixes.
 struct Way {
     from: (MonoNs, Pose),
     to: (MonoNs, Pose),
@@ -372,7 +375,7 @@ impl Way {
     }
 }
 
-/// Context for placing a head's simulated pings.
+/// Context for finding the wall points of a head's real or simulated pings.
 struct Placing<'a> {
     mount: &'a Mount,
     turning: &'a Turning,
@@ -381,8 +384,8 @@ struct Placing<'a> {
 }
 
 impl Placing<'_> {
-    /// Records a missing sample at the aim of a real or simulated ping, and the driving figures at this
-    /// place.
+    /// Records a missing sample at the wall point at which a ping was aimed, and the driving figures in the
+    /// section of that point.
     fn lack(&self, pose: &Pose, ping: &Away, drive: Drive, coverage: &mut Coverage) {
         let origin = pose.place(self.mount.position);
         let beam = pose.attitude * (self.mount.rotation * head_direction(ping.angle_rad));
@@ -394,11 +397,12 @@ impl Placing<'_> {
             section.passage.drive = section.passage.drive.or_worse(drive);
         }
         let mut why = ping.why;
-        // A real ping without a return also gets a further cause here. A simulated one already has its
+        // A real ping without a return gets a further cause here. A simulated ping already has all its
         // causes.
         let made = why == Causes::of(Cause::PositionLost);
         if ping.is_lost {
-            // At wall that the head could not have detected anyway, a ping is not lost by chance.
+            // If the head could not have detected the wall at this point anyway, its loss is not due to
+            // chance.
             let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
             let is_far = wall.range_m > self.turning.longest_m;
             let is_hidden = self.turning.is_hidden() && (self.hidden)(ping.angle_rad);

@@ -1,4 +1,4 @@
-//! Notes how the vehicle and its heads pass each section.
+//! Records how the vehicle and its heads pass each section.
 
 use crate::entities::HeadFrontier;
 use crate::messages::{Outcome, PlacedPing};
@@ -6,11 +6,11 @@ use crate::resources::Coverage;
 use headrace_coverage::{Drive, HeadReach, Loss, PassError, Visit};
 use headrace_geometry::tunnel::Profile;
 
-/// A ping is no evidence of the speed if this many standard deviations of its error relative to the previous
-/// pass reach the target.
+/// Limit for using the speed at a ping as evidence of a cause. The speed isn't used if this many standard
+/// deviations of its position error relative to the previous pass reach the target.
 const ADRIFT_SD: f64 = 2.0;
 
-/// Adds a ping to the passage of the section that the ping's head is in.
+/// Adds a ping to the passage record of the section that the ping's head is in.
 pub(super) fn note_passage(
     coverage: &mut Coverage,
     frontier: &HeadFrontier,
@@ -21,7 +21,7 @@ pub(super) fn note_passage(
     let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let turns = coverage.frontier.turns();
-    let target_m = coverage.sections.target_m();
+    let target_m = coverage.sections.target().max_hole_m;
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
     passage.pings += 1;
@@ -97,10 +97,10 @@ mod tests {
         assert_eq!(coverage.sections.get(28).unwrap().passage, elsewhere);
     }
 
-    /// A ping is no evidence of the speed if two standard deviations against the previous pass reach the
-    /// target. The error of a hole is 1.2 times that of a pass.
+    /// A ping is no evidence of the speed if two standard deviations of its position relative to the previous
+    /// pass reach the target. The error of a hole is 1.2 times that of a pass.
     #[test]
-    fn ping_with_an_uncertain_position_does_not_count_for_the_speed() {
+    fn ping_with_an_uncertain_position_is_no_evidence_of_the_speed() {
         let profile = pipe();
         let noted = |sd_m: f64| {
             let mut coverage = coverage();

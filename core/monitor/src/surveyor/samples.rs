@@ -7,6 +7,7 @@ use headrace_coverage::hole::FARTHEST_M;
 use headrace_coverage::{StoreError, Visit, WallSample};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
+use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
 /// Stores a sample, and adds its spacings to its section.
@@ -26,13 +27,14 @@ pub(super) fn note_sample(
         }
         return Ok(());
     };
-    if !coverage.store.covers(point.x(), arc_m) {
+    let at = WallPoint { x_m: point.x(), arc_m };
+    if !coverage.store.covers(at) {
         *slot = None;
         return Err(StoreError::Outside);
     }
     let before = *slot;
     let step_from = before.filter(|last| last.unbroken && ping.single_step);
-    let t_x_m = coverage.store.nearest_pass_m(point.x(), arc_m, FARTHEST_M);
+    let t_x_m = coverage.store.nearest_pass_m(at, FARTHEST_M);
     let perimeter_m = coverage.store.perimeter_m();
     let step_m = step_from
         .map(|last| [point.x() - last.point.x(), math::wrap_signed(arc_m - last.arc_m, perimeter_m)]);
@@ -43,7 +45,7 @@ pub(super) fn note_sample(
     let kept = coverage.store.insert(sample);
     *slot = kept.ok().map(|_| LastSample { point, arc_m, unbroken: true });
     kept?;
-    coverage.soundings.add(point.x(), arc_m);
+    coverage.soundings.add(at);
     if let Some(visit) = visit {
         coverage.sections.touch(point.x(), &visit, &tunnel.profile);
     }
@@ -72,7 +74,8 @@ mod tests {
     use super::*;
     use crate::fixtures::{coverage, heard, pinged, tunnel};
 
-    /// Pings at intervals of a tenth of a radian: 0.3 m along the wall, and a centimetre along the tunnel.
+    /// Test pings at intervals of a tenth of a radian: 0.3 m along the wall, and a centimetre along the
+    /// tunnel.
     fn at(step: u32) -> PlacedPing {
         let step = f64::from(step);
         heard(5.05 + 0.01 * step, 0.1 * step, 3.0)
@@ -88,7 +91,7 @@ mod tests {
             // Centres of the steps. A pass is a single step that crosses an arc length.
             let passes = [0.5, 1.5, 2.5, 3.5].map(|middle| {
                 let Outcome::Sample { arc_m, .. } = heard(5.1, 0.1 * middle, 3.0).outcome else { panic!() };
-                coverage.store.nearest_pass_m(5.1, arc_m, 1.0).is_some()
+                coverage.store.nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 1.0).is_some()
             });
             (samples, steps, t_y_m, passes)
         };
@@ -104,14 +107,15 @@ mod tests {
         let (samples, steps, t_y_m, passes) = note(&at(3));
         assert_eq!((samples, steps, passes), (3, 2, [true, false, false, false]));
         assert!((t_y_m - math::hypot(6.0 * math::sin(0.1), 0.02)).abs() < 1e-9, "{t_y_m}");
-        // A step that isn't single, then the first sample of a new sweep, which has no previous sample.
+        // The first sample ends a step that isn't single. The second one begins a new sweep, so it has no
+        // previous sample.
         let (samples, steps, _, passes) = note(&PlacedPing { single_step: false, ..at(4) });
         assert_eq!((samples, steps, passes), (4, 3, [true, false, false, false]));
         let (samples, steps, ..) = note(&PlacedPing { new_sweep: true, ..at(5) });
         assert_eq!((samples, steps), (5, 3));
     }
 
-    /// The sample comes a turn later, 0.2 m further on, half way between two samples of the first turn.
+    /// The new sample comes a turn later, 0.2 m further on, half way between two samples of the first turn.
     #[test]
     fn distance_to_the_previous_pass_is_along_the_tunnel() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
@@ -119,13 +123,14 @@ mod tests {
             note_sample(&mut coverage, &mut sweep, &tunnel, &ping).unwrap();
         }
         let section = coverage.sections.get(20).unwrap();
-        // There, the first turn's pass was at 5.055 m. Each sample of that turn ends a step.
+        // At the new sample's arc length, the first turn's pass was at 5.055 m. Each sample of that turn ends
+        // a step.
         assert!((section.t_x_m.max - 0.18).abs() < 1e-9, "{:?}", section.t_x_m);
         assert_eq!((section.samples, section.t_y_m.count), (4, 2));
     }
 
     #[test]
-    fn sample_beyond_the_store_breaks_the_sweep() {
+    fn sample_outside_the_store_extent_interrupts_the_sweep() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         note_sample(&mut coverage, &mut sweep, &tunnel, &at(0)).unwrap();
         let outside = note_sample(&mut coverage, &mut sweep, &tunnel, &heard(33.0, 0.1, 3.0));

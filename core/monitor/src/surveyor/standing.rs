@@ -15,14 +15,14 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Time that a pilot needs to slow down before the vehicle reaches wall that hasn't passed, seconds.
+/// Time that the pilot needs to slow down before the vehicle reaches wall that has not passed yet, seconds.
 const SOON_S: f64 = 5.0;
 /// Speed at or below which the vehicle counts as going back, m/s.
 const ASTERN_MPS: f64 = -0.02;
-/// Time for which an observation holds after its latest occurrence, if occurrences have no duration.
+/// Time for which an observation without a duration holds after its latest occurrence.
 const HOLDS: DurNs = DurNs(10_000_000_000);
 
-/// A head: number, source and reach.
+/// Components of a head: number, source and reach.
 type Heads<'w, 's> = Query<'w, 's, (&'static Head, &'static Mounted, &'static HeadFrontier)>;
 
 pub(super) fn report_standing(
@@ -60,7 +60,8 @@ pub(super) fn report_standing(
     outputs.found.standings.push(standing);
 }
 
-/// Observations that hold. `is_distrusted` tells whether a head is distrusted for the reason of a kind.
+/// Observations that hold now. `is_distrusted` tells whether a head is distrusted for the reason that a kind
+/// of observation names.
 fn active(
     at: MonoNs,
     observations: &Observations,
@@ -85,20 +86,21 @@ fn active(
     active
 }
 
-/// Whether all wall that the heads see now and in the next seconds has passed, so that any speed is fine.
+/// Whether every part of the wall visible to the heads now and in the next seconds has the verdict pass, so
+/// that any speed is fine.
 fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) -> bool {
     let Coverage { sections, .. } = coverage;
     let reaches = heads.iter().map(|(.., frontier)| frontier.0.map(|reach| reach.latest()));
     let all = reaches.reduce(|all, reach| Some(all?.with(reach?))).flatten();
     let Some(all) = all.filter(|_| situation.pose.is_some()) else { return false };
-    let (ahead_m, around_m) = (SOON_S * situation.speed_mps, sections.target_m() / 2.0);
+    let (ahead_m, around_m) = (SOON_S * situation.speed_mps, sections.target().max_hole_m / 2.0);
     let from_m = all.from_m.min(all.from_m + ahead_m) - around_m;
     let to_m = all.to_m.max(all.to_m + ahead_m) + around_m;
     let mut indices = sections.index_of(from_m)..=sections.index_of(to_m);
     indices.all(|index| sections.get(index).is_some_and(|section| section.verdict == Verdict::Pass))
 }
 
-/// Place where a vehicle that goes back must turn round for a missed stretch, m.
+/// Chainage at which a vehicle that goes back must turn round to pass a missed stretch again, m.
 ///
 /// The stretch is the nearest one that isn't ahead of the vehicle.
 fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
@@ -112,12 +114,13 @@ fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::fixtures::{coverage, mount, pipe, situation};
+    use crate::observations::Occurrence;
     use bevy_ecs::system::SystemState;
     use bevy_ecs::world::World;
     use headrace_coverage::{HeadReach, HoleFinder, Judging, MissingSamples, Reach, Request};
     use headrace_sensor::device::{SensorInfo, SensorKind};
 
-    /// Sections for a test. The ones with these indices have failed.
+    /// Test sections of which those with the indices in `failed` have failed.
     fn missed(failed: &[i64]) -> Sections {
         let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
         let mut judging = Judging {
@@ -143,8 +146,8 @@ mod tests {
         sections
     }
 
-    /// The place is half a metre before the missed stretch that begins at 5 m, or before the one at 10 m.
-    /// Half a metre is the target.
+    /// The turning point is half a metre before the missed stretch that begins at 5 m, or before the one at
+    /// 10 m. Half a metre is the target.
     #[test]
     fn turning_point_on_the_way_back_is_before_the_nearest_missed_stretch() {
         let turns_m = |failed: &[i64], speed_mps: f64, x_m: Option<f64>| {
@@ -167,7 +170,7 @@ mod tests {
     /// At 0.4 m/s, 2 m are covered in five seconds. The checked wall extends from a quarter of a metre behind
     /// the rear head to a quarter of a metre ahead of the front head's future place.
     #[test]
-    fn condition_is_passed_only_if_visible_and_upcoming_wall_has_passed() {
+    fn passed_condition_requires_that_all_wall_in_view_and_ahead_passes() {
         let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
             let mut coverage = coverage();
             for index in between {
@@ -184,8 +187,8 @@ mod tests {
             let heads = state.get_mut(&mut world).unwrap();
             is_passed(&coverage, &heads, &Situation { speed_mps, ..situation(x_m) })
         };
-        // Inwards: from 4.75 m, section 19, to 8.25 m, section 33. Going back: from 2.75 m, section 11, to
-        // 6.25 m, section 25.
+        // Checked wall on the way inwards: from 4.75 m, section 19, to 8.25 m, section 33. Going back: from
+        // 2.75 m, section 11, to 6.25 m, section 25.
         assert!(passed(19..34, 0.4, Some(5.5)) && passed(11..26, -0.4, Some(5.5)));
         assert!(passed(19..26, 0.0, Some(5.5)));
         for between in [20..34, 19..33, 19..26] {
@@ -201,7 +204,7 @@ mod tests {
         let kinds = [ObservedKind::HeadScattered, ObservedKind::HeadConstant, ObservedKind::HeadOutvoted];
         let (mut observations, at) = (Observations::default(), MonoNs(5));
         for (source, kind) in (0..3).flat_map(|source| kinds.map(|kind| (SourceId(source), kind))) {
-            observations.note_of(Some(source), kind, at, 1.0, 0.5);
+            observations.note_of(Some(source), kind, at, Occurrence { x_m: 1.0, off_m: 0.5 });
         }
         let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
         for (head, kind) in (0..3).zip(kinds) {

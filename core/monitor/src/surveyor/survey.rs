@@ -1,4 +1,4 @@
-//! State that a walk over the pings changes, and its findings.
+//! State that changes while the surveyor processes the placed pings of a tick, and the results.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
@@ -8,20 +8,22 @@ use crate::alert_list::RunInput;
 use crate::merge::MAX_TICK_PACKETS;
 use crate::messages::{Notice, Standing};
 use crate::observations::Observations;
-use crate::resources::{Coverage, Digests, Tally, Target};
+use crate::resources::{Coverage, Digests, Plan, Tally};
 use headrace_coverage::Request;
 
-/// Maximum number of runs that change when one section is judged: its own run and two others.
+/// Maximum number of runs of flagged sections that change when one section is judged: its own run and two
+/// neighbours.
 const RUNS_EACH: usize = 3;
-/// Notices per judged section: one for the section, and one per run.
+/// Notices per judged section: one for the section, and one for each changed run.
 const NOTICES_EACH: usize = 1 + RUNS_EACH;
 
-/// Place of the walk among the items of a tick.
+/// Position of the surveyor in the tick's list of placed pings and updates.
 #[derive(Debug, Clone, Copy, Default, Resource)]
 pub(super) struct Cursor {
-    /// Index of the next item.
+    /// Index of the next ping or update to process.
     pub(super) next: usize,
-    /// Index of the reading at which the walk has stopped, and whether it has stopped at an update before it.
+    /// Index of the reading at which processing has stopped, and whether it stopped at an update before that
+    /// reading.
     pub(super) stop: (usize, bool),
 }
 
@@ -29,14 +31,14 @@ pub(super) struct Cursor {
 #[derive(Debug, Resource)]
 pub(super) struct Requests(pub(super) Vec<Request>);
 
-/// Findings of the surveyor in a tick.
+/// Results of the surveyor in a tick.
 #[derive(Debug, Resource)]
 pub struct Found {
-    /// Metres by verdict and observations that hold at each update, in order.
+    /// Metres by verdict and observations that hold, at each update, in order.
     pub standings: Vec<Standing>,
-    /// Changed runs, in order.
+    /// Changed runs of flagged sections, in order.
     pub(crate) runs: Vec<RunInput>,
-    /// Changed sections and runs, in order.
+    /// Notices of changed sections and runs, in order.
     pub notices: Vec<Notice>,
 }
 
@@ -59,7 +61,7 @@ impl Found {
     }
 }
 
-/// The wall, and all else that a walk over the pings changes.
+/// The wall's coverage, and all other state that changes while placed pings are processed.
 #[derive(SystemParam)]
 pub(super) struct Survey<'w> {
     pub(super) coverage: ResMut<'w, Coverage>,
@@ -67,10 +69,10 @@ pub(super) struct Survey<'w> {
     pub(super) requests: ResMut<'w, Requests>,
     pub(super) tally: ResMut<'w, Tally>,
     pub(super) cursor: ResMut<'w, Cursor>,
-    pub(super) target: Res<'w, Target>,
+    pub(super) plan: Res<'w, Plan>,
 }
 
-/// Destinations of results.
+/// Destinations of the surveyor's results.
 #[derive(SystemParam)]
 pub(super) struct Outputs<'w> {
     pub(super) found: ResMut<'w, Found>,
@@ -78,7 +80,7 @@ pub(super) struct Outputs<'w> {
     pub(super) observations: ResMut<'w, Observations>,
 }
 
-/// References to [`Outputs`].
+/// Mutable references to the fields of [`Outputs`].
 pub(super) struct OutputRefs<'a> {
     pub(super) notices: &'a mut Vec<Notice>,
     pub(super) runs: &'a mut Vec<RunInput>,

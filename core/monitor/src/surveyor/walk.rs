@@ -1,10 +1,10 @@
-//! Walks over the placed items of a tick, up to the next stop.
+//! Processes the placed pings and updates of a tick, up to the next stop: an update, or a ping that makes
+//! sections due for judging.
 
 use bevy_ecs::prelude::Res;
 use bevy_ecs::system::SystemParam;
 
 use super::classify::{Class, Classified};
-use super::driving::Plan;
 use super::heads::Heads;
 use super::survey::{Outputs, Survey};
 use super::wall::{self, WallContext};
@@ -21,7 +21,7 @@ pub(super) struct Site<'w> {
     entities: Res<'w, HeadEntities>,
 }
 
-/// Processes items until sections are due for judging, or until an update.
+/// Processes pings until sections are due for judging, or until an update has been processed.
 pub(super) fn walk(
     placed: Res<'_, PlacedTick>,
     classified: Res<'_, Classified>,
@@ -57,16 +57,10 @@ fn note_update(
     outputs: &mut Outputs<'_>,
 ) {
     navigation_doubts::note(*at, situation, doubts, &mut outputs.refs());
-    let Survey { coverage, driving, requests, target, .. } = survey;
+    let Survey { coverage, driving, requests, plan, .. } = survey;
     let profile = &site.tunnel.profile;
     let healthy = driving.lacking.healthy(*at, situation, heads);
-    let plan = Plan {
-        planned_mps: target.planned_speed_mps,
-        target_m: target.target_m,
-        confidence_sd: coverage.sections.confidence_sd(),
-        other: target.other,
-    };
-    driving.note(*at, [situation, &healthy], profile, &plan);
+    driving.note(*at, [situation, &healthy], profile, plan);
     let now = driving.now;
     missing_samples::note_beat(&mut driving.lacking, now, heads, (*at, situation), profile, coverage);
     coverage_extent::note_beat(coverage, heads, &site.tunnel, (*at, situation), requests);

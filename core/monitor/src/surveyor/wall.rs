@@ -1,4 +1,4 @@
-//! Returns classified as wall become samples, doubtful ones are counted and recorded.
+//! Turns returns classified as wall into samples. Counts and records doubtful returns.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 use bevy_ecs::system::SystemState;
@@ -10,17 +10,18 @@ use super::missing_samples::number_of;
 use super::samples::note_sample;
 use super::survey::{OutputRefs, Outputs};
 use crate::entities::{HeadClassifier, HeadEntities, HeadSweep, Waiting};
-use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
-use crate::observations::ObservedKind;
+use crate::messages::{Hidden, Outcome, PlacedPing};
+use crate::observations::{ObservedKind, Occurrence};
 use crate::resources::{Coverage, Digests, Tally, TunnelDesign};
 use crate::result_stream::RecordKind;
 use headrace_coverage::{Cause, Causes, Loss, MissingSample, StoreError, Taken};
 use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::tunnel::WallPoint;
 
 /// Distance beyond either end of the tunnel from which samples are recorded as outside, m.
 const WELL_BEYOND_M: f64 = 1.0;
 
-/// Inputs and outputs, without the head.
+/// Inputs and outputs of processing classified returns, without the head.
 pub(super) struct WallContext<'a> {
     pub(super) coverage: &'a mut Coverage,
     pub(super) tunnel: &'a TunnelDesign,
@@ -58,16 +59,16 @@ pub(super) fn note_ping(
         Taken::Waits | Taken::Doubtful => doubtful(context, sweep, ping, *is_distrusted),
     }
     let (why, between_m) = sorted.distrusted?;
-    let (kind, figure_m) = ObservedKind::of_distrust(why);
-    let source = Some(ping.source);
+    let (kind, off_m) = ObservedKind::of_distrust(why);
+    let (source, occurrence) = (Some(ping.source), Occurrence { x_m: point.x(), off_m });
     let OutputRefs { digests, observations, .. } = &mut context.outputs;
-    if observations.note_of(source, kind, ping.received, point.x(), figure_m) {
-        digest_observation(digests, kind, source, ping.received, (point.x(), figure_m));
+    if observations.note_of(source, kind, ping.received, occurrence) {
+        digest_observation(digests, kind, source, ping.received, occurrence);
     }
     Some(between_m)
 }
 
-/// Inputs and outputs at the end of a dive.
+/// Inputs and outputs of processing the waiting returns at the end of a dive.
 type End<'w, 's> = (
     Query<'w, 's, (&'static HeadClassifier, &'static mut HeadSweep)>,
     Res<'w, HeadEntities>,
@@ -77,7 +78,7 @@ type End<'w, 's> = (
     Outputs<'w>,
 );
 
-/// Applies the returns that still wait at the end of a dive, when no more returns will come, as doubtful.
+/// At the end of a dive, applies the returns that still wait as doubtful, because no more returns will come.
 /// Allocates: outside a tick only.
 pub(super) fn end_returns(world: &mut World) {
     let mut state = SystemState::<End<'_, '_>>::new(world);
@@ -97,7 +98,7 @@ pub(super) fn end_returns(world: &mut World) {
     }
 }
 
-/// Applies a waiting return that has been classified, and then the pings since.
+/// Applies a waiting return that has been classified, and then the effects of the pings after it.
 fn settle(
     context: &mut WallContext<'_>,
     sweep: &mut HeadSweep,
@@ -122,10 +123,10 @@ fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     digest(context.outputs.digests, ping, RecordKind::Sample);
     let OutputRefs { digests, observations, .. } = &mut context.outputs;
     let kind = ObservedKind::OutsideTunnel;
-    if let Some(beyond_m) = beyond_end_m(ping, context.tunnel.length_m)
-        && observations.note(kind, ping.received, beyond_m.0, beyond_m.1)
+    if let Some(occurrence) = beyond_end(ping, context.tunnel.length_m)
+        && observations.note(kind, ping.received, occurrence)
     {
-        digest_observation(digests, kind, None, ping.received, beyond_m);
+        digest_observation(digests, kind, None, ping.received, occurrence);
     }
     store(context, sweep, ping);
 }
@@ -140,7 +141,7 @@ fn store(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing
 }
 
 /// Counts a doubtful return. For holes and causes it is a missing return, aimed at the point where its beam
-/// meets the design.
+/// meets the design profile.
 fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_distrusted: bool) {
     context.tally.doubtful += 1;
     digest(context.outputs.digests, ping, RecordKind::Doubtful);
@@ -161,8 +162,8 @@ fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedP
             section.passage.silent = section.passage.silent.with(ping.head);
         }
     }
-    let Some(Aim { x_m, arc_m }) = aim else { return };
-    // A doubtful echo from beside the vehicle's outline comes from the vehicle.
+    let Some(WallPoint { x_m, arc_m }) = aim else { return };
+    // A doubtful echo at an angle just beside the vehicle's outline comes from the vehicle.
     let cause = match ping.hidden {
         Hidden::No if is_distrusted => Cause::HeadSilent,
         Hidden::No => Cause::MissingReturns,
@@ -175,22 +176,22 @@ fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedP
 }
 
 /// Point at which a beam would have met the design profile.
-fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<Aim> {
+fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<WallPoint> {
     let beam = *point - *origin;
     let length_m = Some(beam.norm()).filter(|length_m| *length_m > 0.0)?;
     let across = [beam.y() / length_m, beam.z() / length_m];
     let wall = tunnel.profile.cast([origin.y(), origin.z()], across)?;
-    Some(Aim { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
+    Some(WallPoint { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
 }
 
-/// Chainage of a sample well beyond either end of the tunnel, and the sample's distance from that end, m.
+/// A sample well beyond either end of the tunnel, with the sample's distance from that end.
 ///
 /// A vehicle that turns at an end has heads slightly beyond the end, which is normal.
-fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
+fn beyond_end(ping: &PlacedPing, length_m: f64) -> Option<Occurrence> {
     let Outcome::Sample { point, .. } = ping.outcome else { return None };
     let x_m = point.x();
-    let beyond_m = (-x_m).max(x_m - length_m);
-    (beyond_m > WELL_BEYOND_M).then_some((x_m, beyond_m))
+    let off_m = (-x_m).max(x_m - length_m);
+    (off_m > WELL_BEYOND_M).then_some(Occurrence { x_m, off_m })
 }
 
 fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
@@ -243,8 +244,8 @@ mod tests {
             }
         }
 
-        /// Classifies and applies a ping. Returns the number of samples and the number of doubtful returns so
-        /// far.
+        /// Classifies and applies a test ping. Returns the number of samples and the number of doubtful
+        /// returns so far.
         fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
             let class = classify(&mut self.head, ping, &self.tunnel, &mut self.relief);
             let outputs = OutputRefs {
@@ -266,15 +267,15 @@ mod tests {
 
     const STEP_RAD: f64 = 0.0157;
 
-    /// Return with this number in the turn, at this range, m. The wall is at 3 m.
+    /// Test ping with this number in the turn, and a return at this range, m. The wall is at 3 m.
     fn at(number: u32, range_m: f64) -> PlacedPing {
         heard(5.1, 1.0 + STEP_RAD * f64::from(number), range_m)
     }
 
-    /// An isolated echo in front of the wall waits for the next return. Then it counts as missing, for holes
-    /// and for causes.
+    /// An isolated echo in front of the wall waits for the next return. After that it counts as a missing
+    /// sample, for holes and for causes.
     #[test]
-    fn isolated_echo_counts_as_a_missing_sample_at_its_aim() {
+    fn isolated_echo_counts_as_a_missing_sample_at_the_aimed_wall_point() {
         for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
             let mut bench = Bench::new();
             assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
@@ -307,13 +308,13 @@ mod tests {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
                 panic!()
             };
-            bench.coverage.store.clone().nearest_pass_m(5.1, arc_m, 0.5).is_some()
+            bench.coverage.store.clone().nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 0.5).is_some()
         };
         assert!((1..18).all(|number| crossed(f64::from(number) + 0.5)));
     }
 
     #[test]
-    fn samples_without_room_are_counted() {
+    fn samples_are_counted_even_if_the_store_is_full() {
         let mut bench = Bench::new();
         let perimeter_m = bench.tunnel.profile.perimeter_m();
         let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 32.0, cell_m: 0.25, capacity: 2 };
@@ -324,10 +325,10 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
-    /// The first two returns are from a rock. Pings that come while the first one waits take effect when it
-    /// is classified.
+    /// The first two returns are from a rock. Pings that arrive while the first return waits take effect when
+    /// it is classified.
     #[test]
-    fn lost_ping_after_an_undecided_return_breaks_the_sweep() {
+    fn lost_ping_after_an_undecided_return_interrupts_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {
             let mut bench = Bench::new();
             bench.note(&at(0, 3.0));
@@ -339,7 +340,8 @@ mod tests {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + 2.5 * STEP_RAD, 2.4).outcome else {
                 panic!()
             };
-            let is_crossed = bench.coverage.store.nearest_pass_m(5.1, arc_m, 0.5).is_some();
+            let is_crossed =
+                bench.coverage.store.nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 0.5).is_some();
             (is_crossed, bench.coverage.sections.get(20).unwrap().t_y_m.count)
         };
         let lost = pinged(5.1, 1.0 + 2.0 * STEP_RAD);
@@ -365,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn returns_beyond_the_tunnel_are_counted_with_their_largest_distance() {
+    fn returns_beyond_the_tunnel_are_counted_and_the_largest_distance_is_kept() {
         let mut bench = Bench::new();
         let mut note = |x_m: f64| {
             bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });

@@ -1,4 +1,4 @@
-//! Speed advice and its parts.
+//! Speed advice, with its reason, remedy and alternatives.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,24 +12,24 @@ const MODE_NAME_BYTES: usize = 15;
 /// The limiting factor of the advice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
-    /// The distance between passes is the limit: a lower speed helps.
+    /// The distance between passes is the limit, so a lower speed helps.
     HelixPitch,
     /// A lower speed does not help, but another mode or position, or a steadier vehicle would.
     ///
-    /// The cause is the distance between neighbours of one turn, the width of a strip that no head sees, or the swing
-    /// of the beams.
+    /// The cause is the distance between neighbouring samples of one turn, the width of a strip that no head sees, or
+    /// the swing of the beams.
     AngularStep,
-    /// No advice is possible without position and heading.
+    /// No advice is possible, because position or heading is missing.
     NoHeadingOrFix,
-    /// No head delivers returns.
+    /// No advice is possible, because no head delivers returns.
     NoReturns,
 }
 
 impl Reason {
-    /// All reasons.
+    /// All limiting factors of the advice.
     pub const ALL: [Self; 4] = [Self::HelixPitch, Self::AngularStep, Self::NoHeadingOrFix, Self::NoReturns];
 
-    /// Name used in reports and logs.
+    /// Name of the limiting factor in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::HelixPitch => "helix_pitch",
@@ -39,7 +39,7 @@ impl Reason {
         }
     }
 
-    /// Severity: a more severe reason has a larger number.
+    /// Severity of the limiting factor: a more severe factor has a larger number.
     pub(super) fn gravity(self) -> u8 {
         match self {
             Self::HelixPitch => 0,
@@ -66,7 +66,7 @@ impl ModeName {
         Self { len: u8::try_from(len).unwrap_or(0), bytes }
     }
 
-    /// The name.
+    /// The name of the mode as text.
     pub fn as_str(&self) -> &str {
         let name = self.bytes.get(..self.len.into()).and_then(|name| core::str::from_utf8(name).ok());
         debug_assert!(name.is_some(), "a mode's name is UTF-8: {} of {:?}", self.len, self.bytes);
@@ -83,7 +83,7 @@ impl core::fmt::Debug for ModeName {
 /// Remedy if a lower speed does not help.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Remedy {
-    /// Another mode.
+    /// Setting the heads to another mode.
     Mode(ModeName),
     /// Moving to the middle of the tunnel, level and straight.
     Centre,
@@ -101,7 +101,7 @@ impl Remedy {
         }
     }
 
-    /// Returns the remedy with that number; `None` for any other number.
+    /// Returns the remedy with this number in published data; `None` for an unknown number.
     ///
     /// `mode` is the name for [`Remedy::Mode`].
     pub fn of(number: u64, mode: &str) -> Option<Self> {
@@ -109,7 +109,7 @@ impl Remedy {
         all.into_iter().find(|remedy| remedy.number() == number)
     }
 
-    /// Name used in reports: `centre`, `steady`, or the mode's name.
+    /// Name of the remedy in reports: `centre`, `steady`, or the mode's name.
     pub fn as_str(&self) -> &str {
         match self {
             Self::Mode(name) => name.as_str(),
@@ -119,14 +119,14 @@ impl Remedy {
     }
 }
 
-/// Largest speed with all heads in one of their modes.
+/// Alternative to the present mode: the largest speed with all heads in another mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
-    /// The mode.
+    /// The mode to which all heads would be set.
     pub mode: ModeName,
     /// The largest speed that meets the target with the heads started in phase, m/s.
     ///
-    /// Zero if no speed does.
+    /// Zero if no speed meets it.
     pub v_max_mps: f64,
 }
 
@@ -144,61 +144,61 @@ pub struct Anew {
 pub struct Left {
     /// Remaining length of tunnel in the direction of travel, m.
     pub length_m: f64,
-    /// Remaining time, seconds, if known.
+    /// Remaining time of the dive, seconds, if known.
     pub time_s: Option<f64>,
 }
 
 impl Left {
-    /// Returns the hours needed for the remaining length at a speed; `None` at zero speed.
+    /// Returns the hours needed for the remaining length of tunnel at a speed; `None` at zero speed.
     pub fn hours_at(&self, speed_mps: f64) -> Option<f64> {
         (speed_mps > 0.0).then(|| self.length_m / speed_mps / 3600.0)
     }
 
-    /// Whether the remaining time is enough at a speed; `None` if the time is unknown.
+    /// Whether the remaining time is enough for the remaining length at a speed; `None` if the time is unknown.
     pub fn suffices_at(&self, speed_mps: f64) -> Option<bool> {
         let time_s = self.time_s?;
         Some(self.hours_at(speed_mps).is_some_and(|hours| hours * 3600.0 <= time_s))
     }
 }
 
-/// Speed advice.
+/// Speed advice to the pilot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
     /// The largest speed at which sections will pass, m/s; zero if there is none.
     pub v_max_mps: f64,
     /// Lower end of the advised interval of speeds, m/s; zero if all lower speeds meet the target.
     ///
-    /// At lower speeds, heads apart along the hull run out of phase.
+    /// At lower speeds, heads that are apart along the hull run out of phase.
     pub from_mps: f64,
     /// Speed nearest to the present one that meets the target, m/s.
     ///
-    /// `None` if the present speed meets the target, or if no speed near it does.
+    /// `None` if the present speed meets the target, or if no speed near the present one meets it.
     pub nearest_mps: Option<f64>,
-    /// The limiting factor.
+    /// The limiting factor of the advice.
     pub reason: Reason,
     /// T_max predicted at the present speed, m; `None` if it cannot be predicted or is unbounded.
     pub predicted_t_m: Option<f64>,
-    /// Whether T of the present turn is forecast to exceed the target; false without a prediction.
+    /// Whether the spacing T of the present turn is forecast to exceed the target; false without a prediction.
     pub will_exceed: bool,
-    /// Whether T of the present turn may exceed the target; false without a prediction.
+    /// Whether the spacing T of the present turn may exceed the target; false without a prediction.
     ///
-    /// The predicted T then exceeds the target less the margin for position errors.
+    /// The predicted T then exceeds the target minus the margin for position errors.
     pub may_exceed: bool,
-    /// Target less the margin for position errors, m.
+    /// Target T minus the margin for position errors, m.
     pub sure_m: f64,
-    /// The longest time between two passes over a place that all heads see, seconds.
+    /// The longest time between two head passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
-    /// The longest time between two passes if the heads' passes were evenly spread, seconds.
+    /// The longest time between two head passes if the passes were evenly spread, seconds.
     pub even_pass_gap_s: f64,
-    /// The largest distance between neighbours of one turn, m.
+    /// T_y: the largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// Time between two pings, seconds; the longest of any head.
+    /// Time between two pings of a head, seconds; the longest of any head.
     pub ping_period_s: f64,
-    /// Phase error of the head farthest out of phase, radians of its turn.
+    /// Phase error of the head farthest out of phase, in radians of the head's rotation.
     ///
-    /// `None` in sectors, or with one head.
+    /// `None` for heads in sectors, or for a single head.
     pub phase_error_rad: Option<f64>,
-    /// Remaining tunnel and time.
+    /// Remaining length of tunnel and remaining time of the dive.
     pub left: Left,
     /// Width of a strip that no head sees, and the arc length of its middle, m.
     ///
@@ -206,21 +206,21 @@ pub struct Advice {
     pub unseen_m: Option<[f64; 2]>,
     /// Remedy if a lower speed does not help.
     pub remedy: Option<Remedy>,
-    /// Alternatives in the modes that all heads have.
+    /// Largest speeds in the modes that all heads have.
     pub alternatives: [Option<Alternative>; MAX_MODES],
     /// Restart of the heads for their best speed; `None` if their phases do not depend on the speed.
     pub anew: Option<Anew>,
-    /// Cost of each margin, updated every five seconds.
+    /// Speed cost of each margin of the target, updated every five seconds.
     pub margins: Option<Margins>,
     /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,
 }
 
 impl Advice {
-    /// Whether the figures agree with each other.
+    /// Whether the figures of the advice agree with each other.
     ///
-    /// Speeds and times are finite and not negative. There is a speed exactly if a lower speed helps, and the advised
-    /// interval ends at this speed.
+    /// Speeds and times are finite and not negative. The advice states a speed if and only if a lower speed helps,
+    /// and the advised interval ends at this speed.
     pub fn is_consistent(&self) -> bool {
         let figures = [self.v_max_mps, self.sure_m, self.pass_gap_s, self.even_pass_gap_s, self.t_y_m];
         let is_figure = |figure: f64| figure >= 0.0 && figure.is_finite();

@@ -1,30 +1,30 @@
-//! Hysteresis of the displayed advice, against flicker.
+//! Hysteresis of the displayed advice, so that the display does not flicker.
 
 use super::answer::{Advice, Reason};
 use super::search::SPEED_MARGIN;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Less restrictive advice is displayed once no more restrictive advice has occurred for this time.
+/// Length of the past period whose most restrictive advice is displayed.
 const HOLD: DurNs = DurNs(1_000_000_000);
-/// Time for which a higher speed must last before it is displayed.
+/// Time for which a higher advised speed must last before it is displayed.
 ///
-/// The speed must exceed the displayed one by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
+/// The higher speed must exceed the displayed one by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
-/// A lower speed is displayed at once if it is lower by this share.
+/// A lower advised speed is displayed at once if it is lower than the displayed one by this share.
 ///
 /// Smaller differences are within half of the speed margin.
 const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
 /// Number of stored advice updates: all updates within `HOLD` at 5 Hz.
 const HELD: usize = 6;
-/// Share by which the predicted T must exceed the target before the display forecasts an exceedance.
+/// Share by which the predicted spacing T must exceed the target before the display forecasts an exceedance.
 ///
 /// The share is half of the speed margin, so that the forecast does not flicker at the advised speed.
 const BEYOND: f64 = SPEED_MARGIN / 2.0;
-/// Share by which the predicted T must exceed the remaining target before a possible exceedance is displayed.
+/// Share by which the predicted spacing T must exceed the remaining target before a possible exceedance is displayed.
 ///
-/// The remaining target is the target less the margin for position errors. A pilot may exceed the advised speed by 1
+/// The remaining target is the target minus the margin for position errors. A pilot may exceed the advised speed by 1
 /// or 2 %.
 const MAYBE_BEYOND: f64 = 0.03;
 
@@ -44,14 +44,14 @@ pub struct Hysteresis {
     may_exceed: bool,
     /// Displayed speed, m/s, and the time of the latest advice.
     shown: Option<(MonoNs, f64)>,
-    /// Time since which all speeds exceed the displayed one, and the lowest of these speeds, m/s.
+    /// Time since which all advised speeds exceed the displayed one, and the lowest of these speeds, m/s.
     rising: Option<(MonoNs, f64)>,
 }
 
 stateful!(Hysteresis { state: held, next, begun, will_exceed, may_exceed, shown, rising; fixed: target_m; });
 
 impl Hysteresis {
-    /// Creates the filter for a target T, m.
+    /// Creates the hysteresis filter for a target T, m.
     pub fn new(target_m: f64) -> Self {
         Self {
             target_m,
@@ -65,7 +65,7 @@ impl Hysteresis {
         }
     }
 
-    /// Resets the filter, because the vehicle has turned back and other speeds apply.
+    /// Resets the filter, because the vehicle has reversed its direction and other speeds apply.
     pub fn forget(&mut self) {
         *self = Self::new(self.target_m);
     }
@@ -130,9 +130,9 @@ impl Hysteresis {
     }
 }
 
-/// Whether the predicted T exceeds a limit.
+/// Whether the predicted spacing T exceeds a limit.
 ///
-/// Without a prediction, the result is the forecast of the advice itself.
+/// Without a predicted T, the result is the forecast in the advice itself.
 fn exceeds(advice: &Advice, limit_m: f64) -> bool {
     advice.predicted_t_m.map_or(advice.will_exceed, |t_m| t_m > limit_m)
 }
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn higher_speed_appears_at_once_after_a_reset() {
+    fn higher_advised_speed_is_displayed_at_once_after_a_reset() {
         let mut steady = Hysteresis::new(TARGET_M);
         let show = |steady: &mut Hysteresis, k: u64, mps: f64| {
             steady.show(MonoNs(3_000_000_000 + k * 200_000_000), speed(mps)).v_max_mps
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn more_severe_reason_appears_at_once_and_less_severe_one_after_1_s() {
+    fn more_severe_limiting_factor_appears_at_once_and_less_severe_one_after_1_s() {
         let ladder = [Reason::HelixPitch, Reason::AngularStep, Reason::NoReturns, Reason::NoHeadingOrFix];
         for pair in ladder.windows(2) {
             let [lesser, graver] = [0, 1].map(|k| Advice::nothing(pair[k]));
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn intermittent_reasons_do_not_flicker() {
+    fn intermittent_limiting_factors_do_not_flicker_on_the_display() {
         let flickering =
             (0..100).map(|k| if k % 3 == 0 { Advice::nothing(Reason::AngularStep) } else { speed(0.2) });
         let shown = shown(flickering);
@@ -208,11 +208,11 @@ mod tests {
     }
 
     #[test]
-    fn lower_speed_appears_at_once_and_higher_one_after_10_s() {
+    fn lower_advised_speed_is_displayed_at_once_and_higher_one_after_10_s() {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
-        // The low speed counts for a second, and the higher one must then last for ten seconds.
+        // The low speed stays in the history for a second, and the higher speed must then last for ten seconds.
         assert_eq!(speeds[10..66], [0.1; 56]);
         assert_eq!(speeds[66..], [0.2; 15]);
     }
@@ -222,7 +222,7 @@ mod tests {
         let wavering = (0..300).map(|k| speed(0.1 + if k % 7 < 3 { 0.0009 } else { 0.0027 }));
         let speeds: Vec<f64> = shown(wavering).iter().map(|advice| advice.v_max_mps).collect();
         assert!(speeds[1..].iter().all(|speed_mps| (speed_mps - 0.1009).abs() < 1e-12));
-        // A slowly falling speed is followed, with a lag of at most 0.5 %.
+        // The displayed speed follows a slowly falling advised speed, with a lag of at most 0.5 %.
         let sinking: Vec<_> = (0..300).map(|k| speed(0.1 - 1e-4 * f64::from(k))).collect();
         let shown = shown(sinking.iter().copied());
         let over = |(shown, given): (&Advice, &Advice)| shown.v_max_mps > given.v_max_mps * 1.0051;
@@ -241,7 +241,7 @@ mod tests {
     fn exceedance_is_displayed_at_once_and_cleared_below_the_target() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
-            // T exceeds the target by less than `BEYOND`.
+            // The predicted spacing T exceeds the target by less than `BEYOND`.
             vec![at(0.502); 3],
             vec![at(0.503)],
             vec![at(0.5005); 10],
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn gap_of_more_than_1_s_resets_the_hysteresis() {
+    fn advice_pause_of_more_than_1_s_resets_the_hysteresis() {
         let mut steady = Hysteresis::new(TARGET_M);
         steady.show(MonoNs(0), speed(0.1));
         assert!((steady.show(MonoNs(1_200_000_000), speed(0.2)).v_max_mps - 0.2).abs() < 1e-12);

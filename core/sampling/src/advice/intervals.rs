@@ -1,6 +1,6 @@
-//! Intervals of speed that meet a target.
+//! Intervals of speed that meet a coverage target T.
 //!
-//! Heads apart along the hull are in phase only at some speeds, so several intervals may meet a target.
+//! Heads that are apart along the hull are in phase only at some speeds, so several intervals may meet a target.
 //!
 //! The advised speed depends on the measured heads and the vehicle's pose, not on the present speed. It is the upper
 //! end of the highest interval. If that interval vanishes while heads run out of phase, the next interval may be far
@@ -16,7 +16,7 @@ use headrace_geometry::math;
 /// Hysteresis as a share of the target.
 ///
 /// The advised interval may miss the target by this share. A higher interval must meet the target reduced by this
-/// share. Two percent correspond to 2 mm/s at 0.1 m/s.
+/// share. A share of 2 % corresponds to 2 mm/s at 0.1 m/s.
 pub(super) const EASE: f64 = 0.02;
 /// Speeds closer together than this share belong to one interval.
 const NEAR: f64 = 0.05;
@@ -30,26 +30,27 @@ pub(super) struct Driving<'a> {
     pub(super) phasing: &'a Phasing,
     pub(super) going: &'a Going,
     pub(super) parallax_rad: f64,
-    /// Whether lost returns require extra passes.
+    /// Whether lost returns require extra passes over each place.
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: RemainingTarget,
-    /// Remaining target at unlimited speed, and the heads' distance along the hull, m.
+    /// Target minus the margin for position errors at unlimited speed, and the distance between the heads along the
+    /// hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
-    /// Speed above which no phase meets the target, m/s.
+    /// Speed above which the target is missed whatever the heads' phases, m/s.
     pub(super) bound_mps: f64,
 }
 
 impl Driving<'_> {
-    /// Whether a speed meets the target, enlarged by the share `more`.
+    /// Whether a speed meets the target when the target is enlarged by the share `more`.
     pub(super) fn meets(&self, speed_mps: f64, more: f64) -> bool {
         self.tries(speed_mps, more).is_ok()
     }
 
-    /// Checks whether a speed meets the target, enlarged by the share `more`.
+    /// Checks whether a speed meets the target when the target is enlarged by the share `more`.
     ///
-    /// The error is a lower or equal speed, m/s; no speed between the two meets the target.
+    /// The error is a lower or equal speed, m/s; no speed between that one and the tested one meets the target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
@@ -63,19 +64,19 @@ impl Driving<'_> {
             return Err(speed_mps);
         }
         let Some(unmet) = self.strips.unmet(0, &then, speed_mps, target_m, self.going) else { return Ok(()) };
-        // Across a narrower strip, the samples on either side may meet the target.
+        // If a strip is narrower than the target, the samples on either side of it may meet the target.
         let stays = unmet.width_m > most_m;
         let below_mps = |along_m| self.below_mps(speed_mps, unmet.gap_s, along_m).min(speed_mps);
         Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })
     }
 
-    /// Returns the speed, m/s, down to which passes stay more than `most_m` apart.
+    /// Returns the speed, m/s, down to which neighbouring passes stay more than `most_m` apart.
     ///
-    /// At the given speed v, passes are g = `gap_s` apart in time. At a lower speed u, heads at most a apart along
-    /// the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap is then at least g
-    /// less that shift, so its length is at least u g - a (1 - u / v).
+    /// At the given speed v, neighbouring passes are g = `gap_s` apart in time. At a lower speed u, heads at most a
+    /// apart along the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap is then
+    /// at least g minus that shift, so its length is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
-        /// Allowance for rounding.
+        /// Allowance for rounding errors of the speed.
         const A_LITTLE: f64 = 1e-9;
         let apart_m = self.apart_m;
         (most_m + apart_m) / (gap_s + apart_m / speed_mps) * (1.0 + A_LITTLE)
@@ -90,7 +91,7 @@ impl Driving<'_> {
         self.phasing.at(signed_mps).beside(self.parallax_rad).lossy(self.lossy)
     }
 
-    /// Returns the largest speed, m/s, or zero; `last_mps` is the previous result.
+    /// Returns the largest speed that meets the target, m/s, or zero; `last_mps` is the previous result.
     pub(super) fn fastest_mps(&self, last_mps: Option<f64>) -> f64 {
         let highest = |more: f64| {
             if self.phasing.fits_some_speeds() {
@@ -114,8 +115,8 @@ impl Driving<'_> {
 
     /// Returns the speed reduced by the margin [`SPEED_MARGIN`], or by up to twice that margin.
     ///
-    /// The larger margin applies where T grows faster than the speed, because the heads run out of phase. A speed
-    /// error of 1 % then costs more than 1 % of T.
+    /// The larger margin applies where the spacing T grows faster than the speed, because the heads run out of phase.
+    /// A speed error of 1 % then costs more than 1 % of T.
     pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {
         const STEEP: f64 = 2.0 * SPEED_MARGIN;
         let meets = |speed_mps: f64| self.meets(speed_mps, 0.0);
@@ -129,7 +130,8 @@ impl Driving<'_> {
         less_mps.min(search::kept_back_mps(fastest_mps, 1.0 - edge_mps / fastest_mps / (1.0 + STEEP), meets))
     }
 
-    /// Returns the best speed near the previous result; `None` if T there exceeds the target by over [`EASE`].
+    /// Returns the best speed near the previous result; `None` if the spacing T there exceeds the target by over
+    /// [`EASE`].
     fn kept_mps(&self, last_mps: f64) -> Option<f64> {
         let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
         let best =
@@ -142,7 +144,7 @@ impl Driving<'_> {
     /// Zero if all lower speeds meet the target.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
         const STEP: f64 = 0.99;
-        /// Share of the speed at which the search stops, since no pilot would go that slowly.
+        /// Share of the upper speed at which the search stops, since no pilot would go more slowly.
         const SLOWEST: f64 = 0.2;
         if !self.phasing.fits_some_speeds() {
             return 0.0;

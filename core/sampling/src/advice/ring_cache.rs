@@ -1,4 +1,4 @@
-//! Cached ring of each head, recast after the vehicle moves.
+//! Cached ring of rays from each head to the wall, recast after the vehicle moves.
 
 use crate::error::SamplingError;
 use crate::head::{HeadMode, HeadSpec};
@@ -11,20 +11,20 @@ use headrace_geometry::tunnel::Profile;
 
 /// Relative change of the advised speed that is tolerated before rings are recast.
 const SHARE: f64 = 0.002;
-/// Limits of the movement across the tunnel before a recast, m.
+/// Limits of the movement across the tunnel that is tolerated before rings are recast, m.
 ///
-/// The lower limit applies where steps nearly reach the target. The upper limit applies because hidden strips move
-/// with the vehicle.
+/// The lower limit applies if the distance between neighbouring samples of a turn nearly reaches the target. The
+/// upper limit applies because hidden strips move with the vehicle.
 const STILL_M: [f64; 2] = [0.004, 0.1];
 /// Tolerated rotation per metre of tolerated movement, as a quaternion component (half an angle, rad).
 const TURN_PER_M: f64 = 0.2;
 
-/// Resolution and update rate of the advice's view of the wall.
+/// Angular resolution and update rate of the rays that find the wall for the advice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
     /// Number of rays in a head's ring, spread evenly over a turn; at least one.
     ///
-    /// Steps of heads are rounded up to whole multiples of the angle between rays.
+    /// Angular steps of heads are rounded up to whole multiples of the angle between rays.
     pub ring: u32,
     /// Movement across the tunnel before a ring is recast, m.
     ///
@@ -33,7 +33,7 @@ pub struct Looks {
 }
 
 impl Default for Looks {
-    /// One ray per 0.3 degrees, the finest step of the supported heads.
+    /// One ray per 0.3 degrees, which is the finest angular step of the supported heads.
     fn default() -> Self {
         Self { ring: 1200, anew_m: None }
     }
@@ -41,21 +41,21 @@ impl Default for Looks {
 
 /// Returns the movement across the tunnel before rings are recast, m.
 ///
-/// Steps of `t_y_m` on a wall `range_m` away bound the speed v for a target T. `swing_share` is w / v for a beam
-/// swing w. A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y / T_y. A step
-/// changes in proportion to its range, and by twice as much where the wall falls away.
+/// Samples of a turn that are `t_y_m` apart on a wall `range_m` away bound the speed v for a target T. `swing_share`
+/// is w / v for a beam swing w. A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y
+/// / T_y. The distance T_y changes in proportion to the range, and by twice as much where the wall falls away.
 pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
     let around2 = t_y_m * t_y_m;
     let along2 = (target_m * target_m - around2).max(0.0);
     (SHARE * range_m / (2.0 * around2 / along2 * (1.0 + swing_share))).clamp(STILL_M[0], STILL_M[1])
 }
 
-/// A head with its cached ring.
+/// A head with its cached ring of rays.
 #[derive(Debug, Clone)]
 pub(super) struct AdvisedHead {
     pub(super) spec: HeadSpec,
     pub(super) modes: Vec<HeadMode>,
-    /// Hidden angles, and the sector, in the sensor frame.
+    /// Angles hidden from the head, and the head's sector, in the sensor frame.
     pub(super) hidden: Vec<AngleRange>,
     pub(super) sector: Option<AngleRange>,
     pub(super) ring: Ring,
@@ -65,7 +65,7 @@ pub(super) struct AdvisedHead {
 stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector; });
 
 impl AdvisedHead {
-    /// Whether the vehicle is close to the pose at which the ring was cast.
+    /// Whether the vehicle is still close to the pose at which the head's ring was cast.
     ///
     /// The limit of the movement is `still_m`; the limit of the rotation is [`TURN_PER_M`] times `still_m`.
     pub(super) fn is_near(&self, pose: &Pose, still_m: f64) -> bool {
@@ -87,7 +87,7 @@ impl AdvisedHead {
         Ok(())
     }
 
-    /// Updates the view: the wall within the head's sector, the hidden wall, and the wall outside the range limits.
+    /// Updates the head's view: the wall within its sector, the hidden wall, and the wall outside its range limits.
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else {

@@ -31,7 +31,8 @@ struct Case {
 }
 
 impl Case {
-    /// Heads at the positions `x_m` along the hull with these angles, all in FAST, in the centre of `ceran`.
+    /// Situation with heads at the positions `x_m` along the hull and at these angles, in FAST mode, in the centre of
+    /// `ceran`.
     fn new(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, target_m: f64) -> Self {
         let profile = shapes::ceran().unwrap();
         let specs: Vec<HeadSpec> = x_m.iter().map(|x| spec([*x, 0.0, 0.0], 0.0)).collect();
@@ -64,8 +65,7 @@ impl Case {
     fn advisor(&self) -> Advisor {
         let heads: Vec<_> = self.specs.iter().map(|spec| (*spec, modes())).collect();
         let task = Task {
-            target_m: self.target_m,
-            confidence_sd: 2.0,
+            target: Target::new(self.target_m),
             length_m: LENGTH_M,
             layout: self.situation.layout,
             sound_speed_mps: 1500.0,
@@ -78,7 +78,7 @@ impl Case {
         self.advisor().advise(&self.situation, Swing::default(), self.left_s)
     }
 
-    /// T at a speed, m, by Eq. 16 of Jorge et al. 2021, with the phases of the heads at that speed.
+    /// Spacing T at a speed, m, by Eq. 16 of Jorge et al. 2021, with the phases of the heads at that speed.
     fn t_at_m(&self, advice: &Advice, speed_mps: f64) -> f64 {
         let passes = Phasing::of(&self.situation).at(speed_mps);
         let gap_s = passes.gap_s(passes.heads()).unwrap();
@@ -105,7 +105,7 @@ fn largest_speed_accounts_for_the_phases_of_heads_along_the_hull() {
     let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
     assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
     assert!(t_at(1.02 * v_max) > 1.0);
-    // With even phases at every speed, the vehicle could move faster.
+    // If the phases were even at every speed, the vehicle could move faster.
     let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
     assert!(v_max < 0.99 * even, "{v_max} and {even}");
     let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
@@ -118,7 +118,8 @@ fn largest_speed_accounts_for_the_phases_of_heads_along_the_hull() {
 
 #[test]
 fn advised_speed_is_not_below_a_present_speed_that_meets_the_target() {
-    // Heads 1.1 m apart meet 0.5 m only in narrow intervals of speed. The present speed is in such an interval.
+    // Heads 1.1 m apart meet a target of 0.5 m only in narrow intervals of speed. The present speed is in such an
+    // interval.
     let phase_deg = |v: f64| 180.0 - 360.0 * 1.1 / (v * 8.0);
     for v in [0.06, 0.085, 0.1, 0.105] {
         let case = Case::new(&[0.0, phase_deg(v)], &[0.0, -1.1], v, 0.5);
@@ -129,7 +130,7 @@ fn advised_speed_is_not_below_a_present_speed_that_meets_the_target() {
 }
 
 #[test]
-fn missing_head_leaves_its_sector_unseen() {
+fn wall_in_the_sector_of_a_missing_head_is_unseen() {
     let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
     case.situation.layout = HeadLayout::SectorOffset;
     let whole = case.advice();
@@ -144,7 +145,7 @@ fn missing_head_leaves_its_sector_unseen() {
 }
 
 #[test]
-fn wall_out_of_reach_is_unseen() {
+fn wall_beyond_the_maximum_range_is_unseen() {
     let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.5);
     case.specs[0].range_m[1] = 2.0;
     let advice = case.advice();
@@ -178,7 +179,7 @@ fn backward_travel_has_its_own_phases_and_remaining_length() {
 }
 
 #[test]
-fn alternatives_give_speed_and_duration_and_check_the_time_left() {
+fn alternative_modes_give_speed_and_duration_and_check_the_remaining_time() {
     let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     assert_eq!(case.advice().left.suffices_at(1.0), None);
     case.left_s = Some(3000.0);
@@ -190,7 +191,7 @@ fn alternatives_give_speed_and_duration_and_check_the_time_left() {
     assert!((fast.v_max_mps - advice.v_max_mps).abs() < 1e-9);
     assert!((slow.v_max_mps - 1.0 / 10.818 * 0.99).abs() < 1e-3);
     assert!((advice.left.hours_at(fast.v_max_mps).unwrap() - 900.0 / fast.v_max_mps / 3600.0).abs() < 1e-12);
-    // 900 m in 3,000 s need 0.3 m/s.
+    // 900 m of tunnel in the remaining 3,000 s need 0.3 m/s.
     let suffices = |v_mps| advice.left.suffices_at(v_mps).unwrap();
     assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
 }
@@ -203,7 +204,7 @@ fn sector_alternatives_use_the_sweep_time_of_their_mode() {
     let advice = case.advice();
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
     assert!((fast - advice.v_max_mps).abs() < 1e-9, "the present mode: {fast} {}", advice.v_max_mps);
-    // The longest gap is 21.6 s plus a ping, and steps along the wall are negligible.
+    // The longest time between passes is 21.6 s plus a ping period, and the samples of a turn are close together.
     assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
 }
 
@@ -216,7 +217,7 @@ fn remedy_is_advised_if_a_lower_speed_does_not_help() {
     assert_eq!(advice.left.hours_at(advice.v_max_mps), None);
     assert!(advice.alternatives[0].unwrap().v_max_mps > 0.0);
 
-    // In this mode, steps are too long near the floor's corner, but not in the tunnel's centre.
+    // In this mode, samples of a turn are too far apart near the floor's corner, but not in the tunnel's centre.
     case = Case::new(&[0.0], &[0.0], 0.2, 0.25);
     assert_eq!(case.advice().reason, Reason::HelixPitch);
     case.situation.pose =
@@ -243,7 +244,7 @@ fn mutual_occlusion_lowers_the_speed() {
     // Each head has one wall hidden by its neighbour. On that wall, half of the passes are missing.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
-    // Steps are short on the hidden strips.
+    // On the hidden strips, neighbouring samples of a turn are close together.
     let t_m = spacing::t_max_m(0.125 * (4.0 + parallax_s), 0.125 * 0.02, 0.1);
     assert!((hidden.predicted_t_m.unwrap() - t_m).abs() < 0.01, "{hidden:?}");
     assert!(hidden.v_max_mps < 0.6 * free.v_max_mps, "{} and {}", hidden.v_max_mps, free.v_max_mps);
@@ -282,13 +283,13 @@ fn moving_vehicle_has_no_ring_of_rays_older_than_3_updates() {
     assert!(advisor.heads.iter().all(|head| (9..12).any(|step| head.is_near(&at(step), 1e-9))));
 }
 
-/// Heads side by side, each of which hides some of the wall from its neighbour.
+/// Situation with heads side by side, each of which hides some of the wall from its neighbour.
 fn hiding_each_other() -> Case {
     let mut case = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.125, 0.5);
     let places = [[0.5, 0.15, 0.0], [0.5, -0.15, 0.0], [-0.5, 0.15, 0.0], [-0.5, -0.15, 0.0]];
     for ((spec, motion), place) in case.specs.iter_mut().zip(&mut case.situation.heads).zip(places) {
         *spec = self::spec(place, 0.04);
-        // The heads are phased for 0.125 m/s, at which the vehicle advances 1 m in a whole turn.
+        // The heads are evenly phased for 0.125 m/s, at which the vehicle advances 1 m in a whole turn.
         if let Some(motion) = motion {
             motion.mount = spec.mount;
         }
@@ -296,9 +297,9 @@ fn hiding_each_other() -> Case {
     case
 }
 
-/// Largest relative speed error due to cached rings, compared with rings recast each time.
+/// Largest relative error of the advised speed due to cached rings of rays, compared with rings recast each time.
 ///
-/// The track moves to and fro and in circles at 1.5 cm/s and half a degree per second. The second result is the
+/// The vehicle moves to and fro and in circles at 1.5 cm/s and half a degree per second. The second result is the
 /// number of rings cast in 600 updates.
 fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
     let [y_m, z_m] = case.profile.reference();
@@ -332,7 +333,8 @@ fn cached_rings_of_rays_change_the_advice_by_at_most_2_percent() {
         ("hiding each other", hiding_each_other(), still, 0.002, 0..100),
         ("a wide target", Case::new(&[0.0], &[0.0], 0.1, 1.0), still, 0.002, 0..30),
         ("swinging", around(), swing, 0.006, 0..250),
-        // Steps are nearly as long as the target. Each centimetre matters, so rings are recast more often.
+        // Samples of a turn are nearly as far apart as the target, so each centimetre matters and rings are recast
+        // more often.
         ("a target hard to meet", Case::new(&[0.0, 180.0], &[0.0; 2], 0.1, 0.3), still, 0.02, 250..600),
     ] {
         let (off, cast) = off_by(&case, swing);
@@ -347,12 +349,12 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
     let still = advise(Swing::default());
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
     let swung = advise(swing);
-    // The speed is reduced by the speed of the beams along the wall at that range.
+    // The advised speed is reduced by the speed of the swinging beams along the wall at that range.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
     assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
     assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
-    // A fast swing of small extent costs no more than its extent.
+    // A fast swing of small extent reduces the pass distance by no more than its extent.
     let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01, apart_rate_radps: 0.05 });
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
     let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0, apart_rate_radps: 0.2 });
@@ -362,7 +364,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
 }
 
 #[test]
-fn swing_widens_gaps_between_heads_apart_along_the_hull() {
+fn vehicle_swing_widens_pass_distances_of_heads_apart_along_the_hull() {
     let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
     let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
@@ -394,7 +396,7 @@ fn position_error_lowers_the_speed_by_its_margin() {
     let fast = |advice: &Advice| advice.alternatives[1].unwrap().v_max_mps;
     assert!((meets_m(&unsure, fast(&unsure)) - 0.47).abs() < 1e-3, "{}", fast(&unsure));
     assert!(fast(&sure) > 1.05 * fast(&unsure));
-    // The cost appears as the share of position; the other shares are unchanged.
+    // The cost appears in the margin for position errors; the other margins are unchanged.
     let [margins, before] = [unsure.margins.unwrap(), sure.margins.unwrap()];
     assert!((margins.swing_mps - before.swing_mps).abs() < 1e-9);
     assert!((margins.position_mps - unsure.v_max_mps).abs() < 1e-9 && margins.pass_error_m >= 0.017);
@@ -429,7 +431,7 @@ fn lost_returns_lower_the_speed() {
     assert!(all[2] < 0.75 * all[0], "{all:?}");
 }
 
-/// Heads far apart meet the target in an interval that ends at the advised speed.
+/// Heads far apart along the hull meet the target in a speed interval that ends at the advised speed.
 #[test]
 fn target_is_met_in_the_speed_interval_and_missed_below_it() {
     let case = Case::new(&[0.0, 0.0], &[2.4, 0.0], 0.2, 1.0);
@@ -442,11 +444,11 @@ fn target_is_met_in_the_speed_interval_and_missed_below_it() {
     assert!(t_at(0.985 * from) > 1.0, "{}", t_at(0.985 * from));
 }
 
-/// None of the speeds that a failed test rules out meets the target.
+/// Each failed test of a speed rules out a range of speeds, and no speed in that range meets the target.
 ///
 /// The heads are anywhere along the hull and side by side, with hidden wall, swing and position errors.
 #[test]
-fn search_rules_out_no_speed_that_meets_the_target() {
+fn speed_search_rules_out_no_speed_that_meets_the_target() {
     let mut seed = 7_u64;
     let mut draw = |from: f64, to: f64| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -454,7 +456,7 @@ fn search_rules_out_no_speed_that_meets_the_target() {
     };
     let (mut found, mut hidden, mut skipped) = (0, 0, 0);
     for number in 0..240 {
-        // Every other case is as strict as possible: two heads in line, and no effects but their phases.
+        // Every second case is as strict as possible: two heads in line, and no effects but their phases.
         let bare = number % 2 == 0;
         let heads = if bare { 2 } else { 2 + number % 3 };
         let angles: Vec<f64> = (0..heads).map(|_| draw(0.0, 360.0)).collect();
@@ -500,7 +502,7 @@ fn search_rules_out_no_speed_that_meets_the_target() {
 
 /// A higher interval is advised once its best speed meets the target with a margin of 2 %.
 ///
-/// Such intervals appear and vanish while heads run out of phase.
+/// Higher intervals appear and vanish while heads run out of phase.
 #[test]
 fn higher_interval_is_advised_once_it_meets_the_target_with_margin() {
     let mut advisor = Case::new(&[0.0, 0.0], &[1.1, 0.0], 0.1, 0.5).advisor();
@@ -530,9 +532,9 @@ fn higher_interval_is_advised_once_it_meets_the_target_with_margin() {
     assert!(jumps > 0 && waited > 0, "{jumps} advised at once, {waited} delayed");
 }
 
-/// Heads 1.1 m apart, started for 0.1 m/s, meet 0.5 m in several intervals.
+/// Heads 1.1 m apart, started for 0.1 m/s, meet a target of 0.5 m in several speed intervals.
 ///
-/// The advice contains the nearest of these speeds and the lower end of the highest interval.
+/// The advice contains the nearest speed in these intervals, and the lower end of the highest interval.
 #[test]
 fn nearest_and_highest_speed_intervals_are_advised() {
     let started_deg = 180.0 - 360.0 * 1.1 / (0.1 * 8.0);
@@ -554,7 +556,7 @@ fn nearest_and_highest_speed_intervals_are_advised() {
         };
         outside += 1;
         assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
-        // All speeds that are closer, by more than the step of 1 %, miss the target, except in the narrowest
+        // Any speed closer to the present one by more than the search step of 1 % misses the target, except in narrow
         // intervals.
         let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
         for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
@@ -570,11 +572,11 @@ fn nearest_and_highest_speed_intervals_are_advised() {
     );
 }
 
-/// The margin is up to 2 % instead of 1 % if heads run out of phase just above the largest speed.
+/// The speed margin is up to 2 % instead of 1 % if heads run out of phase just above the largest speed.
 ///
 /// A vehicle 2 % above the advised speed then exceeds the target by at most 2 %.
 #[test]
-fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
+fn speed_margin_is_larger_where_the_spacing_grows_faster_than_speed() {
     let (mut even, mut steep) = (0, 0);
     for (apart_m, k) in
         [0.0, 0.3, 1.1, 2.5].into_iter().flat_map(|apart_m| (0..40).map(move |k| (apart_m, k)))
@@ -600,7 +602,7 @@ fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
             );
             even += 1;
         } else {
-            // The margin is no larger than necessary.
+            // The speed margin is no larger than necessary.
             assert!((1.019..1.0203).contains(&over), "{started_mps}: {kept}, {over}");
             steep += 1;
         }
@@ -609,7 +611,7 @@ fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
 }
 
 #[test]
-fn mean_lost_share_is_the_mean_over_all_heads() {
+fn mean_share_of_lost_returns_is_the_mean_over_all_heads() {
     assert!((mean([0.1, 0.2, 0.6].into_iter()) - 0.3).abs() < 1e-12);
     assert!(mean(core::iter::empty()).abs() <= 0.0);
 }

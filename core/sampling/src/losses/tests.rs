@@ -1,4 +1,4 @@
-//! Comparison of the required passes with simulated walls: losses drawn at random, holes found by brute force.
+//! Comparison of the required number of passes with simulated walls: random losses, and holes found by brute force.
 
 use super::*;
 
@@ -13,7 +13,7 @@ fn passes(t_y_m: f64, rates: &[LossRate]) -> f64 {
     sampled(t_y_m).passes_needed(rates.iter().copied())
 }
 
-/// Random numbers from 0 to 1 (splitmix64).
+/// Generator of random numbers from 0 to 1 (splitmix64).
 struct Draw(u64);
 
 impl Draw {
@@ -26,7 +26,7 @@ impl Draw {
     }
 }
 
-/// Share of simulated stretches without an empty circle of the target's diameter.
+/// Share of simulated stretches of wall that have no empty circle of the target's diameter.
 ///
 /// Passes are `along_m` apart; each stretch is 0.25 m long.
 fn share_passed(along_m: f64, t_y_m: f64, rates: &[LossRate], seed: u64) -> f64 {
@@ -78,7 +78,7 @@ fn along_m(t_y_m: f64, passes: f64) -> f64 {
 }
 
 #[test]
-fn required_passes_let_19_of_20_stretches_pass() {
+fn required_passes_leave_no_hole_in_19_of_20_stretches() {
     let rates = [
         LossRate::independent(0.02),
         LossRate::independent(0.1),
@@ -91,14 +91,14 @@ fn required_passes_let_19_of_20_stretches_pass() {
         for (seed, rate) in (1..).zip(rates) {
             let passes = passes(t_y_m, &[rate]);
             let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
-            // The sample has 80 stretches, and neighbouring stretches share holes.
+            // The tolerance covers a sample of 80 stretches of wall in which neighbouring stretches share holes.
             assert!(share >= 0.87, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
         }
     }
 }
 
 #[test]
-fn too_few_passes_let_fewer_than_9_in_10_stretches_pass() {
+fn too_few_passes_leave_holes_in_over_1_in_10_stretches() {
     let rates =
         [LossRate::independent(0.2), LossRate::independent(0.5), LossRate { share: 0.2, after_lost: 0.8 }];
     for t_y_m in [0.07, 0.1] {
@@ -111,7 +111,7 @@ fn too_few_passes_let_fewer_than_9_in_10_stretches_pass() {
 }
 
 #[test]
-fn passes_of_a_silent_head_are_replaced_by_other_heads() {
+fn other_heads_make_up_for_the_passes_of_a_silent_head() {
     let sound = LossRate::default();
     let deaf = LossRate::independent(1.0);
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
@@ -121,7 +121,7 @@ fn passes_of_a_silent_head_are_replaced_by_other_heads() {
     let lossy = LossRate::independent(0.1);
     let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
     assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
-    // With equal loss rates, the number of heads has no effect.
+    // If all heads have equal loss rates, the number of heads has no effect.
     assert!((passes(0.1, &[lossy; 4]) - passes(0.1, &[lossy])).abs() < 1e-12);
 }
 
@@ -144,10 +144,10 @@ fn required_passes_grow_continuously_with_losses() {
 }
 
 #[test]
-fn no_extra_passes_without_losses_or_without_a_speed() {
+fn no_extra_passes_are_needed_without_losses_or_a_possible_speed() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
-    // If steps are longer than the target, no speed meets the target.
+    // If samples of a turn are farther apart than the target, no speed meets the target.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
 

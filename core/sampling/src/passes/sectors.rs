@@ -6,16 +6,16 @@ use crate::head::{HeadMotion, MAX_HEADS, faces_aft};
 use crate::occlusion::AngleRange;
 use headrace_geometry::math::{self, TAU};
 
-/// Unevenness assumed for neighbouring heads with unknown sweeps: both reach the shared end at once.
+/// Unevenness assumed for neighbouring heads with unknown sweeps: both reach the shared sector end at the same time.
 pub(super) const AT_ONCE: f64 = 0.5;
 
 /// Position of a head in its sweep through its sector, there and back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Leg {
-    /// Number of the head's sector and number of all sectors, in the body's sense of rotation.
+    /// Number of the head's sector, counted in the body's sense of rotation, and number of all sectors.
     sector: i64,
     of: i64,
-    /// Share of a sweep there and back, counted from the beginning of the sector, 0 to 1.
+    /// Share of the sweep there and back that is done, counted from the beginning of the sector, 0 to 1.
     share: f64,
 }
 
@@ -28,7 +28,7 @@ impl Leg {
         let along = math::wrap_signed(motion.angle_rad - sector.middle_rad(), TAU) / size_rad + 0.5;
         let along = along.clamp(0.0, 1.0);
         let grows = motion.rate_radps > 0.0;
-        // A head that faces aft turns in the opposite sense.
+        // Seen in the body frame, a head that faces aft turns in the opposite sense.
         let (along, grows, from_rad) = if faces_aft(motion.mount.rotation) {
             (1.0 - along, !grows, TAU - sector.from_rad - size_rad)
         } else {
@@ -72,7 +72,7 @@ mod tests {
     use headrace_geometry::frames::{Mount, Rot, Vec3};
     use headrace_geometry::time::DurNs;
 
-    /// The heads are two in front and two aft-facing ones behind.
+    /// Two heads are in front, and two aft-facing heads are behind.
     ///
     /// The unevenness is tested at the planned speed and 10 % above it.
     #[test]
@@ -103,7 +103,7 @@ mod tests {
                     }
                     uneven(&legs, &ahead)
                 };
-                // One step of a head is 1/200 of the sweep.
+                // One angular step of a head is 1/200 of the sweep.
                 assert!(at(speed_mps) < 0.011, "{speed_mps} m/s, {at_s} s: {}", at(speed_mps));
                 // The rear heads reach a place 1.1 m / v after the front heads.
                 let later_s = 2.0 * x_m / speed_mps - 2.0 * x_m / (1.1 * speed_mps);
@@ -124,7 +124,8 @@ mod tests {
         for (head, ((slot, spec), program)) in legs.iter_mut().zip(specs).zip(programs).enumerate() {
             let (from_rad, size_rad) = program.sector.unwrap();
             let angle_rad = |at_s: f64| schedule.angle_rad(head, DurNs::from_secs_f64(at_s)).unwrap();
-            // A received angle is the angle at the last ping; the step is the difference from the ping before.
+            // A received angle is the angle at the last ping; the step is the difference from the previous ping's
+            // angle.
             let pings = (at_s / spec.ping_period_s).floor() * spec.ping_period_s + 1e-6;
             let step_rad = math::wrap_signed(angle_rad(pings) - angle_rad(pings - spec.ping_period_s), TAU);
             let motion = HeadMotion {

@@ -34,7 +34,7 @@ fn all(passes: &Passes) -> f64 {
 }
 
 #[test]
-fn evenly_phased_heads_share_the_turn() {
+fn evenly_phased_heads_pass_at_equal_intervals() {
     let passes = passes(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4]);
     assert!((all(&passes) - 2.0).abs() < 1e-9 && (passes.even_gap_s() - 2.0).abs() < 1e-12);
     let errors = passes.phase_errors_rad(4);
@@ -47,12 +47,12 @@ fn evenly_phased_heads_share_the_turn() {
 }
 
 #[test]
-fn place_hidden_from_some_heads_has_longer_gaps() {
+fn place_hidden_from_some_heads_has_longer_times_between_passes() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-    // Without two heads half a turn apart, the gap doubles. Without two heads a quarter turn apart, two successive
-    // passes are missing.
+    // Without two of four heads that are half a turn apart, the longest gap doubles. Without two that are a quarter
+    // turn apart, two successive passes are missing.
     assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
     assert_eq!(passes.gap_s(HeadSet::default()), None);
     assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
@@ -82,8 +82,8 @@ fn heads_at_one_place_with_equal_angles_pass_together() {
     let together = passes(&[0.0, 0.0], &[0.0, 0.0]);
     assert!((all(&together) - 8.0).abs() < 1e-9 && (together.even_gap_s() - 4.0).abs() < 1e-12);
     assert!((together.phase_errors_rad(2)[1].unwrap().abs() - math::PI).abs() < 1e-9);
-    // Heads half a pitch apart along the hull interleave at equal angles: half a pitch is 0.8 m at 0.2 m/s and 8 s
-    // per turn.
+    // Heads at equal angles interleave if they are apart along the hull by half the advance per turn: 0.8 m at 0.2
+    // m/s and 8 s per turn.
     let apart = passes(&[0.0, 0.0], &[0.8, 0.0]);
     assert!((all(&apart) - 4.0).abs() < 1e-9);
 }
@@ -94,11 +94,11 @@ fn reversed_vehicle_reverses_the_order_of_heads() {
     let out = Phasing::of(&back).at(0.2);
     let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
     back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
-    // Travelling back with the nose ahead mirrors travelling out with the nose ahead. Travelling back with the tail
-    // ahead does not.
+    // Travelling back nose first mirrors travelling out nose first. Travelling back tail first does not.
     assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
     assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
-    // If the vehicle yaws, the distance of heads along the tunnel grows. Scan planes along the tunnel have no phase.
+    // If the vehicle yaws, the distance of heads along the tunnel grows. Heads whose scan planes lie along the tunnel
+    // have no phase.
     let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
     let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
     assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
@@ -110,8 +110,8 @@ fn late_head_has_a_positive_phase_error() {
     // The second of two heads should be half a turn ahead, but is only 150 degrees ahead.
     let passes = passes(&[0.0, 150.0], &[0.0, 0.0]);
     assert!((passes.phase_errors_rad(2)[1].unwrap() - f64::to_radians(30.0)).abs() < 1e-9);
-    // At 10 % above the planned speed, the error of a head 1.6 m astern (the advance of one turn) is 1 - 1 / 1.1 of a
-    // turn.
+    // At 10 % above the planned speed, the phase error of a head 1.6 m astern (the advance of one turn) is 1 - 1 /
+    // 1.1 of a turn.
     let at = |speed| Phasing::of(&situation(&[0.0, 180.0], &[1.6, 0.0])).at(speed).phase_errors_rad(2)[1];
     assert!(at(0.2).unwrap().abs() < 1e-9);
     assert!((at(0.22).unwrap() - TAU * (1.0 - 1.0 / 1.1)).abs() < 1e-9, "{:?}", at(0.22));
@@ -133,7 +133,7 @@ fn heads_must_all_rotate_in_the_same_sense_to_be_in_phase() {
 }
 
 #[test]
-fn heads_with_unequal_turn_times_have_the_gap_of_the_fastest() {
+fn heads_with_unequal_turn_periods_count_as_the_fastest_head_alone() {
     let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
     if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
         second.rate_radps = TAU / 21.6;
@@ -158,7 +158,7 @@ fn measured_sector_is_ignored_in_a_phase_shift_layout() {
 }
 
 #[test]
-fn remaining_heads_share_the_turn_evenly() {
+fn remaining_heads_pass_at_equal_intervals() {
     let three = Passes::evenly_phased(HeadSet::first(4).without(1), |_| 9.0).unwrap();
     assert!((all(&three) - 3.0).abs() < 1e-12);
     let none = HeadSet::default();
@@ -172,12 +172,12 @@ fn parallax_is_larger_in_a_narrow_tunnel() {
     let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
     let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
     let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
-    // At 6 m range, the heads are 0.3 m apart.
+    // At a range of 6 m, heads 0.3 m apart see one place at angles 0.05 rad apart.
     assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
     assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
 }
 
-/// The result does not depend on the position of the vehicle's origin along the hull.
+/// The mean distance does not depend on the position of the vehicle's origin along the hull.
 #[test]
 fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
     for origin_m in [-3.0, 0.0, 0.4, 5.0] {
@@ -191,7 +191,7 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
             (vec![0.9, -0.3], 1.2, 1.0),
             (vec![0.9, 0.9, -0.3, -0.3], 1.2, 0.5),
             (vec![0.9, -0.3, 0.9, -0.3], 1.2, 1.0),
-            // The mean is over two steps of half the distance, and the whole distance from the last head back to the
+            // The mean is over two distances of half the spread, and the whole spread from the last head back to the
             // first.
             (vec![0.0, 0.4, 0.8], 0.8, 2.0 / 3.0),
             (vec![0.7, 0.7], 0.0, 0.0),
@@ -204,7 +204,7 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
             assert_eq!(heads.fits_some_speeds(), apart_m > 0.0, "{x_m:?}");
         }
     }
-    // Heads out of step have no order and thus no distance.
+    // Heads that turn in opposite senses have no order of passes and thus no such distance.
     let mut loose = situation(&[0.0, 180.0], &[0.9, -0.3]);
     loose.heads[1].as_mut().unwrap().rate_radps = -TAU / 8.0;
     let heads = Phasing::of(&loose);
@@ -213,9 +213,9 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
     );
 }
 
-/// Scheduled heads share the turn evenly at the planned speed, whatever their positions along the hull.
+/// Scheduled heads pass a place at equal intervals at the planned speed, whatever their positions along the hull.
 #[test]
-fn scheduled_heads_share_the_turn_at_the_planned_speed() {
+fn scheduled_heads_pass_at_equal_intervals_at_the_planned_speed() {
     for x_m in [[0.8, 0.0, -0.5], [0.0, 1.3, 0.2]] {
         let phasing = Phasing::of(&situation(&[3.0, 200.0, 77.0], &x_m)).as_scheduled(3, 0.1);
         let gap_s = |mps: f64| all(&phasing.at(mps));

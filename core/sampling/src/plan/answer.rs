@@ -1,4 +1,4 @@
-//! Questions to a plan, and the answer for each mode.
+//! Planning questions, and the answer for each mode.
 
 use serde::Serialize;
 
@@ -8,26 +8,26 @@ use crate::margin::Margins;
 use crate::section;
 use crate::spacing::Spiral;
 
-/// A planning question.
+/// A planning question: target, speed or time.
 ///
-/// A target asks for the speed. A speed or a time asks for the target that can be met. A target with a speed or time
-/// asks whether both are compatible.
+/// With a target, the question asks for the speed. With a speed or a time, it asks for the target that can be met.
+/// With a target and a speed or time, it asks whether both are compatible.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Target T, m.
     pub target_m: Option<f64>,
-    /// Speed, m/s.
+    /// Speed of the vehicle, m/s.
     pub speed_mps: Option<f64>,
-    /// Time for the whole length, seconds.
+    /// Time for the whole length of the tunnel, seconds.
     pub time_s: Option<f64>,
 }
 
-/// The answer for one mode; distances along the tunnel are at `speed_mps`.
+/// The answer to a planning question for one mode of the heads; distances along the tunnel are at `speed_mps`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
-    /// The mode.
+    /// The mode of the heads.
     pub mode: &'static str,
-    /// theta, degrees.
+    /// theta: angle between two pings, degrees.
     pub step_deg: f64,
     /// n: pings per turn. Eq. 3.
     pub steps_per_turn: u32,
@@ -39,19 +39,19 @@ pub struct Answer {
     pub overlap: f64,
     /// Smallest T_y: straight-line distance between samples, at rest and at the nominal pose, m. Eq. 5 or 7.
     pub t_y_min_rest_m: f64,
-    /// Mean T_y under the same conditions, m. Eq. 10.
+    /// Mean straight-line T_y, at rest and at the nominal pose, m. Eq. 10.
     pub t_y_mean_rest_m: f64,
-    /// Largest T_y under the same conditions, m. Eq. 6.
+    /// Largest straight-line T_y, at rest and at the nominal pose, m. Eq. 6.
     pub t_y_max_rest_m: f64,
-    /// T_yp: upper bound of the mean, m. Eq. 10.
+    /// T_yp: upper bound of the mean T_y, m. Eq. 10.
     pub t_yp_m: f64,
-    /// T_y2: the largest distance between neighbours of one turn on the wall, at any tolerated pose, m.
+    /// T_y2: the largest distance between neighbouring samples of one turn on the wall, at any tolerated pose, m.
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,
     /// The largest speeds as the margins are added one after the other; the last speed is `v_max_mps`.
     pub margins: Option<Margins>,
-    /// Time for the whole length at `v_max_mps`, hours.
+    /// Time for the whole length of the tunnel at `v_max_mps`, hours.
     pub needed_h: Option<f64>,
     /// Reason why no speed meets the target: `angular_step`, `unseen_strip` or `off_axis`.
     pub reason: Option<&'static str>,
@@ -59,7 +59,7 @@ pub struct Answer {
     pub refused: Option<String>,
     /// Speed that the fields below refer to, m/s: the speed in the question, or else `v_max_mps`.
     pub speed_mps: Option<f64>,
-    /// Spacing at `speed_mps`.
+    /// Distances between samples at `speed_mps`.
     pub spacing: Option<Spacing>,
     /// Part of the target reserved for position errors at `speed_mps`, m; zero if the errors are unknown.
     pub position_margin_m: f64,
@@ -67,7 +67,7 @@ pub struct Answer {
     pub meets_target: Option<bool>,
     /// Whether the time in the question is enough at `v_max_mps`.
     pub suffices: Option<bool>,
-    /// Whether this mode is the best of all modes.
+    /// Whether this mode is the best answer to the question among all modes.
     pub best: bool,
 }
 
@@ -78,9 +78,9 @@ pub struct Spacing {
     pub advance_m: f64,
     /// v T: distance travelled in a turn. Eq. 12.
     pub pitch_m: f64,
-    /// T_x where all heads see the wall.
+    /// T_x: distance between passes where all heads see the wall.
     pub t_x_m: f64,
-    /// T_x on the strip with the longest time between passes.
+    /// T_x: distance between passes on the strip of wall with the longest time between passes.
     pub t_x_hidden_m: f64,
     /// T_ymin, including the advance between two pings. Eq. 14.
     pub t_y_min_m: f64,
@@ -88,9 +88,9 @@ pub struct Spacing {
     pub t_y_mean_m: f64,
     /// T_ymax, including the advance between two pings. Eq. 13.
     pub t_y_max_m: f64,
-    /// T_min. Eq. 18.
+    /// T_min: smallest spacing of samples. Eq. 18.
     pub t_min_m: f64,
-    /// T_mean. Eq. 17.
+    /// T_mean: mean spacing of samples. Eq. 17.
     pub t_mean_m: f64,
     /// Largest T_max over all tolerated poses; `None` if no head sees some strip. Eq. 16.
     ///

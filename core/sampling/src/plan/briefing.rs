@@ -1,4 +1,4 @@
-//! Briefing of the crew: hidden angles, starts of the heads, and interference.
+//! Briefing of the crew: angles hidden from the heads, start angles of the heads, and interference between heads.
 
 use serde::Serialize;
 
@@ -10,20 +10,20 @@ use crate::ring::Standing;
 use crate::strips::Arc;
 use headrace_geometry::math::{self, TAU};
 
-/// The briefing for one mode at one speed.
+/// The briefing of the crew for one mode of the heads at one speed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Briefing {
-    /// The mode.
+    /// The mode of the heads.
     pub mode: &'static str,
-    /// The speed of the briefing, m/s.
+    /// The vehicle's speed to which the briefing applies, m/s.
     pub speed_mps: f64,
     /// Angles hidden from each head.
     pub hidden: Vec<Hidden>,
     /// Strips of the wall with fewer passes than the rest, or with none.
     pub strips: Vec<ThinStrip>,
-    /// Start of each head.
+    /// Start angle and direction of each head.
     pub starts: Vec<Start>,
-    /// Spacing rule for heads apart along the hull that start at equal angles.
+    /// Spacing rule for heads that are apart along the hull and start at equal angles.
     pub hull_rules: Vec<HullAdvice>,
     /// Pairs of heads that can receive each other's pings.
     pub exposures: Vec<Heard>,
@@ -32,19 +32,19 @@ pub struct Briefing {
 /// A range of angles that the vehicle hides from a head.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Hidden {
-    /// The head.
+    /// Number of the head from which the angles are hidden.
     pub head: usize,
-    /// Middle of the range, degrees in the sensor frame.
+    /// Middle of the hidden angle range, degrees in the sensor frame.
     pub middle_deg: f64,
-    /// Size of the range, degrees.
+    /// Size of the hidden angle range, degrees.
     pub size_deg: f64,
-    /// Length of the hidden wall, m.
+    /// Length of the wall hidden from the head, around the perimeter, m.
     pub wall_m: f64,
-    /// Clock position of the hidden wall's middle, looking along the tunnel.
+    /// Clock position of the middle of the hidden wall, looking along the tunnel.
     pub clock: String,
 }
 
-/// A strip of the wall with fewer passes than the rest.
+/// A strip of the wall that the heads pass less often than the rest of the wall.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThinStrip {
     /// Arc length of the strip's start, m.
@@ -59,49 +59,49 @@ pub struct ThinStrip {
     pub t_x_factor: Option<f64>,
 }
 
-/// Start of a head's program.
+/// Start of a head's rotation program.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
-    /// The head.
+    /// Number of the head that is started.
     pub head: usize,
     /// Angle of the first ping, degrees in the sensor frame.
     pub angle_deg: f64,
-    /// Whether the angle grows after the first ping.
+    /// Whether the head's angle grows after the first ping.
     pub growing: bool,
-    /// Least angle and size of the sector, degrees.
+    /// Least angle and size of the head's sector, degrees.
     pub sector_deg: Option<[f64; 2]>,
 }
 
-/// The spacing rule x = q v T / s for a head.
+/// The rule x = q v T / s for the distance of a head behind the foremost head.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HullAdvice {
-    /// The head.
+    /// Number of the head to which the rule applies.
     pub head: usize,
-    /// Distance behind the foremost head, m.
+    /// Distance x of the head behind the foremost head, m.
     pub behind_m: f64,
-    /// Number of s-ths of a turn in which the vehicle travels that distance, rounded to the nearest.
+    /// Number q of s-ths of a turn in which the vehicle travels the distance x, rounded to the nearest.
     pub q: u32,
-    /// The speed that fits the rule, m/s.
+    /// The speed v that fits the rule, m/s.
     pub speed_mps: f64,
-    /// The distance that fits the rule, m.
+    /// The distance x that fits the rule, m.
     pub apart_m: f64,
 }
 
 /// Time in which two heads can receive each other's pings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Heard {
-    /// The two heads.
+    /// Numbers of the two heads.
     pub heads: [usize; 2],
-    /// Time for which the beams point at each other's heads, seconds per turn or sweep.
+    /// Time for which each beam points at the other head, seconds per turn or sweep.
     pub facing_s: f64,
     /// Time for which the beams hit the same patch of wall, seconds per turn or sweep.
     pub same_patch_s: f64,
-    /// Period of the turn or sweep, seconds.
+    /// Period of the heads' turn or sweep, seconds.
     pub of_s: f64,
 }
 
 impl Planner {
-    /// The briefing for a mode at a speed, at the nominal pose.
+    /// Returns the briefing for a mode at a speed, with the vehicle at the nominal pose.
     ///
     /// Errors: a speed that isn't above zero.
     pub fn briefing(&self, mode: usize, speed_mps: f64) -> Result<Briefing, SamplingError> {

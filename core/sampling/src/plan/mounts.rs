@@ -13,7 +13,7 @@ const SAME_M: f64 = 0.01;
 
 /// Heads in line along the hull, so that no head hides the wall from another.
 ///
-/// The line passes through the mean of the heads' present positions.
+/// The line passes through the mean position of the heads as mounted now.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InLine {
     /// Position of each head in the body frame, m, in the order of the heads.
@@ -27,7 +27,7 @@ pub struct InLine {
 }
 
 impl Planner {
-    /// Returns the best speed with the heads in line.
+    /// Returns the mounts of heads in line along the hull, with the best mode and speed.
     ///
     /// `None` if the heads already are in line, or if no mode meets the target with heads in line.
     ///
@@ -82,7 +82,7 @@ fn in_line(inspection: &Inspection) -> Option<Inspection> {
         spec.mount.position = Vec3::new(at_m, y_m, z_m);
         last = Some((at_m, long_m));
     }
-    // The line is centred on the heads' present middle, so that it extends equally ahead and astern.
+    // The line is centred on the middle of the heads as mounted now, so that it extends equally ahead and astern.
     let shift_m = x_m - moved.heads.iter().map(|(spec, _)| spec.mount.position.x()).sum::<f64>() / count;
     let mut farthest_m: f64 = 0.0;
     for ((spec, _), (before, _)) in moved.heads.iter_mut().zip(&inspection.heads) {

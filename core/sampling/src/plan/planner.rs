@@ -9,29 +9,30 @@ use crate::passes::{self, Passes};
 use crate::ring::{Ring, Standing};
 use crate::schedule::Schedule;
 use crate::strips::{Arc, Going, Sector, Strips, View};
+use crate::target::Target;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math::TAU;
 use headrace_geometry::tunnel::{Profile, Yz};
 
 /// Share of the largest speed for which heads should be started.
 ///
-/// A pilot keeps a speed within 5 %, and heads apart along the hull are in phase only near the planned speed. See
-/// docs/why/field.md.
+/// A pilot keeps a speed within 5 %, and heads that are apart along the hull are in phase only near the planned
+/// speed. See docs/why/field.md.
 pub const HELD_SHARE: f64 = 0.95;
-/// Number of soundings per ring: soundings 0.1 degrees apart cover many start angles of each step.
+/// Number of ray-cast soundings per turn: soundings 0.1 degrees apart cover many start angles of each head step.
 pub(super) const RING: u32 = 3600;
 
 /// Maximum number of iterations until the speed converges.
 ///
-/// Each change of the speed is a fraction of the one before.
+/// Each change of the speed is a fraction of the previous change.
 const FALLS: u32 = 12;
 
-/// A tunnel, a vehicle and the tolerances to plan for.
+/// The inspection to plan: a tunnel, a vehicle and tolerances of its pose.
 #[derive(Debug, Clone)]
 pub struct Inspection {
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: Profile,
-    /// Length to inspect, m.
+    /// Length of tunnel to inspect, m.
     pub length_m: f64,
     /// Nominal position of the vehicle in the cross-section.
     pub place: Yz,
@@ -41,11 +42,11 @@ pub struct Inspection {
     pub hull: Vec<Obstacle>,
     /// Layout of the heads.
     pub layout: HeadLayout,
-    /// Tolerated drift of the vehicle, up, down and sideways, m.
+    /// Tolerated drift of the vehicle from its nominal position, up, down and sideways, m.
     pub drift_m: f64,
     /// Tolerated heading off the tunnel's axis, to either side, radians.
     pub yaw_rad: f64,
-    /// Tolerated yaw rate, rad/s: beams swing along the wall between two passes.
+    /// Tolerated yaw rate, rad/s, by which beams swing along the wall between two passes.
     pub yaw_rate_radps: f64,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
@@ -57,23 +58,23 @@ pub(super) struct Stance {
     strips: Strips,
     farthest_m: f64,
     parallax_rad: f64,
-    /// Spread of the heads' displacements along the tunnel relative to their positions along the hull, m.
+    /// Largest difference between two heads' shifts along the tunnel that the heading causes, m.
     shift_m: f64,
-    /// Distance between the heads along the tunnel, m.
+    /// Distance along the tunnel between the planes in which the heads meet the wall, m.
     apart_m: f64,
 }
 
-/// A mode that all heads can be set to.
+/// A mode to which all heads can be set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedMode {
-    /// Mode of the first head; all heads have its name and step.
+    /// Mode of the first head; the modes of all heads have the same name and step.
     pub mode: HeadMode,
-    /// Smallest, mean and largest straight-line distance between neighbours of one turn, m.
+    /// Smallest, mean and largest straight-line distance between neighbouring samples of one turn, m.
     ///
     /// The figures cover all heads, with the vehicle at its nominal pose and at rest. Source: the general case of Eq.
     /// 5, 6 and 10.
     pub chords_m: [f64; 3],
-    /// The largest distance between neighbours of one turn on the unrolled wall, at any tolerated pose, m.
+    /// The largest distance between neighbouring samples of one turn on the unrolled wall, at any tolerated pose, m.
     pub t_y2_m: f64,
     passes: Passes,
     ping_period_s: f64,
@@ -136,12 +137,12 @@ impl Planner {
         &self.inspection
     }
 
-    /// Returns the modes that all heads have, in the order of the first head's.
+    /// Returns the modes that all heads have, in the order of the first head's list.
     pub fn modes(&self) -> &[PlannedMode] {
         &self.modes
     }
 
-    /// Returns the largest T_max over all tolerated poses, with the heads phased for the speed, m.
+    /// Returns the largest T_max over all tolerated poses, with the heads evenly phased for the speed, m.
     ///
     /// The result includes strips that the vehicle hides from some of its heads. It is infinite if no head sees a
     /// strip.
@@ -156,7 +157,7 @@ impl Planner {
         Ok(self.over_stances(mode, t_m).fold(0.0, f64::max))
     }
 
-    /// Returns the largest speed at which sections will pass, with the heads phased for that speed, m/s.
+    /// Returns the largest speed at which sections will pass, with the heads evenly phased for that speed, m/s.
     ///
     /// T_max plus the margin for position errors then equals the target.
     ///
@@ -167,8 +168,9 @@ impl Planner {
             debug_assert!(false, "mode {mode}, which has a speed, is one of {}", self.modes.len());
             return Ok(known_mps);
         };
-        // At a lower speed, heads apart along the hull pass a place later after each other, so the margin is larger.
-        // The iteration starts from above, and each speed leads to a lower one until the speeds converge.
+        // At a lower speed, heads that are apart along the hull pass a place at longer intervals, so the margin is
+        // larger. The iteration starts above the solution, and each speed leads to a lower speed until the speeds
+        // converge.
         let mut speed_mps = known_mps;
         for _ in 0..FALLS {
             let margin_m = self.margin_m(planned, target_m, speed_mps);
@@ -181,9 +183,14 @@ impl Planner {
 
     /// Returns the margin for position errors in a mode at a speed, m.
     pub(super) fn margin_m(&self, planned: &PlannedMode, target_m: f64, speed_mps: f64) -> f64 {
+        let target = self.target(target_m);
+        margin::position_margin_m(target, self.pass_error_m(planned, speed_mps), planned.t_y2_m)
+    }
+
+    /// Target with the confidence of the expected errors; without them, the confidence is zero.
+    pub(super) fn target(&self, max_hole_m: f64) -> Target {
         let confidence_sd = self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd);
-        let pass_error_m = self.pass_error_m(planned, speed_mps);
-        margin::position_margin_m(target_m, confidence_sd, pass_error_m, planned.t_y2_m)
+        Target { max_hole_m, confidence_sd }
     }
 
     /// Standard deviation of a hole's size between two passes in a mode at a speed, m; zero if unknown.
@@ -220,7 +227,7 @@ impl Planner {
         ))
     }
 
-    /// Returns the speed at which T_max equals the target, with the heads phased for it, m/s.
+    /// Returns the speed at which T_max equals the target, with the heads evenly phased for that speed, m/s.
     ///
     /// The function is the inverse of [`Planner::t_max_m`], without position errors.
     ///
@@ -260,8 +267,8 @@ impl Planner {
                 shift_m: stance.shift_m,
                 apart_m: stance.apart_m,
                 apart_swing_mps: swing_mps,
-                // The swing is at most from one tolerated yaw to the other. Without a yaw tolerance, a yaw rate may
-                // last indefinitely.
+                // The vehicle swings at most from the tolerated yaw on one side to that on the other side. Without a
+                // yaw tolerance, a yaw rate may last indefinitely.
                 swing_most_m: (yaw_rad > 0.0).then_some(2.0 * yaw_rad * stance.farthest_m),
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
@@ -279,12 +286,12 @@ impl Planner {
         Some((gap_s(planned.passes.heads())?, longest))
     }
 
-    /// The strips of the wall at the nominal pose.
+    /// The strips of the wall, each seen by the same heads, at the nominal pose.
     pub fn nominal_strips(&self) -> Option<&Strips> {
         self.stances.first().map(|stance| &stance.strips)
     }
 
-    /// The longest range from any head to the wall, m: at the nominal pose, and over all tolerated poses.
+    /// The longest ranges from any head to the wall, m: at the nominal pose, and over all tolerated poses.
     pub fn farthest_m(&self) -> (f64, f64) {
         let far = || self.stances.iter().map(|stance| stance.farthest_m);
         (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
@@ -320,7 +327,7 @@ impl Planner {
         &self.hidden
     }
 
-    /// The nominal pose, at chainage 0.
+    /// The vehicle's nominal pose, at chainage 0.
     pub fn nominal_pose(&self) -> Pose {
         pose(&self.inspection, [0.0, 0.0], 0.0)
     }
@@ -347,7 +354,7 @@ impl Planner {
 }
 
 impl PlannedMode {
-    /// T_s: time between two pings, the longest of any head, seconds.
+    /// T_s: time between two pings of a head, the longest of any head, seconds.
     pub fn ping_period_s(&self) -> f64 {
         self.ping_period_s
     }
@@ -360,8 +367,8 @@ impl PlannedMode {
 
 /// Returns the more severe of two errors.
 ///
-/// An error of another kind is more severe than an unseen strip, and an unseen strip is more severe than a step.
-/// Between two errors of one kind, the larger value counts.
+/// From least to most severe: samples of a turn too far apart, a strip that no head sees, any other error. Of two
+/// errors of one kind, the larger value counts.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),
@@ -454,7 +461,7 @@ fn stance(
     })
 }
 
-/// The difference between the largest and the smallest value.
+/// Returns the difference between the largest and the smallest value.
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)).max(0.0)
 }

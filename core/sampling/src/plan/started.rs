@@ -23,8 +23,7 @@ impl Planner {
         let inspection = self.inspection();
         let specs = self.specs(mode);
         let task = Task {
-            target_m,
-            confidence_sd: self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd),
+            target: self.target(target_m),
             length_m: inspection.length_m,
             layout: inspection.layout,
             sound_speed_mps: inspection.sound_speed_mps,
@@ -60,7 +59,7 @@ impl Planner {
             lost_at_most: LossRate::default(),
         };
         let mut advisor = Advisor::new(&inspection.profile, task, &heads, &inspection.hull);
-        // Each call recasts a single outdated ring.
+        // Each call of the advisor recasts a single outdated ring of rays.
         let calls = 0..specs.len().max(1);
         let advised = calls.map(|_| advisor.advise(&situation, Swing::default(), None).v_max_mps);
         Ok(advised.last().unwrap_or(0.0))

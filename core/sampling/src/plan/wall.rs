@@ -1,4 +1,4 @@
-//! Planned spacing and sample pattern by place on the wall.
+//! Planned spacing of samples, and planned sample pattern, by place on the wall.
 
 use super::planner::{Planner, RING, stride_of};
 use crate::error::{SamplingError, positive};
@@ -8,16 +8,16 @@ use crate::{layout, spacing};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
-/// Spacing at a place on the wall, with the vehicle at the nominal pose.
+/// Spacing of samples at a place on the wall, with the vehicle at the nominal pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallPlace {
-    /// Arc length of the place, m.
+    /// Arc length of the place on the wall, m.
     pub arc_m: f64,
-    /// Largest distance between neighbours of one turn on the wall, m, over the heads that see the place.
+    /// Largest distance between neighbouring samples of one turn on the wall, m, over the heads that see the place.
     pub t_y_m: f64,
     /// Smaller and larger distance between passes, m; `None` if no head sees the place.
     ///
-    /// The distances differ where two distances alternate.
+    /// The two distances differ where shorter and longer distances alternate.
     pub t_x_m: Option<[f64; 2]>,
     /// T at the place, m, from `t_y_m` and the larger `t_x_m`; `None` if no head sees the place.
     pub t_m: Option<f64>,
@@ -26,15 +26,15 @@ pub struct WallPlace {
 /// A sample of the planned pattern.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatternSample {
-    /// Number of the head.
+    /// Number of the head that takes the sample.
     pub head: usize,
-    /// Chainage, m, relative to the vehicle's origin at the start.
+    /// Chainage of the sample, m, relative to the vehicle's origin at the start.
     pub x_m: f64,
-    /// Arc length, m.
+    /// Arc length of the sample on the wall, m.
     pub arc_m: f64,
-    /// Whether the vehicle hides the sample.
+    /// Whether the vehicle hides the sample's place from the head.
     pub hidden: bool,
-    /// Whether the sample is the first of a head, or the first after a turning point.
+    /// Whether the sample is the head's first, or the first after a turning point of the sweep.
     pub new_sweep: bool,
 }
 
@@ -66,7 +66,7 @@ impl Planner {
             let share = around.share.get(k).copied().flatten();
             let t_x_m = gap_s.map(|gap_s| {
                 let longest_m = speed_mps * gap_s;
-                // In a sector, two distances alternate, and `longest_m` is their sum.
+                // In a sector, two distances between passes alternate, and `longest_m` is their sum.
                 share.map_or([longest_m; 2], |share| layout::divided_m(longest_m, share))
             });
             let t_y_m = around.t_y_m.get(k).copied().unwrap_or(0.0);
@@ -134,7 +134,7 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// Records a head's steps at each place that they cross and the head sees.
+    /// Records the distance between a head's neighbouring samples at each place between them that the head sees.
     fn add(
         &mut self,
         planner: &Planner,

@@ -25,7 +25,7 @@ fn standing(profile: &Profile) -> Standing<'_> {
 
 /// The reference table lists T_max of Eq. 16 for `ceran` at 0.197 m/s.
 ///
-/// The pings are at their actual angles.
+/// In this test, the pings are at the head's actual angles.
 #[test]
 fn t_max_equals_the_reference_table() {
     let profile = shapes::ceran().unwrap();
@@ -39,7 +39,7 @@ fn t_max_equals_the_reference_table() {
     for (step_deg, turn_s, expected) in modes {
         let turn = Turn::new(f64::to_radians(step_deg), turn_s).unwrap();
         for (heads, expected) in [1.0, 2.0, 4.0].into_iter().zip(expected) {
-            // A quarter turn is 37.5 steps of 2.4 degrees, so every other head's pings are half a step away from the
+            // A quarter turn is 37.5 steps of 2.4 degrees, so every second head's pings are half a step away from the
             // corner.
             let t_y = (0..4)
                 .map(|head| TAU * (f64::from(head) / heads))
@@ -93,13 +93,14 @@ fn footprint_on_a_flat_wall_equals_the_closed_form() {
 }
 
 #[test]
-fn yaw_lengthens_steps_and_beam_along_the_tunnel_is_an_error() {
+fn yaw_widens_sample_spacing_and_beam_along_the_tunnel_is_an_error() {
     let profile = shapes::ceran().unwrap();
     let turned = pose(&profile, 0.0, 0.0, f64::to_radians(15.0));
     let head = Standing::new(&profile, &turned, &mount()).unwrap();
     let ring = Ring::cast(&head, 0.0, 400).unwrap();
     assert!(ring.largest_step_m(1) > Ring::cast(&standing(&profile), 0.0, 400).unwrap().largest_step_m(1));
-    // At a yaw of 15 degrees, the beam to the left wall is tan(15 degrees) of its lateral range ahead or astern.
+    // At a yaw of 15 degrees, the beam to the left wall meets it ahead or astern by tan(15 degrees) times the lateral
+    // range.
     let left = head.sounding(math::FRAC_PI_2).unwrap();
     assert!((left.beam.x() / left.beam.y() + math::tan(f64::to_radians(15.0))).abs() < 1e-12);
 
@@ -116,7 +117,7 @@ fn yaw_lengthens_steps_and_beam_along_the_tunnel_is_an_error() {
 }
 
 #[test]
-fn largest_step_over_every_eighth_ray_equals_that_of_a_coarser_head() {
+fn largest_sample_distance_over_every_eighth_ray_equals_that_of_a_coarser_head() {
     let profile = shapes::ceran().unwrap();
     let fine = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let coarse = |start: u32| {
@@ -131,18 +132,18 @@ fn largest_step_over_every_eighth_ray_equals_that_of_a_coarser_head() {
 }
 
 #[test]
-fn step_with_few_pings_per_turn_spans_at_least_half_of_the_perimeter() {
+fn sample_distance_with_few_pings_per_turn_is_at_least_half_of_the_perimeter() {
     let profile = shapes::rectangle(20.0, 2.0).unwrap();
     let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let perimeter_m = profile.perimeter_m();
     assert!((ring.largest_step_m(1200) - perimeter_m).abs() < 1e-9);
-    // With two pings per turn, one of the two steps is at least half of the perimeter.
+    // With two pings per turn, one of the two distances between samples is at least half of the perimeter.
     assert!(ring.largest_step_m(600) >= perimeter_m / 2.0 - 1e-9);
     // For a head close to the left wall, a third of a turn spans more than half of the perimeter.
     let near = Standing::new(&profile, &pose(&profile, 9.9, 0.0, 0.0), &mount()).unwrap();
     let ring = Ring::cast(&near, 0.0, 1200).unwrap();
     assert!(ring.largest_step_m(400) > 0.8 * perimeter_m, "{}", ring.largest_step_m(400));
-    // The steps of a turn add up to one perimeter.
+    // The distances between the samples of a turn add up to one perimeter.
     for stride in [1, 8, 400] {
         let around: f64 = ring.steps_m(stride).step_by(stride).sum();
         assert!((around - perimeter_m).abs() < 1e-9);
@@ -152,7 +153,7 @@ fn step_with_few_pings_per_turn_spans_at_least_half_of_the_perimeter() {
 proptest! {
     /// Eq. 10: for any head position and profile, the mean chord of a turn is at most perimeter / pings.
     #[test]
-    fn mean_step_is_bounded_by_the_perimeter(
+    fn mean_sample_distance_is_bounded_by_the_perimeter(
         radii in prop::collection::vec(0.5..6.0f64, 5..40),
         (along, around) in (0.0..0.95f64, 0.0..TAU),
         steps in 3_u32..800,

@@ -1,16 +1,17 @@
-//! Limit of the speed from two figures of a strip: the time between its passes, and its longest step.
+//! Limit of the speed on a strip of wall, from the time between passes and the largest distance between samples of a
+//! turn.
 
 use crate::spacing;
 use headrace_geometry::math;
 
-/// Vehicle motion for the prediction of spacing.
+/// Motion of the vehicle and its beams, for the prediction of sample spacing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Going {
-    /// Time between two pings, the longest of any head, seconds.
+    /// Time between two pings of a head, the longest of any head, seconds.
     pub ping_period_s: f64,
     /// Largest speed of the beams along the wall due to swing, in addition to the vehicle's speed, m/s.
     pub swing_mps: f64,
-    /// Displacement of passes along the tunnel from their scheduled places, m, at any speed.
+    /// Displacement of passes along the tunnel from their scheduled places, m, the same at any speed.
     pub shift_m: f64,
     /// Distance between heads along the hull, m; the swing acts while the vehicle covers this distance.
     pub apart_m: f64,
@@ -20,12 +21,12 @@ pub struct Going {
     pub swing_most_m: Option<f64>,
 }
 
-/// Inputs of T on a strip: the time between passes, and the distance between neighbours around the wall.
+/// Inputs of the spacing T on a strip: the time between passes, and the distance between samples around the wall.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
     pub(super) gap_s: f64,
     pub(super) t_y_m: f64,
-    /// Unevenness of passes across a strip that sectors leave out; `None` for any other strip.
+    /// Unevenness of passes across a strip that lies between two sectors; `None` for any other strip.
     ///
     /// The strip's width is `t_y_m`. See [`crate::passes::Passes::uneven_ends`].
     pub(super) uneven: Option<f64>,
@@ -42,14 +43,14 @@ impl Limit {
         let advance_m = over_ground_mps * going.ping_period_s;
         let t_m = spacing::t_max_m(t_x_m, advance_m, self.t_y_m);
         let Some(uneven) = self.uneven else { return t_m };
-        // Shift of one row of samples relative to the other.
+        // The row of samples on one side of the strip may be shifted relative to the row on the other side.
         t_m.min(staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven, going.shift_m))
     }
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
     ///
-    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads apart, and a their
-    /// distance.
+    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads that are apart along
+    /// the hull, and a their distance.
     ///
     /// Two other limits may allow a higher speed, which is then the result: the largest displacement by swing between
     /// passes, and the circle between two rows of turning points.
@@ -85,7 +86,7 @@ impl Limit {
 ///
 /// The circle passes through two samples of a row and the sample of the other row between them, at distances a and b
 /// along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c = `across_m`. If c^2 < a b, its centre is not
-/// between the rows. The samples of a row then limit the circle on this row.
+/// between the rows. In that case, two samples of one row limit a circle centred on that row.
 fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let off_m = (uneven * along_m + moved_m).min(along_m / 2.0);
     let square = |x_m: f64| x_m * x_m;
@@ -145,13 +146,13 @@ mod tests {
                 assert!((back_m - along_m).abs() < 1e-9, "{what}: {back_m}");
             }
         }
-        // Samples of level rows form the corners of a rectangle.
+        // If the rows are level, their samples form the corners of a rectangle.
         assert!((staggered_m(0.4, 0.3, 0.5, 0.0) - 0.5).abs() < 1e-12);
         assert!((staggered_m(0.4, 0.3, 0.3, 1.0) - 0.5).abs() < 1e-12);
     }
 
     #[test]
-    fn largest_gap_at_the_limit_speed_equals_the_target_with_swing_and_shift() {
+    fn largest_hole_at_the_limit_speed_equals_the_target_with_swing_and_shift() {
         let bounded = Some(0.3);
         for (swing_mps, shift_m, swing_most_m) in
             [(0.0, 0.0, None), (0.01, 0.0, None), (0.0, 0.03, None), (0.01, 0.03, bounded)]

@@ -17,7 +17,7 @@ const GOING: Going = Going {
     swing_most_m: None,
 };
 
-/// A pipe with a perimeter of 30 m; seen from its axis, all steps are equally long.
+/// A pipe with a perimeter of 30 m. For a head on the axis, samples of a turn are equally spaced.
 fn pipe() -> Profile {
     shapes::circle(30.0 / math::TAU).unwrap()
 }
@@ -33,7 +33,7 @@ fn arc(from_m: f64, length_m: f64) -> Arc {
     Arc { from_m, length_m }
 }
 
-/// A step of 2.4 degrees is 0.2 m long.
+/// An angular step of 2.4 degrees is 0.2 m long on the wall.
 fn strips(views: &[View]) -> Strips {
     let ring = ring(&pipe());
     let mut strips = Strips::default();
@@ -59,7 +59,7 @@ fn closed(target_m: f64, t_y_m: f64, gap_s: f64) -> f64 {
 }
 
 #[test]
-fn full_view_gives_one_strip() {
+fn wall_seen_by_all_heads_is_one_strip() {
     let one = strips(&[all_around(&[]), all_around(&[])]);
     let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), hidden: false, wait: 1.0 };
     assert_eq!(one.as_slice(), [whole]);
@@ -90,12 +90,12 @@ fn fewer_passes_on_a_hidden_strip_lower_the_speed() {
 }
 
 #[test]
-fn narrow_hidden_strip_counts_like_a_long_step() {
+fn narrow_hidden_strip_counts_like_a_large_distance_between_samples() {
     let some = strips(&[all_around(&[arc(7.0, 0.1)]), all_around(&[])]);
-    // Pings may end one step before the hidden strip on either side.
+    // The last pings on either side may be one step away from the hidden strip.
     let v = speed(&some, &turning(2), 0.8).unwrap();
     assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
-    // A strip counts even if it is narrower than the spacing of the ring's soundings.
+    // A hidden strip counts even if it is narrower than the spacing of the ring's soundings.
     let sliver = strips(&[all_around(&[arc(7.0013, 1e-4)])]);
     let v = speed(&sliver, &turning(1), 0.8).unwrap();
     assert!((v - closed(0.8, 0.4001, 8.0)).abs() < 1e-9, "{v}: {sliver:?}");
@@ -128,8 +128,8 @@ fn gap_between_sectors_is_an_unseen_strip_that_limits_the_speed() {
     let some = strips(&views);
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
     assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
-    // For a large target, the end of a sector is the limit. For a small target, the limit is the circle through three
-    // samples: two on one side of the gap, 8 s apart, and one between them on the other side.
+    // For a large target, the spacing at the end of a sector limits the speed. For a small target, the circle through
+    // three samples limits it: two on one side of the gap, 8 s apart, and one between them on the other side.
     let v = speed(&some, &passes, 1.0).unwrap();
     assert!((v - closed(1.0, 0.2, 8.0)).abs() < 1e-9);
     let v = speed(&some, &passes, 0.35).unwrap();
@@ -145,7 +145,7 @@ fn hidden_arc_outside_a_sector_has_no_effect() {
         hidden: Vec::new(),
     };
     let open = [plain(0.0, 14.99), plain(15.0, 15.0)];
-    // The arc covers a narrow strip that both sectors leave out, and wall of the other head's sector.
+    // The hidden arc covers a narrow strip between the sectors, and wall in the other head's sector.
     let mut beside = open.clone();
     beside[0].hidden = vec![arc(14.992, 5.0)];
     let passes = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
@@ -161,7 +161,7 @@ fn hidden_arc_outside_a_sector_has_no_effect() {
 ///
 /// The rectangle's corners lie within the heads' sectors.
 #[test]
-fn long_step_in_a_sector_counts_with_the_local_time_between_passes() {
+fn large_sample_distance_in_a_sector_uses_the_pass_interval_at_that_place() {
     let (target_m, sweep_s, count) = (0.5, 8.0, 75);
     let profile = shapes::rectangle(6.0, 4.0).unwrap();
     let ring = ring(&profile);
@@ -214,8 +214,9 @@ fn long_step_in_a_sector_counts_with_the_local_time_between_passes() {
 }
 
 #[test]
-fn steps_count_only_on_strips_that_they_touch() {
-    // Steps of a rectangle are long in its corners. A strip in the middle of the floor has no long steps.
+fn sample_distances_count_only_on_strips_that_they_touch() {
+    // Neighbouring samples are far apart in the corners of a rectangle, but not on a strip in the middle of the
+    // floor.
     let profile = shapes::rectangle(8.0, 4.0).unwrap();
     let ring = ring(&profile);
     let mut some = Strips::default();
@@ -227,7 +228,7 @@ fn steps_count_only_on_strips_that_they_touch() {
 }
 
 #[test]
-fn swing_and_shift_widen_the_distance_between_passes() {
+fn vehicle_swing_and_pass_shift_widen_the_distance_between_passes() {
     let one = strips(&[all_around(&[])]);
     let rough = Going { swing_mps: 0.01, apart_swing_mps: 0.01, shift_m: 0.05, apart_m: 0.2, ..GOING };
     let v = one.bound_for_target(0, &turning(1), 0.5, &rough).unwrap().speed_mps;
@@ -243,7 +244,7 @@ fn swing_and_shift_widen_the_distance_between_passes() {
 }
 
 #[test]
-fn wall_out_of_reach_is_hidden() {
+fn wall_beyond_the_range_limits_counts_as_hidden() {
     let profile = shapes::rectangle(8.0, 4.0).unwrap();
     let ring = ring(&profile);
     let hidden = |reach_m: [f64; 2]| {
@@ -276,8 +277,8 @@ fn overlapping_hidden_arcs_across_the_seam_form_one_strip() {
 
 #[test]
 fn obstacle_list_at_capacity_overestimates_hidden_wall() {
-    // Slots all around the profile are outside the range limits. One of the two views has too little capacity for the
-    // slots.
+    // Slots in the wall all around the profile are outside the range limits. One of the two views has too little
+    // capacity for the slots.
     let points: Vec<[f64; 2]> = (0..240)
         .map(|k| {
             let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);
@@ -303,7 +304,7 @@ fn obstacle_list_at_capacity_overestimates_hidden_wall() {
     }
 }
 
-/// In either direction of rotation, the strip changes at this distance, even across the seam.
+/// In either direction of rotation, the strip ends at the computed distance, even across the seam.
 #[test]
 fn distance_to_the_end_of_the_strip_is_right_for_each_sounding() {
     let mut strips = strips(&[all_around(&[arc(4.0, 3.0), arc(28.0, 3.5)]), all_around(&[arc(10.0, 5.0)])]);

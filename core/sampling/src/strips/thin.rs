@@ -1,30 +1,30 @@
-//! Detection of strips that are passed less often than others.
+//! Detection of wall strips over which heads pass less often than over other strips.
 
 use crate::head::HeadSet;
 use crate::passes::Passes;
 
-/// Number of head sets whose gaps are stored.
+/// Number of head sets for which the longest time between passes is stored.
 ///
-/// Strips hidden from one or two heads rarely have more different head sets.
+/// If strips are hidden from one or two heads, there are rarely more different head sets.
 const SETS: usize = 8;
-/// Number of strips whose head set is cached; the gaps of other strips are computed again.
+/// Number of strips whose head set is cached; for other strips, the time between passes is computed again.
 const STRIPS: usize = 64;
-/// Number that stands for a head set that is not stored.
+/// Index that stands for a head set that is not stored.
 const NOT_KEPT: u8 = u8::MAX;
 
-/// Time between passes over each strip, and the thin strips.
+/// Longest time between passes over each strip, and detection of thin strips.
 ///
 /// A thin strip is passed less often than the strip that is passed most often.
 pub(super) struct Thin<'a> {
     passes: &'a Passes,
-    /// Head sets and their gaps, s; many strips are seen by the same heads.
+    /// Head sets, each with its longest time between passes, s; many strips are seen by the same heads.
     sets: [(HeadSet, Option<f64>); SETS],
     set_of: [u8; STRIPS],
     best_s: f64,
 }
 
 impl<'a> Thin<'a> {
-    /// Creates the detection for strips; `strips` lists the heads that see each strip.
+    /// Creates the detection of thin strips; `strips` lists the heads that see each strip.
     pub(super) fn of(passes: &'a Passes, strips: impl Iterator<Item = HeadSet>) -> Self {
         let mut thin = Self {
             passes,
@@ -68,17 +68,17 @@ impl<'a> Thin<'a> {
         kept.map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| *gap_s)
     }
 
-    /// Longest time of `needed` passes over a strip, s; see [`Passes::time_for_s`].
+    /// Longest time that `needed` passes over a strip take, s; see [`Passes::time_for_s`].
     pub(super) fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         if needed > 1.0 { self.passes.time_for_s(seen_by, gap_s, needed) } else { gap_s }
     }
 
-    /// Unevenness at shared ends, as in [`Passes::uneven_ends`].
+    /// Unevenness of passes at shared sector ends, as in [`Passes::uneven_ends`].
     pub(super) fn uneven_ends(&self) -> Option<f64> {
         self.passes.uneven_ends()
     }
 
-    /// Whether extra passes are required for lost returns.
+    /// Whether extra passes over each place are required for lost returns.
     pub(super) fn is_lossy(&self) -> bool {
         self.passes.is_lossy()
     }

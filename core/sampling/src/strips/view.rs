@@ -8,10 +8,10 @@ use crate::ring::{Ring, Standing};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 
-/// An interval of the perimeter.
+/// An interval of the wall's perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Arc {
-    /// Arc length of the start, m.
+    /// Arc length at the start of the interval, m.
     pub from_m: f64,
     /// Length of the interval in the direction of growing arc length, m.
     pub length_m: f64,
@@ -54,10 +54,10 @@ impl Arc {
 
 /// Number of equal angles into which a sector is divided.
 ///
-/// The longest times between passes at the two ends of a part differ by an eighth of a sweep there and back.
+/// At the two ends of one part, the longest times between passes differ by an eighth of a sweep there and back.
 pub const PARTS: usize = 8;
 
-/// Wall of a head's sector, in parts of equal angle from one turning point to the other.
+/// Wall within a head's sector, in parts of equal angle from one turning point to the other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sector {
     parts: [Arc; PARTS],
@@ -79,12 +79,12 @@ impl Sector {
         Ok(Self { parts })
     }
 
-    /// Parts of the sector.
+    /// Wall of each part of the sector.
     pub(super) fn parts(&self) -> impl Iterator<Item = &Arc> {
         self.parts.iter()
     }
 
-    /// Longest time between two passes over the part that contains this place, 0.5 to 1.
+    /// Longest time between two passes over the part of the sector that contains this place, 0.5 to 1.
     ///
     /// The time is a share of a sweep there and back; `None` outside the sector. At a turning point, one pass follows
     /// another immediately, and the next comes a whole sweep later. In the middle of the sector, passes are evenly
@@ -98,7 +98,7 @@ impl Sector {
 
 #[cfg(test)]
 impl Sector {
-    /// Creates a sector in the middle of a pipe, where equal angles are equal arcs.
+    /// Creates the sector of a head on the axis of a pipe, where equal angles are equal arcs.
     pub(super) fn evenly(arc: Arc) -> Self {
         let length_m = arc.length_m / PARTS as f64;
         let part = |k: usize| Arc { from_m: arc.from_m + k as f64 * length_m, length_m };
@@ -120,8 +120,8 @@ stateful!(View { state: sector; lists: hidden; });
 impl View {
     /// Hides the parts of a ring that are outside the head's range limits.
     ///
-    /// Without capacity for another arc, the function extends the last arc over the visible part in between. Hiding
-    /// too much wall is the safe error.
+    /// Without capacity for another arc, the function extends the last arc over the visible wall up to the new arc.
+    /// Hiding too much wall is the safe error.
     ///
     /// Allocates: not if the capacity suffices for one arc.
     pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {

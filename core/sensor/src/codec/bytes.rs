@@ -7,13 +7,13 @@ pub struct Bytes<const N: usize> {
     len: usize,
 }
 
-/// Error: the bytes do not fit.
+/// Error: the bytes do not fit into the byte string.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("storing {len} bytes; at most {max} are allowed")]
 pub struct TooLong {
-    /// Required length, bytes.
+    /// Number of bytes that the contents would need.
     pub len: usize,
-    /// Capacity, bytes.
+    /// Capacity of the byte string, bytes.
     pub max: usize,
 }
 
@@ -24,7 +24,7 @@ impl<const N: usize> Default for Bytes<N> {
 }
 
 impl<const N: usize> Bytes<N> {
-    /// Creates a copy of `bytes`.
+    /// Creates a byte string with a copy of `bytes`.
     ///
     /// Errors: `bytes` has more than `N` bytes.
     pub fn new(bytes: &[u8]) -> Result<Self, TooLong> {
@@ -44,18 +44,18 @@ impl<const N: usize> Bytes<N> {
         Ok(())
     }
 
-    /// Removes all bytes.
+    /// Removes all bytes of the string.
     pub fn clear(&mut self) {
         self.as_mut_slice().fill(0);
         self.len = 0;
     }
 
-    /// Returns the bytes, mutably.
+    /// Returns the bytes of the string as a mutable slice.
     pub fn as_mut_slice(&mut self) -> &mut [u8] {
         self.bytes.get_mut(..self.len).unwrap_or_default()
     }
 
-    /// Returns the bytes.
+    /// Returns the bytes of the string.
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or_default()
     }

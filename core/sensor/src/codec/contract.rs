@@ -7,7 +7,7 @@ use proptest::test_runner::{Config, RngSeed};
 
 use super::interface::Codec;
 
-/// Seed of the contract's random values; arbitrary.
+/// Seed of the random values in contract tests; an arbitrary number.
 const SEED: u64 = 881;
 
 /// Proptest configuration of the contract's tests, which draw the same values on every run.
@@ -24,8 +24,8 @@ pub fn config() -> Config {
     Config { rng_seed, failure_persistence: None, ..from_environment }
 }
 
-/// Decodes `bytes` pushed in pieces of the given lengths, without a flush. The last piece contains the remaining
-/// bytes.
+/// Decodes `bytes`, pushed into the codec in pieces of the given lengths, without a flush. The last piece contains
+/// the remaining bytes.
 pub fn decode_pieces<C: Codec>(codec: &mut C, bytes: &[u8], pieces: &[usize]) -> Vec<C::Value> {
     let mut values = Vec::new();
     let mut rest = bytes;
@@ -40,14 +40,14 @@ pub fn decode_pieces<C: Codec>(codec: &mut C, bytes: &[u8], pieces: &[usize]) ->
     values
 }
 
-/// Decodes `bytes` pushed in one piece, then flushes.
+/// Decodes `bytes`, pushed into the codec in one piece, and then flushes the codec.
 pub fn decode_all<C: Codec>(codec: &mut C, bytes: &[u8]) -> Vec<C::Value> {
     let mut values = decode_pieces(codec, bytes, &[]);
     codec.flush(&mut |value| values.push(value));
     values
 }
 
-/// Decodes garbage followed by a good frame, whose value must come last.
+/// Decodes garbage followed by a good frame; that frame's value must be the last one decoded.
 pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8]) -> Vec<C::Value> {
     let mut values = Vec::new();
     codec.push(garbage, &mut |value| values.push(value));
@@ -59,14 +59,14 @@ pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8
     values
 }
 
-/// Whether `bytes` is exactly one good frame.
+/// Whether `bytes` decodes as exactly one good frame.
 fn is_one_frame<C: Codec>(codec: &mut C, bytes: &[u8]) -> bool {
     let values = decode_all(codec, bytes);
     let counts = codec.counts();
     values.len() == 1 && counts.bad_frames == 0 && counts.skipped_bytes == 0
 }
 
-/// Sets the two bytes from `at` on so that `bytes` passes as one frame; returns `false` if this is impossible.
+/// Sets the two bytes from `at` on such that `bytes` decodes as one frame; returns `false` if that is impossible.
 fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) -> bool {
     let Some(before) = bytes.get(at..at + 2).map(<[u8]>::to_vec) else { return false };
     if bytes.len() > MOST_MATCHED {
@@ -96,14 +96,14 @@ fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
 /// checksum.
 const MOST_MATCHED: usize = 100;
 
-/// Returns corrupted frames that pass by chance.
+/// Returns corrupted frames that decode as good frames by chance.
 ///
 /// One byte of a good frame is changed, and its checksum, if any, is changed to match.
 pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let wrong = attempts(frame.len()).filter_map(|(at, turn)| {
         let mut wrong = frame.to_vec();
         wrong[at] ^= turn;
-        // A checksum is near the end, possibly in digits.
+        // A checksum is near the end of a frame, possibly written in digits.
         let places = (0..frame.len().saturating_sub(1))
             .rev()
             .take(6)
@@ -114,7 +114,7 @@ pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<V
     wrong.collect()
 }
 
-/// Returns truncated frames that, with the first bytes of the good frame after them, pass as one frame.
+/// Returns truncated frames that, together with the first bytes of the next good frame, decode as one frame.
 pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let len = frame.len();
     let cut = (2..len).rev().step_by(len.div_ceil(6)).filter_map(|keep| {
@@ -243,8 +243,8 @@ macro_rules! codec_contract {
                 assert!(tried > 0);
             }
 
-            /// A truncated frame may match together with the next bytes. Then only the frame with those bytes is
-            /// lost.
+            /// A truncated frame may form a valid frame with the bytes after it. Then only the frame with those bytes
+            /// is lost.
             #[test]
             fn truncated_frame_completed_by_the_next_frame_hides_only_that_frame() {
                 for frame in $frames {

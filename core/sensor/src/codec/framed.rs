@@ -1,4 +1,4 @@
-//! Framing that rescans after a failed candidate, shared by all codecs.
+//! Search for frames that rescans the bytes of a failed frame candidate; shared by all codecs.
 
 use super::interface::{Codec, CodecCounts};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -6,18 +6,18 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 /// Verdict on the bytes from the start of a frame candidate on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// No frame begins here.
+    /// No frame begins at this byte.
     NotAStart,
-    /// A frame may begin here; a decision needs at least this many bytes in total.
+    /// A frame may begin here; a verdict needs at least this many bytes in total.
     Need(usize),
-    /// A complete frame of this many bytes.
+    /// A complete frame of this many bytes begins here.
     Frame(usize),
-    /// A start marker without a valid frame after it.
+    /// A start marker that no valid frame follows.
     Bad,
 }
 
 impl Verdict {
-    /// Returns the verdict on a candidate of `len` bytes; `is_good` checks the candidate once it is complete.
+    /// Returns the verdict on a frame candidate of `len` bytes; `is_good` checks the candidate once it is complete.
     pub fn on(front: &[u8], len: usize, is_good: impl FnOnce(&[u8]) -> bool) -> Self {
         match front.get(..len) {
             None => Self::Need(len),
@@ -29,10 +29,10 @@ impl Verdict {
 
 /// Frame format of one protocol; [`Framed`] turns it into a codec.
 pub trait Framing: Copy {
-    /// See [`Codec::Value`].
+    /// Value of one frame; see [`Codec::Value`].
     type Value: Clone + PartialEq + core::fmt::Debug;
 
-    /// See [`Codec::WHOLE_MESSAGES`].
+    /// Whether the transport delivers whole messages; see [`Codec::WHOLE_MESSAGES`].
     const WHOLE_MESSAGES: bool = false;
 
     /// Returns the verdict on a frame at the start of `front`, which has at least one byte; depends on `front`
@@ -46,9 +46,9 @@ pub trait Framing: Copy {
 /// Codec of a [`Framing`]: keeps an incomplete frame between pushes and finds frames in arbitrary input.
 ///
 /// `N` is the maximum frame length; a candidate that needs more bytes is bad. On a byte stream, scanning resumes at
-/// the second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame
-/// is skipped, and does not count as a bad frame. In a whole message, the first bytes that are no frame make the
-/// rest of the message one bad frame. Apparent frames in that rest are ignored.
+/// the second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame is
+/// skipped, and does not count as a bad frame. In a whole message, all bytes from the first one outside a frame to
+/// the end count as one bad frame. Apparent frames among these bytes are ignored.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]
@@ -75,13 +75,13 @@ impl<F, const N: usize> Framed<F, N> {
 }
 
 impl<F, const N: usize> Framed<F, N> {
-    /// Returns the frame format.
+    /// Returns the frame format of the codec.
     pub fn framing(&self) -> &F {
         &self.framing
     }
 }
 
-/// Saves the incomplete frame and the counters.
+/// Saves the codec's incomplete frame and its counters.
 impl<F, const N: usize> Stateful for Framed<F, N> {
     fn save(&self, to: &mut Saver) {
         to.value(&(self.astray, self.counts));
@@ -123,11 +123,11 @@ impl<F: Framing, const N: usize> Framed<F, N> {
         self.astray = false;
     }
 
-    /// Handles a silence, before `next` is pushed. Drops held bytes only if they are provably a false start.
+    /// Handles a silence on the line, before `next` is pushed. Drops held bytes only if they are provably no frame.
     ///
-    /// A whole frame inside the held bytes or at the start of `next` is the proof. Without it, the held bytes are
-    /// kept, however late the rest of the frame comes, because a slow line looks the same as a false start. Frames
-    /// go to `take` as in [`Framed::push_frames`]. In message mode, the message ends with the silence.
+    /// A whole frame inside the held bytes or at the start of `next` is the proof. Without this proof, the held bytes
+    /// are kept, however late the rest of the frame comes, because a slow line looks the same as a false start.
+    /// Frames go to `take` as in [`Framed::push_frames`]. In message mode, the message ends with the silence.
     pub fn settle_frames(&mut self, next: &[u8], mut take: impl FnMut(&[u8], usize)) {
         if F::WHOLE_MESSAGES || self.is_whole_frame(next) {
             return self.flush_frames(take);
@@ -145,7 +145,7 @@ impl<F: Framing, const N: usize> Framed<F, N> {
             && matches!(self.framing.judge(front), Verdict::Frame(n) if (1..=front.len().min(N)).contains(&n))
     }
 
-    /// Takes frames from the held bytes. Gives up incomplete candidates that begin before `give_up_before`.
+    /// Extracts frames from the held bytes, and gives up incomplete candidates that begin before `give_up_before`.
     fn scan(&mut self, later: usize, give_up_before: usize, take: &mut impl FnMut(&[u8], usize)) {
         let mut start = 0;
         while start < self.len {
@@ -239,7 +239,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn flush_releases_a_frame_behind_a_false_start() {
+    fn flush_releases_a_frame_after_a_false_start() {
         let mut codec = Framed::<Marked<false>, 8>::default();
         assert!(pushed(&mut codec, &[0xA5, 5, 0xA5, 0, 0x5A]).is_empty());
         assert_eq!(codec.held_bytes(), 5);
@@ -253,13 +253,13 @@ pub(super) mod tests {
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut behind = Vec::new();
         codec.push_frames(&[0, 0xA5, 5, 0xA5], |_, back| behind.push(back));
-        // The codec holds the false start and the first byte of a frame, and the next push exceeds the buffer.
+        // The codec holds a false start marker and the first byte of a frame, and the next push exceeds the buffer.
         codec.push_frames(&[1, 7, 0x5A, 0, 0, 0xA5, 0, 0x5A, 0], |_, back| behind.push(back));
         assert_eq!(behind, [10, 4]);
     }
 
     #[test]
-    fn candidate_longer_than_the_buffer_is_bad() {
+    fn frame_candidate_longer_than_the_buffer_is_bad() {
         let mut codec = Framed::<Marked<false>, 7>::default();
         assert_eq!(pushed(&mut codec, &[0xA5, 5, 0xA5, 1, 7, 0x5A]), [[7]]);
     }

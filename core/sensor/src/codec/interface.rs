@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 /// Counters of a codec. Every pushed byte belongs to a good frame, counts in `skipped_bytes`, or is still held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CodecCounts {
-    /// Complete, valid frames.
+    /// Number of complete, valid frames.
     pub good_frames: u64,
-    /// Candidates that begin with a start marker, but fail by checksum, terminator, length or range.
+    /// Number of frame candidates that begin with a start marker, but fail by checksum, terminator, length or range.
     pub bad_frames: u64,
-    /// Bytes that belong to no good frame.
+    /// Number of bytes that belong to no good frame.
     pub skipped_bytes: u64,
 }
 
@@ -44,9 +44,9 @@ pub trait Codec {
     /// Gives up an incomplete frame and rescans its bytes.
     fn flush(&mut self, sink: &mut dyn FnMut(Self::Value));
 
-    /// Counters so far.
+    /// Counters of frames and bytes so far.
     fn counts(&self) -> CodecCounts;
 
-    /// Bytes held for an incomplete frame.
+    /// Number of bytes held because they may begin an incomplete frame.
     fn held_bytes(&self) -> usize;
 }

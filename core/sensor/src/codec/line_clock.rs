@@ -12,16 +12,16 @@ const MAX_PARTS: usize = 32;
 
 /// Stamps each frame of a byte stream with the receive time of the packet that contained its first byte.
 ///
-/// A frame may begin in an earlier packet than the one that completes it, at any time before. If the held bytes
-/// come from more than `MAX_PARTS` packets, the latest ones before the newest are merged into one. A frame that
-/// begins in a merged packet, after a false start, is then stamped too early.
+/// A frame may begin in a packet that arrived long before the one that completes it. If bytes of an incomplete frame
+/// come from over `MAX_PARTS` packets, the packets just before the newest one are merged. A frame that begins in a
+/// merged packet, after a false start, is then stamped too early.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct LineClock {
     silence: DurNs,
     last: MonoNs,
-    /// Packets that contained the held bytes, oldest first.
+    /// Packets that contained the bytes held by the codec, oldest first.
     parts: [Part; MAX_PARTS],
     len: usize,
 }
@@ -76,7 +76,7 @@ impl LineClock {
         }
     }
 
-    /// Returns the receive time of the first of the last `behind` bytes.
+    /// Returns the receive time of the byte that is `behind` bytes before the end of the input.
     fn received(&self, behind: usize) -> MonoNs {
         let mut after = 0;
         let holds = |part: &&Part| {
@@ -86,7 +86,7 @@ impl LineClock {
         self.parts().iter().rev().find(holds).map_or(self.last, |part| part.received)
     }
 
-    /// Drops the packets that contain none of the last `held` bytes.
+    /// Drops the records of packets that contain none of the last `held` bytes.
     fn keep(&mut self, held: usize) {
         let mut after = 0;
         let needed = self.parts().iter().rev().take_while(|part| {
@@ -121,13 +121,13 @@ mod tests {
     }
 
     #[test]
-    fn frame_in_pieces_has_the_time_of_its_first_byte() {
+    fn frame_received_in_pieces_has_the_time_of_its_first_byte() {
         let packets: [&[u8]; 4] = [&[0xA5], &[2, 8], &[9, 0x5A, 0xA5, 0, 0x5A, 0xA5], &[0, 0x5A]];
         assert_eq!(times(&mut clock(5), &packets), [1, 3, 3]);
     }
 
     #[test]
-    fn frame_behind_a_false_start_has_the_time_of_its_first_byte() {
+    fn frame_after_a_false_start_has_the_time_of_its_first_byte() {
         let packets: [&[u8]; 4] = [&[0xA5, 5], &[0xA5], &[1, 7], &[0x5A, 0, 0]];
         assert_eq!(times(&mut clock(5), &packets), [2]);
     }

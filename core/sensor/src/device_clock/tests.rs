@@ -21,7 +21,7 @@ impl Random {
     }
 }
 
-/// A device that sends its time every `period_ns` from a clock with a rate error of `ppm`.
+/// A simulated device that sends its clock's time every `period_ns`; the clock has a rate error of `ppm`.
 struct Device {
     bits: u32,
     tick: i64,
@@ -44,14 +44,14 @@ impl Device {
         self.first_ticks.wrapping_add(elapsed) & mask
     }
 
-    /// Sends stamps from `from_s` to `to_s`; returns the last unwrapped time.
+    /// Sends stamps from `from_s` to `to_s`; returns the last device time without wraps.
     #[expect(clippy::cast_possible_truncation, reason = "positive and below 2^63")]
     fn send(&self, clock: &mut DeviceClock, random: &mut Random, from_s: f64, to_s: f64) -> DurNs {
         let mut at = from_s * 1e9;
         let mut last = 0;
         let mut device = DurNs::ZERO;
         while at < to_s * 1e9 {
-            // A queue preserves the order.
+            // A queue preserves the order of the stamps.
             last = last.max(5 * S + (at + 300e3 + random.queue_ns(self.queue_ns)) as u64);
             device = clock.take(self.ticks(at), MonoNs(last));
             at += self.period_ns;
@@ -76,7 +76,7 @@ fn sbg(ppm: f64) -> Device {
 }
 
 #[test]
-fn drift_error_agrees_with_its_standard_deviation() {
+fn clock_drift_error_agrees_with_its_standard_deviation() {
     let mut within_two = 0;
     let mut squares = 0.0;
     let cases = 160;
@@ -91,7 +91,8 @@ fn drift_error_agrees_with_its_standard_deviation() {
         assert_eq!((report.restarts, report.jumps), (0, 0), "seed {seed}");
         let error = (drift.ppm - ppm) / drift.sd_ppm;
         assert!(error.abs() < 5.0, "seed {seed}: {drift:?} of {ppm}");
-        // The sd itself must be small: a few ppm after a minute or two, and a fraction of a ppm later.
+        // The drift's standard deviation must be small: a few ppm after a minute or two, and a fraction of a ppm
+        // later.
         assert!(drift.sd_ppm < 300.0 / seconds, "seed {seed}, {seconds} s: {drift:?}");
         within_two += u32::from(error.abs() < 2.0);
         squares += error * error;
@@ -102,7 +103,7 @@ fn drift_error_agrees_with_its_standard_deviation() {
 }
 
 #[test]
-fn ticks_over_10_h_are_unwrapped_exactly() {
+fn device_clock_ticks_over_10_h_are_unwrapped_exactly() {
     // The clock wraps every 71.6 minutes, so it wraps eight times in ten hours.
     let device = Device { period_ns: 1e8, ..sbg(20.0) };
     let mut clock = device.clock();
@@ -140,13 +141,14 @@ fn device_time_continues_after_hours_of_silence() {
 }
 
 #[test]
-fn restart_begins_an_epoch_and_keeps_the_drift() {
+fn clock_restart_begins_an_epoch_and_keeps_the_drift() {
     let device = Device { first_ticks: 0, ..xsens(80.0) };
     let mut clock = device.clock();
     let mut random = Random(4);
     device.send(&mut clock, &mut random, 0.0, 900.0);
     let before = clock.report();
-    // The device is off for eight seconds. Then its ticks restart from zero, 908 s after the first start.
+    // The device is off for eight seconds. Then the ticks of its clock restart from zero, 908 s after the first
+    // start.
     let mut last = DurNs::ZERO;
     for i in 0..300_u64 {
         last = clock.take(i * 100, MonoNs((5 + 908) * S + i * S / 100));
@@ -158,8 +160,9 @@ fn restart_begins_an_epoch_and_keeps_the_drift() {
 }
 
 #[test]
-fn restart_that_looks_like_a_delay_is_recognised() {
-    // The clock shows 4.9 s at 4.9 s. After a restart it shows 6 s at 13 s: it is 7 s behind, but never goes back.
+fn clock_restart_that_looks_like_a_delay_is_recognised() {
+    // The clock shows 4.9 s at 4.9 s. After a restart, the clock shows 6 s at 13 s. So it is 7 s behind, but its time
+    // has never gone back.
     let mut clock = DeviceClock::new(32, DurNs(1000));
     let mut take = |device_ms: u64, ours_ms: u64| clock.take(device_ms * 1000, MonoNs(ours_ms * 1_000_000));
     for i in 0..50 {
@@ -174,7 +177,7 @@ fn restart_that_looks_like_a_delay_is_recognised() {
 }
 
 #[test]
-fn jump_ahead_by_1_h_begins_an_epoch() {
+fn clock_jump_ahead_by_1_h_begins_an_epoch() {
     // If a clock wraps every 71.6 minutes, a jump of an hour ahead looks like 11.6 minutes behind, which is a
     // restart.
     for (device, epochs) in [(xsens(30.0), (0, 1)), (sbg(30.0), (1, 0))] {
@@ -188,18 +191,18 @@ fn jump_ahead_by_1_h_begins_an_epoch() {
         assert_eq!((report.restarts, report.jumps), epochs);
         let drift = report.drift.unwrap();
         assert!((drift.ppm - 30.0).abs() < 5.0 * drift.sd_ppm, "{drift:?}");
-        // The second epoch is the longer one.
+        // The clock's second epoch is longer than the first.
         assert!((report.span.as_secs_f64() - 400.0).abs() < 0.1);
     }
 }
 
 #[test]
-fn burst_after_silence_counts_as_neither_restart_nor_drift() {
+fn burst_of_stamps_after_silence_counts_as_neither_restart_nor_drift() {
     let device = Device { queue_ns: 1e5, ..sbg(12.0) };
     let mut clock = device.clock();
     let mut random = Random(6);
     device.send(&mut clock, &mut random, 0.0, 200.0);
-    // Stamps of four seconds arrive late and all at once.
+    // The stamps of four seconds arrive late and all at once.
     for i in 0..200_u32 {
         let at_s = 200.0 + f64::from(i) * 0.02;
         clock.take(device.ticks(at_s * 1e9), MonoNs(5 * S + 204 * S));
@@ -212,7 +215,7 @@ fn burst_after_silence_counts_as_neither_restart_nor_drift() {
 }
 
 #[test]
-fn burst_at_start_counts_as_neither_restart_nor_drift() {
+fn burst_of_stamps_at_start_counts_as_neither_restart_nor_drift() {
     let device = sbg(25.0);
     let mut clock = device.clock();
     for i in 0..150_u32 {
@@ -226,8 +229,8 @@ fn burst_at_start_counts_as_neither_restart_nor_drift() {
 }
 
 #[test]
-fn wrong_tick_length_shows_as_restarts_or_jumps() {
-    // If ticks of 100 us are taken for 1 us, the clock looks slow; in the reverse case it looks fast.
+fn wrong_clock_tick_length_shows_as_restarts_or_jumps() {
+    // If ticks of 100 us are configured as 1 us, the clock looks slow; in the reverse case it looks fast.
     for (real, taken) in [(100_000, 1000), (1000, 100_000)] {
         let device = Device { tick: real, ..xsens(0.0) };
         let mut clock = DeviceClock::new(32, DurNs(taken));
@@ -250,7 +253,7 @@ fn sample_counter_is_unwrapped() {
 }
 
 #[test]
-fn few_stamps_give_no_drift() {
+fn few_device_stamps_give_no_drift_estimate() {
     let mut clock = DeviceClock::new(32, DurNs(1000));
     assert_eq!(
         clock.report(),

@@ -1,4 +1,4 @@
-//! Splits a byte stream into the device's frames.
+//! Splits a device's byte stream into frames.
 //!
 //! Each log message is therefore one frame, stamped with the receive time of its first byte.
 
@@ -16,9 +16,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 pub struct Cutter<F, const N: usize> {
     codec: Framed<F, N>,
     silence: DurNs,
-    /// Receive time of the last bytes.
+    /// Receive time of the last received bytes.
     last: MonoNs,
-    /// Whether the silence since the last bytes has been handled.
+    /// Whether the silence since the last received bytes has been handled.
     settled: bool,
     /// Bytes that have not been passed on yet.
     pending: Vec<u8>,
@@ -26,10 +26,10 @@ pub struct Cutter<F, const N: usize> {
     parts: VecDeque<(MonoNs, usize)>,
 }
 
-/// A piece of the input: a frame, or bytes between frames.
+/// A piece of the byte stream: a frame, or bytes between frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece<'a> {
-    /// Receive time of the first byte.
+    /// Receive time of the piece's first byte.
     pub received: MonoNs,
     /// Bytes of the piece.
     pub bytes: &'a [u8],
@@ -75,12 +75,12 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
     /// Returns the time of the next push of an empty slice, after which an incomplete frame no longer holds back
     /// others.
     ///
-    /// `None` if nothing is pending, or if the silence has been handled.
+    /// `None` if no bytes are pending, or if the silence has been handled.
     pub fn settles(&self) -> Option<MonoNs> {
         (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }
 
-    /// Whether these bytes alone contain a frame that satisfies `one_of_its`.
+    /// Whether these bytes alone contain a complete frame of this device; `one_of_its` checks a frame.
     pub fn accepts(&self, bytes: &[u8], one_of_its: impl Fn(&[u8]) -> bool) -> bool {
         let (mut codec, mut found) = (Framed::<F, N>::new(*self.codec.framing()), false);
         codec.push_frames(bytes, |frame, _| found |= one_of_its(frame));
@@ -88,15 +88,14 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         found
     }
 
-    /// Counters so far.
+    /// Counters of frames and bytes so far.
     pub fn counts(&self) -> CodecCounts {
         self.codec.counts()
     }
 
     /// Passes on all pending bytes except those held by the codec.
     ///
-    /// `found` contains two numbers for each frame: the bytes from its start to the end of the input, and its
-    /// length.
+    /// For each frame, `found` contains the number of bytes from its start to the end of the input, and its length.
     fn hand_on(&mut self, found: &[(usize, usize)], take: &mut dyn FnMut(Piece<'_>)) {
         let total = self.pending.len();
         let mut handed = 0;
@@ -209,20 +208,20 @@ mod tests {
         let expected: Pieces = vec![(1, vec![0xA5, 1, 9, 0x5A], true), (67, vec![0xA5, 1, 8, 0x5A], true)];
         let mut cutter = cutter();
         assert_eq!(pushed(&mut cutter, &parts), expected);
-        // A frame that has begun causes no repeated wake-ups.
+        // The start of a frame causes no repeated wake-ups of the driver.
         assert!(pushed(&mut cutter, &[(133 + 52, &[])]).is_empty());
         assert_eq!(cutter.settles(), None);
     }
 
     #[test]
-    fn whole_frame_after_silence_releases_a_truncated_one() {
+    fn whole_frame_after_silence_releases_a_truncated_frame() {
         let parts: [(u64, &[u8]); 2] = [(1, &[0xA5, 5, 1]), (100, &[0xA5, 0, 0x5A])];
         let expected: Pieces = vec![(1, vec![0xA5, 5, 1], false), (100, vec![0xA5, 0, 0x5A], true)];
         assert_eq!(pushed(&mut cutter(), &parts), expected);
     }
 
     #[test]
-    fn wake_ups_without_bytes_do_not_extend_the_silence() {
+    fn pushes_without_bytes_do_not_extend_the_silence() {
         let mut cutter = cutter();
         let lure: [(u64, &[u8]); 3] = [(1, &[0xA5, 5, 0xA5, 0, 0x5A]), (30, &[]), (51, &[])];
         assert!(pushed(&mut cutter, &lure).is_empty());
@@ -233,7 +232,7 @@ mod tests {
         /// For any split of the input, the cutter passes on all bytes in order, and times never decrease. The
         /// frames equal those that the codec alone finds.
         #[test]
-        fn pieces_concatenate_to_the_input_for_any_split(
+        fn pieces_concatenate_to_the_input_for_any_split_of_the_byte_stream(
             bytes in proptest::collection::vec(prop_oneof![Just(0xA5u8), Just(0x5A), 0u8..7], 0..200),
             cuts in proptest::collection::vec(1usize..20, 1..40),
         ) {

@@ -26,10 +26,10 @@ pub enum Carrier {
 pub struct DriverSetup {
     /// Start of the dive.
     ///
-    /// Each head runs its program from this time on. A head that joins later starts at the position that is due
-    /// then. So the heads keep their relative phase without communication between their drivers.
+    /// Each head runs its program from this time on. A head that joins later starts at the position that its program
+    /// gives for that time. So the heads keep their relative phase without communication between their drivers.
     pub begun: MonoNs,
-    /// Program of a head; `None` for other devices.
+    /// Rotation program of a head; `None` for other devices.
     pub head: Option<HeadProgram>,
 }
 
@@ -52,7 +52,7 @@ pub trait Wire {
 pub struct DeviceHealth {
     /// Number of valid messages from the device.
     pub good_frames: u64,
-    /// Identity that the device has reported.
+    /// Identity that the device has reported, if any.
     pub identity: Option<String>,
     /// Description of a fault, with its remedy.
     pub complaint: Option<String>,
@@ -66,7 +66,7 @@ pub trait Driver: Send {
     /// was closed.
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Reacts to the line being closed. Bytes sent from now on are discarded.
+    /// Reacts to the line being closed. Bytes that the driver sends from now on are discarded.
     ///
     /// The bytes of an incomplete frame are delivered unchanged, because they may contain a complete frame.
     fn closed(&mut self, _wire: &mut dyn Wire) {}
@@ -85,10 +85,11 @@ pub trait Driver: Send {
     /// Returns the time of the next call of [`Driver::wake`]; `None` if no call is needed.
     fn due(&self) -> Option<MonoNs>;
 
-    /// Performs the action that is due at the time given by [`Driver::due`].
+    /// Performs the action that is due at the time that [`Driver::due`] returned.
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Whether a response is pending. While it is pending, other drivers on the same line must not transmit.
+    /// Whether the driver waits for a response from the device. While it is pending, other drivers on the same line
+    /// must not transmit.
     fn awaits(&self) -> bool {
         false
     }
@@ -102,9 +103,9 @@ pub trait Driver: Send {
     fn health(&self) -> DeviceHealth;
 }
 
-/// Identifies a device of one kind on a line.
+/// Probe that identifies a device of one kind on a line.
 ///
-/// Its requests are harmless to any other device on the line: they start no motion and change no persistent
+/// The probe's requests are harmless to any other device on the line: they start no motion and change no stored
 /// setting.
 pub trait Probe: Send {
     /// Returns the requests to send one after the other until the device has reported its identity.

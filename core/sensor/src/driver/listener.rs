@@ -1,11 +1,11 @@
-//! Drivers of devices that transmit without requests.
+//! Drivers of devices that transmit without being polled.
 
 use super::cutter::Cutter;
 use super::interface::{DeviceHealth, Driver, Wire};
 use crate::codec::Framing;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Driver that only listens to a byte stream, and delivers all of it frame by frame.
+/// Driver that only listens to a device's byte stream, and delivers the whole stream frame by frame.
 pub struct Listener<F, const N: usize> {
     cutter: Cutter<F, N>,
     silence_timeout: DurNs,
@@ -56,7 +56,7 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
 /// Function that returns the fault of a message; `None` for a good message of the device.
 pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
 
-/// Driver that only listens to whole messages, and delivers each of them.
+/// Driver that only listens to a device's whole messages, and delivers each message.
 pub struct MessageListener {
     judge: Judge,
     silence_timeout: DurNs,
@@ -67,8 +67,8 @@ pub struct MessageListener {
 impl MessageListener {
     /// Creates a listener.
     ///
-    /// `judge` finds faulty and foreign messages. `silence_timeout` is the longest gap between messages of a
-    /// healthy device.
+    /// `judge` finds faulty messages and messages of other devices. `silence_timeout` is the longest gap between
+    /// messages of a healthy device.
     pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
         Self { judge, silence_timeout, good_frames: 0, complaint: None }
     }

@@ -3,7 +3,7 @@
 /// Maximum number of senders that are listed by name.
 const NAMED: usize = 4;
 
-/// Names of the ignored senders, and the number of their messages. Memory is bounded for any input.
+/// Names of the ignored senders, and the number of their messages; uses bounded memory for any input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct IgnoredSenders {
     messages: u64,

@@ -3,7 +3,7 @@ use headrace_geometry::frames::Vec3;
 
 const PERIOD: DurNs = DurNs(2_500_000);
 const TICK: DurNs = DurNs(100_000);
-/// Number of samples after which a unit is known to send its stamps first.
+/// Number of samples after which a device is known to send its stamp before the readings.
 const FIRST: i64 = 30;
 
 fn force() -> Reading {
@@ -14,7 +14,8 @@ fn rate() -> Reading {
     Reading::AngularRate(Vec3::zero())
 }
 
-/// Returns the true and corrected times of samples that are made every 2.5 ms and arrive with these delays.
+/// Returns the true times and the corrected times of samples that are taken every 2.5 ms and arrive with these
+/// delays.
 fn times(delays_ns: &[i64], ticks_of: impl Fn(i64) -> i64) -> Vec<(MonoNs, MonoNs)> {
     let mut times = SampleTimes::new(32, TICK);
     let of = |(k, delay_ns): (i64, &i64)| {
@@ -39,14 +40,14 @@ fn punctual_samples_keep_their_receive_times() {
     }
 }
 
-/// Largest time error after the first 4000 samples, ns.
+/// Returns the largest time error after the first 4000 samples, ns.
 fn worst_ns(times: &[(MonoNs, MonoNs)]) -> i64 {
     times.iter().skip(4000).map(|(made, at)| at.since(*made).0.abs()).max().unwrap()
 }
 
 #[test]
 fn samples_of_a_burst_are_separated() {
-    // Of every forty samples, one waits 25 ms and the nine after it arrive at the same time.
+    // Of every forty samples, one arrives 25 ms late and the nine after it arrive at the same time.
     let burst = |k: i64| if k % 40 < 10 { (10 - k % 40) * PERIOD.0 } else { 0 };
     let delays: Vec<i64> = (20..20_020).map(burst).collect();
     let off = worst_ns(&times(&delays, in_step));
@@ -59,7 +60,7 @@ fn samples_of_a_burst_are_separated() {
 }
 
 #[test]
-fn drifting_clock_is_followed() {
+fn drifting_device_clock_is_followed() {
     for ppm in [-500, -20, 200, 500] {
         // One sample in ten is 5 ms late.
         let delays: Vec<i64> = (0..40_000).map(|k| if k % 10 == 3 { 5_000_000 } else { 0 }).collect();
@@ -70,7 +71,7 @@ fn drifting_clock_is_followed() {
 
 #[test]
 fn garbled_stamp_affects_only_its_own_sample() {
-    // One stamp in fifty has a flipped bit.
+    // One device stamp in fifty has a flipped bit.
     let garbled = |k: i64| if k % 50 == 7 { in_step(k) ^ 1 << (k / 50 % 32) } else { in_step(k) };
     let all = times(&vec![0; 20_000], garbled);
     let others: Vec<(MonoNs, MonoNs)> =
@@ -79,7 +80,7 @@ fn garbled_stamp_affects_only_its_own_sample() {
 }
 
 #[test]
-fn stopped_device_clock_corrects_few_sample_times_and_restarted_clock_none() {
+fn few_sample_times_are_corrected_after_a_clock_stop_and_none_after_a_restart() {
     let none = vec![0; 4000];
     let stuck = times(&none, |k| in_step(k.min(1000)));
     let put_back = stuck.iter().filter(|(made, at)| made != at).count();
@@ -88,7 +89,7 @@ fn stopped_device_clock_corrects_few_sample_times_and_restarted_clock_none() {
     assert!(again.iter().all(|(made, at)| made == at));
 }
 
-/// Returns the corrected times of samples every 10 ms, whose stamp comes before or after rate and force.
+/// Returns the corrected times of samples taken every 10 ms, whose stamp comes before or after turn rate and force.
 fn stamped(times: &mut SampleTimes, count: u64, is_first: bool) -> Vec<MonoNs> {
     let mut got = Vec::new();
     for k in 0..count {
@@ -105,7 +106,7 @@ fn stamped(times: &mut SampleTimes, count: u64, is_first: bool) -> Vec<MonoNs> {
 }
 
 #[test]
-fn stamp_belongs_to_the_first_reading_of_each_kind() {
+fn stamp_belongs_to_the_first_reading_of_each_kind_after_it() {
     let mut times = SampleTimes::new(32, TICK);
     stamped(&mut times, 20, true);
     let at = |ms: u64| MonoNs(1_000_000_000 + ms * 1_000_000);

@@ -17,18 +17,19 @@ pub(super) struct Placed {
     pub(super) led_from: Option<Px>,
 }
 
-/// Areas of a sheet that are already occupied.
+/// Areas of a drawing that markers and labels already occupy.
 #[derive(Default)]
 pub(super) struct Taken(Vec<Frame>);
 
 impl Taken {
-    /// Occupies the area of a marker.
+    /// Marks the area of a marker as occupied.
     pub(super) fn marker(&mut self, [x, y]: Px) {
         const HALF_PX: f64 = 6.0;
         self.0.push(Frame { left: x - HALF_PX, top: y - HALF_PX, right: x + HALF_PX, bottom: y + HALF_PX });
     }
 
-    /// Finds and occupies a free place for a label beside a marker, within a frame; `None` if there is no room.
+    /// Finds a free place for a label beside a marker, within a frame, and marks it as occupied; `None` if
+    /// there is no room.
     pub(super) fn label(
         &mut self,
         [x, y]: Px,
@@ -42,7 +43,7 @@ impl Taken {
                 let by_px = match side {
                     Side::Right => APART_PX,
                     Side::Left => -APART_PX,
-                    // A label in the middle is directly above or below its marker.
+                    // A horizontally centred label can only be directly above or below its marker.
                     Side::Middle if step == 0.0 => continue,
                     Side::Middle => 0.0,
                 };

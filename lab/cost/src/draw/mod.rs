@@ -1,4 +1,4 @@
-//! Draws a trade: a chart for each scene, with the error on the x axis and the cost on the y axis, both logarithmic.
+//! Draws a trade (comparison of error and cost): a chart for each scene, with logarithmic axes: x error, y cost.
 
 mod labels;
 mod panel;
@@ -20,7 +20,7 @@ const LINE_PX: f64 = 17.0;
 /// Maximum number of lines that name omitted settings.
 const MOST_LEFT_OUT: usize = 6;
 
-/// Draws a trade as SVG.
+/// Draws a trade (comparison of error and cost) as SVG.
 pub fn svg(trade: &Trade) -> String {
     let scenes = trade.scenes();
     let left_out = left_out(trade);
@@ -41,7 +41,7 @@ fn whole(px: f64) -> u32 {
     u32::try_from(headrace_geometry::math::floor_to_i64(px) + 1).unwrap_or(0)
 }
 
-/// Explains the marks in a line below the title.
+/// Draws the legend: a line below the title that explains the marks.
 fn legend(canvas: &Canvas, trade: &Trade) {
     let y = 70.0;
     let mut x = 14.0;

@@ -12,14 +12,14 @@ use super::labels::Taken;
 use crate::point::{Point, Trade};
 use crate::words;
 
-/// Band under the front.
+/// Wide grey line drawn under the Pareto front.
 pub(super) const BAND: Look = Look { colour: Colour(214, 214, 214), width_px: 9.0, ..look::T };
-/// Background of the plateau.
+/// Background colour of the plateau: settings that cost clearly more without a smaller error.
 pub(super) const PLATEAU: Colour = Colour(255, 240, 200);
 const WHISKER: Look = Look { colour: Colour(170, 170, 170), width_px: 0.9, ..look::T };
 /// Line from a marker to a label that is not beside the marker.
 const LEADER: Look = Look { colour: Colour(110, 110, 110), width_px: 0.7, ..look::T };
-/// Maximum ratio of an error on the plateau to the least error.
+/// A setting belongs to the plateau if its error is at most this multiple of the smallest error.
 const SAME: f64 = 1.05;
 /// Smallest error drawn, as a multiple of the oracle's own error.
 pub(super) const CLEAR: f64 = 10.0;
@@ -63,7 +63,7 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// Position of a point. Errors below [`CLEAR`] times the oracle's error are drawn at that value.
+    /// Position of a point in the chart. Errors below [`CLEAR`] times the oracle's error are drawn at that limit.
     fn place(&self, point: &Point) -> [f64; 2] {
         [self.shown(point.error()), point.cost.middle]
     }
@@ -94,7 +94,7 @@ impl<'a> Panel<'a> {
         methods
     }
 
-    /// Points of the front, from small errors to large ones.
+    /// Points of the Pareto front, from small errors to large ones.
     fn front(&self) -> Vec<&'a Point> {
         let mut front: Vec<&Point> = self.points.iter().copied().filter(|point| point.on_front).collect();
         front.sort_by(|a, b| a.error().total_cmp(&b.error()).then(b.cost.middle.total_cmp(&a.cost.middle)));
@@ -168,7 +168,8 @@ impl<'a> Panel<'a> {
             chart.canvas.marker(at, &look(point), size_px, point.is_default);
             taken.marker(at);
         }
-        // The most important labels come first. The table on the page lists the points whose labels find no room.
+        // The most important labels are placed first. Points whose labels find no room are listed only in the table on
+        // the page.
         let knee = crate::point::knee(&self.trade.points, self.scene, self.trade.resolution());
         let is_knee = |point: &Point| knee.is_some_and(|knee| std::ptr::eq(knee, point));
         let mut points = self.points.clone();

@@ -1,4 +1,4 @@
-//! The points of a trade as CSV: one row per point.
+//! Formats the points of a trade (settings with error and cost) as CSV, one row per point.
 
 use crate::point::{Interval, Point, Trade};
 
@@ -30,7 +30,7 @@ fn row(trade: &Trade, point: &Point, [name, unit]: [&str; 2], error: Interval) -
     row
 }
 
-/// A cell, quoted if necessary.
+/// A CSV cell, quoted if necessary.
 fn quoted(cell: &str) -> String {
     if cell.contains([',', '"', '\n']) {
         format!("\"{}\"", cell.replace('"', "\"\""))

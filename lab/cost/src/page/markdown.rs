@@ -1,4 +1,4 @@
-//! The two pages in Markdown: advice for a survey, and how it was measured.
+//! The two pages in Markdown: advice for a survey, and the method of measurement.
 
 use super::Results;
 use crate::point::{Given, Trade};
@@ -36,12 +36,12 @@ pub(super) fn method(results: &Results) -> String {
     let mut text = format!(
         "# How the cost of accuracy is measured\n\n\
          Measured with {} on {}. `{}` measures it again.\n\n\
-         - Each point is a setting with its error and its cost.\n\
-         - Errors are measured against independent values. Their bounds are 95 % intervals, or the extremes of a few seeds.\n\
+         - Each point of a chart is a setting of the program, with its error and its cost.\n\
+         - An error is the difference from a reference value that other code computes. Its bounds are a 95 % interval, or the extremes of a few seeds.\n\
          - A cost is the {}. The CSV files state both bounds.\n\
-         - A machine is faster or slower as a whole from run to run. This shifts all costs of a run alike; `.ci/cost-page --runs ONE OTHER` \
+         - The whole machine may be faster in one run than in another. This scales all costs of a run alike; `.ci/cost-page --runs ONE OTHER` \
          shows by how much.\n\
-         - CPU time is that of the measuring thread with its part of the kernel. Wall time says little on a shared machine.\n\
+         - CPU time is that of the measuring thread, including its time in the kernel. Wall time says little on a shared machine.\n\
          - `on_front` in the CSV files marks settings with no better alternative: no other setting of the scene has less error for no more \
          cost.\n",
         results.program,
@@ -53,17 +53,17 @@ pub(super) fn method(results: &Results) -> String {
         append(
             &mut text,
             format_args!(
-                "\n## {}\nError of the independent values themselves: {}; {}.\n",
+                "\n## {}\nThe reference values are accurate to {}. Evidence: {}.\n",
                 trade.title,
                 number(trade.oracle.size),
                 trade.oracle.how
             ),
         );
         if !trade.left_out.is_empty() {
-            text.push_str("\nLeft out:\n");
+            text.push('\n');
         }
         for left in &trade.left_out {
-            append(&mut text, format_args!("- {}: {}\n", left.what, left.why));
+            append(&mut text, format_args!("- Not measured: **{}** ({})\n", left.what, left.why));
         }
     }
     text

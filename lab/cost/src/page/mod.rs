@@ -16,11 +16,11 @@ pub use table::table;
 /// Version of `cost.json`.
 pub const COST_VERSION: u32 = 1;
 
-/// Meaning of the bounds of costs.
+/// Kind of bounds that are stated for each cost: quartiles or a 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bars {
-    /// Quartiles of nine rounds. Files that don't state the meaning of their bounds have these.
+    /// Quartiles of nine rounds; the default for files that don't state a kind.
     #[default]
     Quartiles,
     /// The 95 % interval of the median.
@@ -28,34 +28,36 @@ pub enum Bars {
 }
 
 impl Bars {
-    /// Description for the page of the method.
+    /// Describes a cost and its bounds for the page method.md.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Quartiles => "median of nine rounds measured in turns, with quartiles",
+            Self::Quartiles => {
+                "median over nine rounds, each of which measures every setting once. Its bounds are the quartiles"
+            }
             Self::Median => {
-                "median of rounds measured in turns (nine, or three with `--quick`), with its 95 % interval by the sign test"
+                "median over nine rounds (three with `--quick`), each of which measures every setting once. Its bounds are the 95 % interval by the sign test"
             }
         }
     }
 }
 
-/// All results.
+/// All results of `headrace cost`: the trades, and the machine on which they were measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Version of this format.
     pub cost_version: u32,
-    /// The program that measured.
+    /// Name and version of the program that measured.
     pub program: String,
     /// The machine: processor, cores, debug or release.
     pub machine: String,
     /// The command that reproduces the results.
     pub command: String,
-    /// Meaning of the bounds of costs.
+    /// Kind of bounds that are stated for each cost: quartiles or a 95 % interval.
     #[serde(default)]
     pub bars: Bars,
     /// The trades.
     pub trades: Vec<Trade>,
-    /// Costs of things that aren't a choice.
+    /// Tables of the costs of properties that are not a choice, such as determinism.
     pub given: Vec<Given>,
 }
 

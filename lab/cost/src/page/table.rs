@@ -1,4 +1,4 @@
-//! Formats a trade for the terminal.
+//! Formats a trade (comparison of error and cost) for the terminal.
 
 use crate::point::{Point, Trade};
 use crate::words::{self, append, number};

@@ -1,4 +1,4 @@
-//! Figures of several dives.
+//! Combines figures of several dives into means with intervals.
 
 use headrace_geometry::math;
 

@@ -1,6 +1,7 @@
 //! Holes: the cost of finding the largest hole of a section exactly.
 //!
-//! The exact search is compared with a search with tolerances, with the lattice's T, and with counts of empty cells.
+//! The exact search is compared with a search with tolerances, with T of the sample lattice, and with counts of empty
+//! cells.
 
 use headrace_coverage::HoleFinder;
 use headrace_monitor::run::Loop;
@@ -20,16 +21,16 @@ use headrace_oracle::dive::{JudgedDive, JudgedSection, Recorded};
 use headrace_oracle::second;
 use headrace_oracle::timed;
 
-/// Tolerances, m; 0.01 is a fiftieth of the target.
+/// Compared tolerances of the hole search, m; 0.01 is a fiftieth of the target.
 const TOLERANCES_M: [f64; 6] = [1e-4, 1e-3, 0.01, 0.05, 0.2, 1.0];
 const QUICK_TOLERANCES_M: [f64; 2] = [0.05, 0.2];
-/// Edge lengths of cells, m.
+/// Edge lengths of the grid cells for the cell-counting method, m.
 const CELLS_M: [f64; 3] = [0.5, 0.1, 0.02];
 const QUICK_CELLS_M: [f64; 1] = [0.1];
-/// Lengths of sections, m, besides the shipped one.
+/// Section lengths compared with the default length, m.
 const SECTIONS_M: [f64; 2] = [0.05, 1.0];
 const QUICK_SECTIONS_M: [f64; 1] = [1.0];
-/// Length of a dive's judged range, away from the dive's ends, m: quick, full.
+/// Length of the evaluated part of a dive, without its ends, m: in a quick and in a full measurement.
 const JUDGED_M: [f64; 2] = [4.0, 16.0];
 /// Length of tunnel beyond the end of a dive, m. A shorter tunnel keeps grids of fine cells small.
 const BEYOND_M: f64 = 30.0;
@@ -38,7 +39,8 @@ const NS: f64 = 1e9;
 /// Speed of all scenes, m/s.
 const SPEED_MPS: f64 = 0.1;
 
-/// Target of all scenes, m. A tenth of the target decides, and a tenth of that tenth counts as no difference.
+/// Target of all scenes, m. An error of a tenth of the target can change a decision; a hundredth counts as no
+/// difference.
 const TARGET_M: f64 = 0.5;
 const DECIDES_M: f64 = TARGET_M / 10.0;
 const NOTHING_M: f64 = DECIDES_M / 10.0;
@@ -49,24 +51,24 @@ enum Setting {
     Exact,
     Tolerance(f64),
     Section(f64),
-    /// T_max of Eq. 16 for the driven speed.
+    /// T_max of the paper's Eq. 16 for the driven speed.
     Planned,
-    /// The largest diagonal of a section's samples.
+    /// The largest diagonal of the sample lattice in a section.
     Lattice,
     Cells(f64),
 }
 
-/// A scene to dive.
+/// A scene whose dives are simulated and measured.
 struct Case {
     name: &'static str,
     /// Text of the scene. The length of its only leg is a placeholder.
     text: String,
 }
 
-/// Effects of the field on four heads.
+/// Simulated field effects, for a vehicle with four heads.
 ///
-/// The field scene of VITA 1 has these effects on one head. Here the pilot sways less: with more sway, every section
-/// would miss the target of half a metre.
+/// The shipped field scene of VITA 1 has the same effects with one head. Here the pilot sways less, since with that
+/// scene's sway every section would miss the target of half a metre.
 const FIELD: &str = "motion_within_turn = {}\nocclusion = {}\n\
     pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 2, period_s = 40 }\n\
     imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -90,7 +92,7 @@ fn cases() -> Result<[Case; 3], CostError> {
     ])
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -136,7 +138,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     inputs.effort.pick(Some(quick), None).into_iter().collect()
 }
 
-/// A case's dives, one per seed.
+/// The dives of a scene, one per seed.
 struct Dives(Vec<(Scene, Recorded)>);
 
 impl Dives {
@@ -156,7 +158,7 @@ impl Dives {
 
     fn oracle_m(&self) -> Result<f64, CostError> {
         let Some((scene, recorded)) = self.0.first() else { return Ok(0.0) };
-        let end_m = END_M + scene.vehicle.target_m;
+        let end_m = END_M + scene.vehicle.target.max_hole_m;
         let [from_m, to_m] = recorded.truth.way_m;
         let off_m = second::may_be_off_m(
             &recorded.truth,
@@ -193,7 +195,7 @@ struct Prepared {
     judged: Vec<Vec<Vec<Judged>>>,
 }
 
-/// Times all settings of all cases in turns.
+/// Times all settings of all cases, round by round.
 fn points(
     inputs: &Inputs<'_>,
     settings: &[Setting],
@@ -321,10 +323,10 @@ impl Setting {
     }
 }
 
-/// Name of the figure that is a time and not an error.
+/// Name of the only figure that is a CPU time, not an error.
 const SEARCH: &str = "search or count alone";
 
-/// Judges each section by a T of the lattice.
+/// Judges each section by the spacing T that `t_m` returns for it.
 fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) -> Vec<Judged> {
     let target_m = dive.report.target_m;
     let judged = |section: &JudgedSection| {
@@ -335,7 +337,7 @@ fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) ->
     verdicts::inner(dive).map(judged).collect()
 }
 
-/// T_max of Eq. 16 at the driven speed for the configured heads, m.
+/// T_max of the paper's Eq. 16 at the driven speed for the configured heads, m.
 fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     let failed = |why: &str| CostError::Figure { what: "T of the plan".to_owned(), why: why.to_owned() };
     let planner = Planner::new(vehicle.inspection().map_err(|why| failed(&why))?)?;
@@ -368,7 +370,7 @@ fn search(dive: &Loop, tolerance_m: f64) {
     }
 }
 
-/// Finds a figure of a point by its name.
+/// Finds a figure among the errors of a measured point, by its name.
 fn figure(point: &Point, name: &str) -> f64 {
     let found = point.errors.iter().find(|error| error.name.starts_with(name));
     found.map_or(f64::NAN, |error| error.interval.middle)
@@ -385,7 +387,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
         let search = figure(exact, SEARCH);
         Some(format!(
             "Scene {scene}: the search takes {} of {} ns per return, so a tolerance can save at most {} %. A tolerance of 0.05 m saves {} ns and \
-             leaves {} m in 100 without a verdict, instead of {}.",
+             leaves {} of 100 m without a verdict, instead of {}.",
             number(search),
             number(exact.cost.middle),
             number(100.0 * search / exact.cost.middle),
@@ -409,7 +411,7 @@ fn advice(points: &[Point]) -> String {
     let planned = find(points, "drop-outs", "of the plan", None);
     format!(
         "Keep the exact search. It takes {} of {} ns per return and is within {} m of D_true in an ideal dive. A grid of 0.1 m cells is {} m \
-         off. In the scene drop-outs, the grid wrongly passes {} m in 100, and the spacing that the plan predicts wrongly passes {}.",
+         off. In the scene drop-outs, of every 100 m the grid wrongly passes {} m, and a verdict by the planned spacing T {} m.",
         number(figure(exact, SEARCH)),
         number(exact.cost.middle),
         number(exact.error()),

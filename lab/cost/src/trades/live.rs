@@ -22,15 +22,15 @@ use crate::words::number;
 use headrace_oracle::dive::{Recorded, armed};
 use headrace_oracle::{TruthError, timed};
 
-/// Reference settings: the densest ring of rays, recast after the smallest movement, and a second ring with a sixth
-/// fewer rays.
+/// Two reference settings: the densest ring of rays, recast after the smallest movement, and a ring with a sixth fewer
+/// rays.
 const FINEST: Looks = Looks { ring: 3600, anew_m: Some(0.001) };
 const AS_FINE: Looks = Looks { ring: 3000, anew_m: Some(0.001) };
-/// Largest difference of speed that counts as equal, m/s.
+/// Difference up to which two speeds count as equal, m/s.
 const RESOLUTION_MPS: f64 = 1e-5;
 const USUAL_TICK_MS: u32 = 20;
 
-/// A setting, which becomes a marker in the chart.
+/// A setting of the live loop, drawn as a marker in the chart.
 struct Setting {
     method: &'static str,
     knob: &'static str,
@@ -41,7 +41,7 @@ struct Setting {
     tick_ms: u32,
 }
 
-/// Result of a dive.
+/// Result of replaying a dive with one setting.
 struct Ran {
     /// Advised speed at each update, m/s; zero if no speed was advised.
     v_max_mps: Vec<f64>,
@@ -51,7 +51,7 @@ struct Ran {
     digest: String,
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -103,13 +103,13 @@ fn scenes(inputs: &Inputs<'_>) -> Result<Vec<(&'static str, String)>, CostError>
     Ok(scenes)
 }
 
-/// A pilot of VITA 2 with four heads, who often stops, goes back and wanders.
+/// Scene: VITA 2 with four heads, driven by a pilot who often stops, goes back and sways.
 const PILOT: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"pilot\"\nstart_m = 5\nspeed_mps = 0.1\nstops_per_hour = 60\n\
     stop_s = [3, 8]\nbacks_per_hour = 60\nback_m = [0.5, 1]\nwander_across_m = 1.0\nwander_up_m = 0.5\nwander_yaw_deg = 10\n\
     wander_pitch_deg = 2\nwander_roll_deg = 2\n";
 const PILOT_EFFECTS: &str =
     "[effects]\nmotion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\nrange_noise = { sd_m = 0.01 }\n";
-/// A dive of about half a metre with VITA 2, for profiles with many vertices.
+/// Scene: a dive of about half a metre with VITA 2, used with profiles of many vertices.
 const SHORT: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 0.6\nspeed_mps = 0.1\n\
     [effects]\nmotion_within_turn = {}\n";
 
@@ -150,7 +150,7 @@ fn settings() -> Vec<Setting> {
     settings
 }
 
-/// A recorded dive with its settings judged, ready to be timed.
+/// A recorded dive whose sections have been judged with each setting, ready to be timed.
 struct Prepared {
     scene: &'static str,
     seeds: u32,
@@ -234,7 +234,7 @@ impl Prepared {
 }
 
 impl Marker {
-    /// Share of one core that the loop uses.
+    /// Share of one core that the live loop uses.
     fn cost(&self, recorded: &Recorded) -> Result<f64, CostError> {
         let pace = Pace { tick: tick(self.setting.tick_ms), speed: None };
         Ok(recorded.cpu_with_s(&self.vehicle, self.vehicle.navigation(), pace)? / recorded.duration_s())
@@ -258,7 +258,7 @@ impl Marker {
     }
 }
 
-/// Times all markers of all scenes in turns.
+/// Times all settings of all scenes, round by round.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
     let mut all: Vec<(&Recorded, &Marker)> = Vec::new();
     for Prepared { recorded, markers, .. } in &prepared {

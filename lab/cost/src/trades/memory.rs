@@ -11,20 +11,20 @@ use crate::point::{Given, Interval};
 use crate::scene::Inputs;
 use headrace_oracle::timed;
 
-/// Number of arguments tried per function.
+/// Number of arguments for which each mathematical function is compared.
 const ARGUMENTS: u32 = 100_000;
 /// Length of a tunnel, m, and the perimeter of its wall.
 const LENGTH_M: f64 = 7000.0;
 const PERIMETER_M: f64 = 28.0;
 /// Number of samples per metre of tunnel.
 const PER_M: u32 = 1_000;
-/// Metres of wall for which samples remain unpacked, and metres for which they are packed.
+/// Length of tunnel whose samples stay unpacked, and length whose samples are packed, m.
 const OPEN_M: u32 = 20;
 const PACKED_M: u32 = 160;
-/// Bytes of a sample before packing: chainage, arc length, step, visit, head.
+/// Bytes of a sample before packing: its chainage, arc length, step, visit and head number.
 const PLAIN_BYTES: usize = size_of::<WallSample>();
 
-/// Makes the table.
+/// Measures the costs of determinism and memory, as a table.
 ///
 /// Errors: see [`CostError`].
 pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Given, CostError> {
@@ -106,7 +106,7 @@ fn row(what: &str, lost: String, costs: &[Interval]) -> Vec<String> {
     vec![what.to_owned(), lost, ns(0), ns(1)]
 }
 
-/// Compares places stored in double precision with places stored in single precision.
+/// Compares wall positions stored in double precision with positions stored in single precision.
 fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     let places: Vec<[f64; 2]> =
         arguments([LENGTH_M - 100.0, LENGTH_M]).zip(arguments([0.0, PERIMETER_M])).map(Into::into).collect();
@@ -169,7 +169,7 @@ fn filled(metres: u32) -> Result<SampleStore, CostError> {
     Ok(store)
 }
 
-/// Adds the helix of one head's samples.
+/// Adds one head's samples, which form a helix on the wall.
 fn fill(store: &mut SampleStore, metres: u32) -> Result<(), CostError> {
     let step_m = [1.0 / f64::from(PER_M), PERIMETER_M / 120.0];
     for k in 0..metres * PER_M {

@@ -1,4 +1,4 @@
-//! The trades: one file for each, with a function `measure`. All are listed here.
+//! The trades (comparisons of error and cost): one file for each, with a function `measure`. All are listed here.
 
 mod cells;
 mod figures;

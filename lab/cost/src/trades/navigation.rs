@@ -39,13 +39,13 @@ const DECIDES_M: f64 = 0.05;
 const MOMENT_S: f64 = 0.1;
 /// Length of the part of a dive that is timed, s.
 const TIMED_S: f64 = 15.0;
-/// Difference of errors below which two settings count as equal, m.
+/// Difference between the errors of two settings below which the settings count as equal, m.
 const RESOLUTION_M: f64 = 5e-4;
 /// A beam width of more than a turn. With it, navigation uses no return, since consecutive returns of a head are too
 /// close to each other.
 const NO_RETURNS_RAD: f64 = 1e9;
 
-/// A scene that starts at a chainage.
+/// A scene together with the chainage at which its dive starts.
 struct Place {
     name: String,
     text: String,
@@ -66,7 +66,7 @@ enum Way {
     Smoothed(Settings),
 }
 
-/// A setting, which becomes a marker in the chart.
+/// A setting of navigation, drawn as a marker in the chart.
 #[derive(Debug, Clone)]
 struct Setting {
     method: &'static str,
@@ -78,17 +78,17 @@ struct Setting {
     way: Way,
 }
 
-/// A dive with the recorded input of navigation.
+/// A simulated dive with the recorded input of navigation.
 struct Dived {
     recorded: Recorded,
     vehicle: VehicleConfig,
     hearing: Hearing,
-    /// The part of the input that is timed.
+    /// The part of the recorded input for which navigation is timed.
     timed: Hearing,
     by_cable: JudgedDive,
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -122,7 +122,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     })
 }
 
-/// The scenes, each at each chainage.
+/// All combinations of a scene with a start chainage.
 fn places(inputs: &Inputs<'_>) -> Result<Vec<Place>, CostError> {
     let field = file("vita1-field.toml")?;
     let loose = field.replace(SLACK, "tether_slack = { reach_m = 0.45, period_s = 30 }");
@@ -229,13 +229,13 @@ fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
     settings
 }
 
-/// A scene with its dives judged, ready to be timed.
+/// A scene whose dives have been judged with each setting, ready to be timed.
 struct Prepared {
     scene: String,
     settings: Vec<Setting>,
-    /// The distinct settings. A default lies on the lines of several settings, but is measured once.
+    /// The distinct settings. The default belongs to the lines of several varied parameters, but is measured once.
     unique: Vec<(u32, Way)>,
-    /// For each distinct setting, the number of seeds and the errors.
+    /// For each distinct setting, the number of simulated seeds and the errors.
     errors: Vec<(u32, Vec<Error>)>,
     /// Dives of the first seed, by rate of the inertial unit, Hz.
     first: Vec<(u32, Dived)>,
@@ -311,7 +311,7 @@ impl Prepared {
     }
 }
 
-/// Times the distinct settings of all scenes in turns.
+/// Times the distinct settings of all scenes, round by round.
 fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, CostError> {
     let all: Vec<(&Prepared, (u32, Way))> =
         prepared.iter().flat_map(|place| place.unique.iter().map(move |unique| (place, *unique))).collect();
@@ -327,7 +327,7 @@ fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, Cost
     Ok(points)
 }
 
-/// Results of navigation itself in one dive.
+/// Figures for the accuracy of navigation in one dive.
 #[derive(Debug, Clone, Copy)]
 struct Figures {
     turn_m: Option<f64>,

@@ -23,7 +23,7 @@ const USUAL_RAYS: u32 = 16;
 const MANY_RAYS: u32 = 1024;
 /// Number of rays of a second reference. It is as good as [`MANY_RAYS`], with rays at other directions within the beam.
 const OTHER_RAYS: u32 = 769;
-/// A tenth of the smallest shipped target, 0.5 m.
+/// Change of D that can change a decision, m: a tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;
 /// Smallest difference of D that counts, m. Rounding in the simulation is far smaller.
 const RESOLUTION_M: f64 = 1e-4;
@@ -43,7 +43,7 @@ struct Stage {
     boulders_m: Vec<f64>,
 }
 
-/// Results of a dive.
+/// Results of a simulated dive.
 struct Figures {
     /// D and verdict of each section, by the section's start in millimetres.
     sections: Vec<(i64, Option<f64>, &'static str)>,
@@ -51,7 +51,7 @@ struct Figures {
     features_hit: Vec<u16>,
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -150,7 +150,7 @@ const AMONG_BOULDERS: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m 
 /// The effects of the shipped scene `boulders`.
 const BOULDERS_EFFECTS: &str =
     "[effects]\nmotion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\nrange_noise = { sd_m = 0.01 }\n";
-/// VITA 2 with four heads along a plain stretch.
+/// Scene: VITA 2 with four heads along a stretch without features.
 const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.09\n";
 
 /// The scenes in which the number of rays is varied.
@@ -179,7 +179,7 @@ fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
 /// The shipped field scene over `length_m` metres.
 fn field(length_m: u32) -> Result<Stage, CostError> {
     let text = file("vita1-field.toml")?.replace("distance_m = 130", &format!("distance_m = {length_m}"));
-    // The speed is the one that the scene's vehicle file plans.
+    // The dive has the planned speed of the scene's vehicle file.
     let planned = text.replace("speed_mps = 0.16", "speed_mps = 0.197");
     if planned == text {
         let why = "the shipped scene has another speed than this trade changes".to_owned();
@@ -216,7 +216,7 @@ impl Prepared {
     }
 }
 
-/// Times all settings of all scenes in turns.
+/// Times all settings of all scenes, round by round.
 ///
 /// The time saved by leaving an effect out is relative to the scene with all effects.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
@@ -234,7 +234,7 @@ fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, Co
     Ok(points)
 }
 
-/// Method name of the points with one effect left out. The default leaves none out and comes first.
+/// Method name of the points with one effect left out. The default point leaves no effect out and comes first.
 const LEFT_OUT: &str = "left out";
 
 fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prepared>, CostError> {
@@ -297,7 +297,7 @@ fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepar
     Ok((prepared, references.get(1).map_or(f64::NAN, Differences::change_m)))
 }
 
-/// Changes of the results by a change of the scene, one value per seed.
+/// Differences of a changed scene's results from those of the original scene, one value per seed.
 #[derive(Default)]
 struct Differences {
     hole_m: Vec<f64>,
@@ -327,9 +327,9 @@ impl Differences {
     }
 }
 
-/// Simulates the scene of each text with the same seeds, and compares each dive with the dive of the first text.
+/// Simulates each scene with the same seeds, and compares each dive with the dive of the first scene.
 ///
-/// Also returns the features hit in the dives of the first seed.
+/// Also returns the features that beams hit in the dives of the first seed.
 fn differences(
     inputs: &Inputs<'_>,
     texts: &[(String, String)],
@@ -397,7 +397,7 @@ impl Figures {
     fn of(scene: &Scene, has_boulders: bool) -> Result<Self, CostError> {
         let JudgedDive { report, .. } = Recorded::of(scene, &scene.vehicle)?.judged(&scene.vehicle)?;
         let millimetres = |m: f64| math::round_to_i64(1000.0 * m);
-        let section = |section: &headrace_monitor::report::SectionReport| {
+        let section = |section: &headrace_monitor::section_row::SectionRow| {
             let hole_m = section.hole_m.filter(|_| section.hole_bounded);
             (millimetres(section.start_m), hole_m, section.verdict)
         };
@@ -491,7 +491,7 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    // A dive without any D gives no finite change.
+    // A dive in which no section has a D gives no finite change.
     let is_known = |point: &&Point| figure(point, "change of D").is_finite();
     let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);

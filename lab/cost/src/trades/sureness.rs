@@ -1,6 +1,6 @@
-//! The price of confidence in hours.
+//! The trade "sureness": hours of diving that a higher confidence in the verdicts costs.
 //!
-//! The price depends on the standard deviation of the displacement between passes, and on the required confidence.
+//! The hours depend on the standard deviation of the displacement between passes, and on the required confidence.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::margin::ExpectedErrors;
@@ -17,14 +17,15 @@ use crate::words::number;
 use headrace_oracle::dive::Recorded;
 
 const VEHICLE: &str = "vita2-4.toml";
-/// The mode and the target, m, of the heads.
+/// Mode of the heads for which the plans are made.
 const MODE: &str = "fast";
+/// Target for which the plans are made, m.
 const TARGET_M: f64 = 0.5;
 /// Length of the tunnel, m.
 const LENGTH_M: f64 = 7000.0;
 /// Standard deviations of the displacement between passes, m.
 const SIGMAS_M: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06];
-/// Required difference between hole and target for a verdict, in standard deviations.
+/// Compared confidences: required difference between hole and target for a verdict, in standard deviations.
 const CONFIDENCES: [u32; 3] = [1, 2, 3];
 const USUAL: u32 = 2;
 /// Ratio of the speed in the second half of a dive to the planned speed. It makes some sections fail.
@@ -32,7 +33,7 @@ const HURRY: f64 = 1.2;
 /// Range of times between two passes for which the standard deviation is stated, s. The range covers all passes.
 const TIMES_S: [f64; 2] = [0.001, 1000.0];
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -132,8 +133,8 @@ fn point(
     })
 }
 
-/// Errors of verdicts at `confidence` standard deviations in field dives. The first half is driven at `speed_mps`, the
-/// second half faster.
+/// Errors of verdicts that require `confidence` standard deviations, in simulated dives with field effects. The first
+/// half is driven at `speed_mps`, the second half faster.
 fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Error>, CostError> {
     let half_m = inputs.effort.pick(8.0, 15.0);
     let legs = [(half_m, speed_mps), (half_m, HURRY * speed_mps)];
@@ -143,7 +144,7 @@ fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Err
     let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
     let dives = side_by_side(&seeds, |seed| {
         let mut scene = inputs.scene(&text, *seed)?;
-        scene.vehicle.coverage.confidence_sd = f64::from(confidence);
+        scene.vehicle.target.confidence_sd = f64::from(confidence);
         let dive = Recorded::of(&scene, &scene.vehicle)?.judged(&scene.vehicle)?;
         Ok(inner(&dive).map(Judged::of).collect::<Vec<_>>())
     })?;

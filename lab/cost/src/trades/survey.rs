@@ -1,7 +1,8 @@
 //! Survey: the cost of a finer target in hours of diving.
 //!
 //! Hours and T come from the functions of `headrace plan`. They are shown beside the largest hole of a simulated dive
-//! at the planned speed, with heads phased for that speed. A dive keeps its plan if the largest hole is smaller than T.
+//! at the planned speed, with heads phased for that speed. A dive keeps its plan if its largest hole is at most the
+//! planned T.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::plan::{Planner, Question};
@@ -16,10 +17,10 @@ use crate::words::number;
 use headrace_oracle::second;
 use headrace_oracle::truth::{Truth, TruthTaker};
 
-/// Targets, m.
+/// Targets (largest allowed holes) for which each vehicle is planned, m.
 const TARGETS_M: [f64; 8] = [0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0];
 const QUICK_TARGETS_M: [f64; 3] = [0.5, 0.7, 1.0];
-/// Targets for comparing modes, drifts and layouts, m.
+/// Targets for which modes, drifts and layouts are compared, m.
 const FEW_TARGETS_M: [f64; 4] = [0.4, 0.5, 1.0, 2.0];
 const QUICK_FEW_TARGETS_M: [f64; 1] = [SHIPPED_M];
 /// The shipped target, m.
@@ -28,11 +29,11 @@ const SHIPPED_M: f64 = 0.5;
 const SHIPPED_MODE: &str = "fast";
 /// Lateral positions of the vehicle relative to the middle, left and up, as multiples of its drift.
 const PLACES: [[f64; 2]; 5] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 0.0]];
-/// Speed of the way back, during which nothing is inspected, m/s.
+/// Speed at which the vehicle returns without inspecting, m/s.
 ///
 /// The value is the rounded speed of the demonstration's pilot when in a hurry.
 const WAY_BACK_MPS: f64 = 0.3;
-/// Share of the tunnel that is passed a second time.
+/// Share of the tunnel that is assumed to be inspected a second time.
 const AGAIN_SHARE: f64 = 0.1;
 /// Length, m, and number of the sections in which both references are compared.
 const STRETCH_M: f64 = 0.25;
@@ -50,7 +51,7 @@ const VEHICLES: [(&str, &str); 4] = [
 /// Name of the scene in which the vehicles are compared.
 const HEADS: &str = "heads, each vehicle in its fastest mode";
 
-/// A vehicle with its changes.
+/// A vehicle file with the mode, layout and drift for which it is planned.
 struct Way<'a> {
     /// Name of the vehicle's line in the picture.
     method: String,
@@ -60,7 +61,7 @@ struct Way<'a> {
     drift_m: f64,
 }
 
-/// Measures the trade.
+/// Measures the errors and costs of all settings of this trade.
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
@@ -140,7 +141,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
     reasons
 }
 
-/// Sentence about plans that the dives don't keep.
+/// Sentence about plans whose simulated dives have a hole larger than the planned T.
 fn broken(points: &[Point]) -> Option<String> {
     let is_broken = |point: &&Point| {
         point.errors.get(1).is_some_and(|error| error.unit == "m" && error.interval.middle > point.error())
@@ -349,7 +350,7 @@ fn true_hole(inputs: &Inputs<'_>, dives: &Dives<'_>, seed: u32) -> Result<TrueHo
     Ok(TrueHole { hole_m: truth.wall()?.hole_m(from_m, to_m), may_be_off_m })
 }
 
-/// The plan of a vehicle file with the given layout and tolerated drift, as from `headrace plan`.
+/// The plan that `headrace plan` makes of a vehicle file with the given layout and tolerated drift.
 ///
 /// Errors: the vehicle is invalid, or can't be planned for.
 pub fn planner(
@@ -367,7 +368,7 @@ pub fn planner(
     Ok(Planner::new(inspection)?.with_errors(errors))
 }
 
-/// Dives at the planned speed.
+/// Settings of simulated dives at the planned speed.
 struct Dives<'a> {
     way: &'a Way<'a>,
     mode: &'static str,

@@ -52,7 +52,7 @@ impl Cluster {
 #[test]
 fn executors_give_the_same_tables_and_answers_as_threads() {
     let (folder, scratch) = (dives(), tempfile::tempdir().unwrap());
-    // An unreadable log becomes a row.
+    // A log that can't be read becomes a row of `dives` with the error.
     std::fs::write(folder.path().join("nothing.mcap"), "nothing").unwrap();
     let (here, there) = (scratch.path().join("here"), scratch.path().join("there"));
     let cluster = Cluster::start(&there);
@@ -80,7 +80,7 @@ fn executors_give_the_same_tables_and_answers_as_threads() {
         let (answer, summary) = ask(folder.path(), &there, sql, &scheduler);
         assert!(!expected.is_empty());
         assert_eq!(answer, expected, "{sql}");
-        // The unreadable log is tried again.
+        // Every run tries the unreadable log again.
         assert!(summary.contains(" 1 replayed, 5 from the cache"), "{summary}");
     }
     assert!(files(&there) == files(&here), "executors make other files of another target than threads");

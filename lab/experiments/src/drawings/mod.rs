@@ -1,4 +1,4 @@
-//! Pictures like the paper's Figures 6, 8, 12, 13 and 15.
+//! Draws pictures like the paper's Figures 6, 8, 12, 13 and 15.
 
 mod beam;
 mod patterns;

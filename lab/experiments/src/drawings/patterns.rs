@@ -1,4 +1,4 @@
-//! Figures 6 and 8: patterns of heads in phase shift and in sector offset.
+//! Draws Figures 6 and 8: sampling patterns of heads in the phase-shift layout and in the sector-offset layout.
 
 use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart};
@@ -10,12 +10,12 @@ use crate::figures::{PhaseShift, Place, Sectors, Way};
 
 const SIZE_PX: [u32; 2] = [900, 640];
 const FRAME: Frame = Frame { left: 66.0, top: 78.0, right: 806.0, bottom: 540.0 };
-/// Top of the legend, pixels.
+/// Vertical position of the legend, pixels from the top.
 const LEGEND_PX: f64 = 600.0;
-/// One sample in this many is marked, in Figure 6 and in Figure 8. More marks would overlap.
+/// Figure 6 marks one sample in 5, and Figure 8 one in 20, since more marks would overlap.
 const MARKED: [usize; 2] = [5, 20];
 
-/// Look of dimension lines.
+/// Line style of dimension lines.
 const MEASURE: Look = Look { colour: BLACK, width_px: 1.6, dash: &[], marker: Marker::Circle };
 const LONG: Look = Look { colour: Colour(0, 114, 178), ..MEASURE };
 const SHORT: Look = Look { colour: Colour(213, 94, 0), ..MEASURE };
@@ -53,7 +53,7 @@ fn legend(canvas: &Canvas, heads: u16) -> f64 {
     x
 }
 
-/// Draws the line of text at the bottom.
+/// Draws the explanation at the bottom of the figure.
 fn note(canvas: &Canvas, marked: usize, more: &str) {
     let words = format!("One in {marked} samples is marked. {more}");
     canvas.text([14.0, 626.0], &words, Side::Right, SMALL);
@@ -155,7 +155,8 @@ pub(super) fn sectors(figure: &Sectors) -> String {
         measured(&chart, [*from_m, *to_m], figure.line_m, look, (&words, -13.0));
     }
     if let [from_m, _, to_m, ..] = figure.at_line.as_slice() {
-        /// Distance of the dimension line that shows the sum below the measured line on the wall, pixels.
+        /// Vertical distance between the wall line on which passes are measured and the dimension line of their sum,
+        /// pixels.
         const BELOW_PX: f64 = 30.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.line_m, BELOW_PX);

@@ -35,7 +35,7 @@ pub(super) fn colour(level: usize) -> Colour {
     Colour(part(|[red, _, _]| red), part(|[_, green, _]| green), part(|[_, _, blue]| blue))
 }
 
-/// The level of a value on a scale from zero to `most`. Larger values have the highest level.
+/// The colour level of a value on a scale from zero to `most`. Values above `most` have the highest level.
 pub(super) fn level(value: f64, most: f64) -> usize {
     let level = math::floor_to_i64(value / most * LEVELS as f64).max(0);
     usize::try_from(level).unwrap_or(0).min(LEVELS - 1)

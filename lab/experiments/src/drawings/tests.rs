@@ -21,7 +21,7 @@ fn figure_6_shows_evenly_spaced_passes_and_a_faster_head() {
     assert!((figure.t_x_m - 0.197 * 4.8).abs() < 1e-9);
     assert_eq!(figure.at_crown.len(), 8);
     for pair in figure.at_crown.windows(2) {
-        // Adjacent heads see the crown at different angles. A ping that is early or late by one step of 2.4 degrees
+        // Adjacent heads ping the crown at slightly different angles. A ping one step of 2.4 degrees early or late
         // shifts a pass by 0.006 m.
         assert!((pair[1].1 - pair[0].1 - spaced_m).abs() < 0.1 * spaced_m, "{:?}", figure.at_crown);
     }
@@ -43,7 +43,7 @@ fn figure_6_shows_evenly_spaced_passes_and_a_faster_head() {
 }
 
 #[test]
-fn long_and_short_distances_of_figure_8_have_the_expected_sum() {
+fn long_and_short_pass_distances_in_figure_8_have_the_expected_sum() {
     let figure = figures::sectors().unwrap();
     let gaps: Vec<f64> = figure.at_line.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(gaps.len() >= 4, "{gaps:?}");
@@ -75,7 +75,7 @@ fn drawn(configurations: &[(u8, &'static str, bool, bool)]) -> (Walls, String) {
 }
 
 #[test]
-fn figure_12_passes_are_evenly_spaced_only_if_aligned() {
+fn figure_12_passes_are_evenly_spaced_only_if_head_phases_are_aligned() {
     let (figure, svg) = drawn(&PHASES[..3]);
     let sectors = &figure.panels[2];
     assert!(
@@ -100,7 +100,7 @@ fn figure_12_passes_are_evenly_spaced_only_if_aligned() {
 }
 
 #[test]
-fn figure_13_shows_side_wall_gaps_in_phase_shift_and_empty_strips_in_sectors() {
+fn figure_13_shows_side_wall_gaps_in_phase_shift_layout_and_unseen_strips_in_sector_layout() {
     let (figure, svg) = drawn(&[AT_GAPS[1], AT_GAPS[3]]);
     let [phase, sector] = figure.panels.as_slice() else { panic!("two panels") };
     let gap = phase.widest.unwrap();

@@ -13,15 +13,17 @@ use crate::figures::{Panel, Walls};
 const SIZE_PX: [u32; 2] = [900, 900];
 const LEFT_PX: f64 = 66.0;
 const RIGHT_PX: f64 = 802.0;
-/// Gap between panels, pixels.
+/// Horizontal gap between adjacent panels, pixels.
 const APART_PX: f64 = 20.0;
-/// Top and bottom of the panels of samples, and of the panels of surfaces, pixels.
+/// Top and bottom of the upper panels (samples), pixels.
 const SAMPLES_PX: [f64; 2] = [136.0, 446.0];
+/// Top and bottom of the lower panels (surfaces), pixels.
 const SURFACES_PX: [f64; 2] = [514.0, 790.0];
-/// Maximum number of dots in a panel.
+/// Maximum number of samples drawn as dots in a panel.
 const MOST_DOTS: usize = 3000;
-/// Colours of strips with widely spaced passes, and of strips without passes.
+/// Colour of strips of wall with widely spaced passes.
 const WIDE: Colour = Colour(255, 244, 200);
+/// Colour of strips of wall without passes.
 const UNSEEN: Colour = Colour(245, 170, 90);
 const GAP: Look = Look { colour: Colour(213, 94, 0), width_px: 1.8, dash: &[], marker: Marker::Circle };
 
@@ -104,12 +106,13 @@ fn samples(chart: &Chart<'_>, panel: &Panel, length_m: f64) {
     }
 }
 
-/// One sample in this many is drawn.
+/// Returns n if one in n samples of the panel is drawn.
 fn thinned(panel: &Panel) -> usize {
     panel.samples.len().div_ceil(MOST_DOTS).max(1)
 }
 
-/// Draws cells by colour. Vertically adjacent cells of one colour are joined.
+/// Draws the cells of a panel, coloured by their distance from the surface. Vertically adjacent cells of one colour are
+/// joined.
 fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
     let [along, round] = panel.cells.map(|cells| usize::try_from(cells).unwrap_or(1).max(1));
     let size_m = [figure.length_m / along as f64, figure.profile.perimeter_m() / round as f64];

@@ -11,11 +11,11 @@ use crate::ExperimentError;
 const BEAMS_DEG: [f64; 2] = [1.4, 2.4];
 /// Largest range setting of the paper's experiments, m.
 const RANGE_M: f64 = 10.0;
-/// Number of points of a curve.
+/// Number of points of each footprint curve.
 const POINTS: u32 = 60;
 /// Number of rays of a simulated beam: the largest number that a scene allows.
 const RAYS: usize = 64;
-/// One point in this many is also simulated.
+/// Interval between curve points for which the footprint is also simulated.
 const SIMULATED: u32 = 6;
 
 /// Data of Figure 15.
@@ -29,7 +29,7 @@ pub(crate) struct Footprints {
     pub height_m: f64,
     /// Direction of the floor's corner, degrees from straight down.
     pub corner_deg: f64,
-    /// The largest range, m.
+    /// The largest range shown, m.
     pub range_m: f64,
 }
 

@@ -11,11 +11,11 @@ use crate::spacing::passes_of;
 
 /// Length of dive before the picture, m. It is long enough for every head to pass the picture's start.
 const BEFORE_M: f64 = 4.0;
-/// Start of the dives, m.
+/// Chainage at which the simulated dives start, m.
 const START_M: f64 = 5.0;
 /// Position within the sector at which the two distances are shown, as a share of the sector.
 const SHARE: f64 = 0.8;
-/// Angle between the drawn points of the faster head, degrees.
+/// Angle between consecutive drawn points of the faster head's track, degrees.
 const FASTER_STEP_DEG: u32 = 2;
 
 /// Figure 6: heads in phase shift over two turns.

@@ -15,7 +15,7 @@ fn track_over_the_seam_is_split_in_two() {
 
 /// Compares the simulator's cone with the paper's formula, computed independently.
 #[test]
-fn simulated_beams_match_the_formula() {
+fn simulated_beam_footprints_match_the_paper_formula() {
     let figure = footprints().unwrap();
     assert!((figure.corner_deg - 59.27).abs() < 0.05, "{}", figure.corner_deg);
     for footprint in figure.by_range.iter().chain(&figure.by_angle) {

@@ -11,22 +11,22 @@ use crate::spacing::passes_of;
 use crate::surface::{MeshIndex, wall};
 use crate::{ExperimentError, Progress};
 
-/// Length of the stretch shown, m.
+/// Length of the stretch of wall in the figures, m.
 const SHOWN_M: f64 = 12.0;
-/// Start of the dives, m.
+/// Chainage at which the simulated dives start, m.
 const START_M: f64 = 5.0;
 /// Number of cells along the stretch, and around the wall.
 const CELLS: [u32; 2] = [40, 100];
 /// Number of lines along the wall on which passes are counted.
 const LINES: u32 = 360;
-/// Ratio of a line's largest gap to the usual gap above which the line counts as in a shadow.
+/// A line on the wall counts as occluded by another head if its largest gap exceeds this multiple of the usual gap.
 const IN_SHADOW: f64 = 1.5;
-/// Share of cells within the distance scale.
+/// Share of cells whose distances lie within the colour scale.
 ///
-/// The cells at a floor's corners exceed the scale, since a Poisson surface rounds corners off.
+/// The cells at a floor's corners lie beyond the scale, since a Poisson surface rounds corners off.
 const SCALE_SHARE: f64 = 0.93;
 
-/// Number of heads, mode, whether in sectors, whether aligned.
+/// Number of heads, their mode, whether they are in sector offset, and whether their phases are aligned.
 type Configuration = (u8, &'static str, bool, bool);
 
 /// Figure 12: two heads with and without their phases aligned.
@@ -49,9 +49,9 @@ pub(crate) struct Walls {
     pub speed_mps: f64,
     /// Length of the dives, m.
     pub dive_m: f64,
-    /// Length of the stretch, m.
+    /// Length of the stretch shown, m.
     pub length_m: f64,
-    /// The panels.
+    /// The panels, one for each configuration of the heads.
     pub panels: Vec<Panel>,
     /// Upper end of the colour scale, m. Only a few cells have larger distances.
     pub most_m: f64,
@@ -66,7 +66,7 @@ pub(crate) struct Panel {
     pub mode: &'static str,
     /// Whether the heads are in sector offset instead of phase shift.
     pub sectors: bool,
-    /// Whether the phases are aligned.
+    /// Whether the heads' phases are aligned.
     pub aligned: bool,
     /// T_x of a single head, divided by the number of heads, m.
     pub t_x_m: f64,
@@ -76,13 +76,13 @@ pub(crate) struct Panel {
     pub cells: [u32; 2],
     /// Unsigned distance of each cell's centre from the surface, m. The cells around the wall are consecutive.
     pub distances_m: Vec<f64>,
-    /// Mean of the distances, m.
+    /// Mean distance of the cells from the surface, m.
     pub mean_m: f64,
     /// The longest gap between passes along the tunnel, among lines with at least two passes.
     pub widest: Option<Gap>,
-    /// Start and end of strips of wall in which some gap between passes exceeds 1.5 T_x / s, m.
+    /// Arc lengths of the start and end of each strip of wall in which some gap between passes exceeds 1.5 T_x / s, m.
     pub wide_m: Vec<[f64; 2]>,
-    /// Start and end of strips of wall without passes, m.
+    /// Arc lengths of the start and end of each strip of wall without passes, m.
     pub unseen_m: Vec<[f64; 2]>,
 }
 
@@ -91,7 +91,7 @@ pub(crate) struct Panel {
 pub(crate) struct Gap {
     /// Arc length of the line, m.
     pub arc_m: f64,
-    /// Start and end of the gap, from the picture's start, m.
+    /// Start and end of the gap along the tunnel, from the picture's start, m.
     pub x_m: [f64; 2],
 }
 
@@ -121,7 +121,7 @@ pub(crate) fn walls(
     let last = math::floor_to_i64(SCALE_SHARE * all.len() as f64);
     let most_m = all.get(crate::index(last)).copied().unwrap_or_default();
     let profile = headrace_geometry::tunnel::shapes::ceran_blueprint()?;
-    // The scale ends at a whole centimetre.
+    // The colour scale ends at a whole centimetre.
     let most_m = (most_m * 100.0).ceil().max(1.0) / 100.0;
     Ok(Walls { profile, speed_mps: SPEED_MPS, dive_m: LENGTH_M, length_m: SHOWN_M, panels, most_m })
 }
@@ -198,7 +198,8 @@ fn lines(dive: &Dive, window: Window) -> Vec<Line> {
     (0..LINES).map(line).collect()
 }
 
-/// The largest gap. If adjacent lines are in the same shadow, the gap is that of the shadow's middle line.
+/// The largest gap between passes. If one head occludes several adjacent lines, the gap of their middle line is
+/// returned.
 fn widest(lines: &[Line]) -> Option<Gap> {
     let mut lengths: Vec<f64> = lines.iter().filter_map(Line::widest).map(|gap| gap.length_m()).collect();
     lengths.sort_by(f64::total_cmp);
@@ -208,12 +209,12 @@ fn widest(lines: &[Line]) -> Option<Gap> {
     let (number, worst) = lines.iter().enumerate().max_by(|a, b| length_m(a.1).total_cmp(&length_m(b.1)))?;
     let before = lines.iter().take(number).rev().take_while(shadowed).count();
     let after = lines.iter().skip(number + 1).take_while(shadowed).count();
-    // Index of the line in the middle of the shadow.
+    // Index of the middle one of the occluded lines.
     let middle = (2 * number + after).saturating_sub(before) / 2;
     lines.get(middle).unwrap_or(worst).widest()
 }
 
-/// Start and end of the strips made of adjacent lines that satisfy `kind`, m.
+/// Arc lengths of the start and end of each strip made of adjacent lines that satisfy `kind`, m.
 fn strips(lines: &[Line], perimeter_m: f64, kind: impl Fn(&Line) -> bool) -> Vec<[f64; 2]> {
     let apart_m = perimeter_m / f64::from(LINES);
     let mut strips: Vec<[f64; 2]> = Vec::new();

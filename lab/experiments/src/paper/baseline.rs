@@ -9,7 +9,7 @@ use super::drift::{Across, Rig, across};
 use super::modes::{Mode, modes};
 use super::printed::Line;
 
-/// Recomputed predictions for all modes and rigs.
+/// Recomputed predictions for all modes of the heads and all rigs (mounting positions).
 #[derive(Debug, Clone)]
 pub(super) struct Baselines {
     modes: Vec<Mode>,
@@ -29,7 +29,7 @@ impl Baselines {
         self.modes.iter().find(|mode| mode.name == name).copied().ok_or(PaperError::Mode { name })
     }
 
-    /// Mode and T_y of a table's line.
+    /// The mode and the predicted T_y for a line of a printed table.
     pub(super) fn of(&self, line: &Line) -> Result<(Mode, Across), PaperError> {
         let (name, rig) = (line.text("mode")?, Rig::of(line.heads()?));
         let of_rig = self.rigs.iter().filter(|(one, _)| *one == rig).flat_map(|(_, modes)| modes);
@@ -39,7 +39,7 @@ impl Baselines {
     }
 }
 
-/// The largest distance between passes, m: T_x / s, or 2 T_x / s in sectors.
+/// The largest distance between passes, m: T_x / s in the phase-shift layout, 2 T_x / s in the sector-offset layout.
 pub(super) fn t_x_m(turn: Turn, layout: HeadLayout, heads: u8, speed_mps: f64) -> Result<f64, PaperError> {
     let passes_per_turn = match layout {
         HeadLayout::PhaseShift => f64::from(heads),

@@ -47,13 +47,13 @@ pub struct SeveralHeadsRow {
 /// its digits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AtBothSpeeds {
-    /// At [`STATED_SPEED_MPS`].
+    /// The number recomputed at [`STATED_SPEED_MPS`].
     pub at_stated_speed: Cell,
-    /// At [`FITTING_SPEED_MPS`].
+    /// The number recomputed at [`FITTING_SPEED_MPS`].
     pub at_fitting_speed: Cell,
 }
 
-/// Table 3.
+/// Recomputes Table 3.
 pub(super) fn one_head(baselines: &Baselines) -> Result<Table<OneHeadRow>, PaperError> {
     let row = |line: Line| {
         let (mode, across) = baselines.of(&line)?;
@@ -80,7 +80,7 @@ pub(super) fn one_head(baselines: &Baselines) -> Result<Table<OneHeadRow>, Paper
     Ok(Table { number: 3, title: "VITA 1, one head: the baseline at 0.197 m/s, metres", rows, notes })
 }
 
-/// Table 4.
+/// Recomputes Table 4.
 pub(super) fn several_heads(baselines: &Baselines) -> Result<Table<SeveralHeadsRow>, PaperError> {
     let rows =
         lines(4).iter().map(|line| several_heads_row(baselines, line)).collect::<Result<_, PaperError>>()?;

@@ -1,4 +1,4 @@
-//! Elements of the tables.
+//! Elements of the recomputed tables: cells with numbers, and notes.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use super::printed::{Digits, Printed, difference_percent};
 pub struct Cell {
     /// The number as printed.
     pub printed: Printed,
-    /// Recomputed value.
+    /// Recomputed number.
     pub ours: f64,
     /// Difference of the recomputed from the printed number, percent of the printed one; `None` for a printed zero.
     pub difference_percent: Option<f64>,
@@ -22,11 +22,11 @@ pub struct Cell {
 /// A note on a table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Note {
-    /// Mark used in cells.
+    /// Letter that marks the cells to which the note applies.
     pub mark: char,
-    /// Kind.
+    /// Kind of the note.
     pub kind: NoteKind,
-    /// Text.
+    /// Text of the note.
     pub text: String,
 }
 
@@ -47,7 +47,7 @@ pub enum NoteKind {
 pub struct Table<Row> {
     /// Number of the table in the paper.
     pub number: u8,
-    /// Title.
+    /// Title of the table.
     pub title: &'static str,
     /// Rows of the table, in the paper's order.
     pub rows: Vec<Row>,

@@ -22,7 +22,7 @@ pub struct CombinedRow {
     pub sector_offset: Combined,
 }
 
-/// T of a layout.
+/// T of heads in one layout: phase shift or sector offset.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Combined {
     /// T for the mean T_y.

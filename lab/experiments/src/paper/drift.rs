@@ -13,9 +13,9 @@ use super::modes::Mode;
 const DRIFT_M: f64 = 1.5;
 /// Greatest yaw relative to the tunnel's direction, degrees (§8.1).
 const YAW_DEG: f64 = 15.0;
-/// Soundings per turn, a hundredth of a degree apart.
+/// Number of computed ranges per turn, a hundredth of a degree apart.
 ///
-/// Every step of Table 2 is a whole number of these soundings. The last step before a corner is found to 0.2 % of its
+/// Every step of Table 2 is a whole multiple of this angle. The last step before a corner is found to 0.2 % of its
 /// length.
 const SOUNDINGS: u32 = 36_000;
 
@@ -30,7 +30,7 @@ pub(super) enum Rig {
     Vita2Pairs,
 }
 
-/// T_y of a rig in one mode.
+/// T_y (distance between samples across the tunnel) of a rig in one mode, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Across {
     pub(super) mean_m: f64,

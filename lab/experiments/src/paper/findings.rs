@@ -9,7 +9,7 @@ use super::drift::{Rig, floor_m, height_m};
 use super::printed::{Digits, Interval, Line, lines};
 use super::{FITTING_SPEED_MPS, PaperError, STATED_SPEED_MPS};
 
-/// Position of a head relative to the corner of floor and wall.
+/// Position of a head relative to the corner between floor and wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     /// Height above the floor, m.
@@ -29,7 +29,7 @@ pub(super) fn fitting_place(rig: Rig) -> Place {
     }
 }
 
-/// Whether the T_y columns of this row of Table 4 are a copy of FASTER's.
+/// Whether the T_y columns of this row of Table 4 are copied from the row of mode FASTER.
 pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }

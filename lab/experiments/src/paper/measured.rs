@@ -16,7 +16,7 @@ pub struct Measured {
     pub sector_offset: Option<Spacings>,
 }
 
-/// Spacings of a run, m.
+/// Sample spacings that the paper prints for a run, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spacings {
     /// T_x.

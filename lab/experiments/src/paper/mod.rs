@@ -34,7 +34,7 @@ pub const STATED_SPEED_MPS: f64 = 0.197;
 /// This is the only multiple of 0.1 mm/s that gives the printed digits.
 pub const FITTING_SPEED_MPS: f64 = 0.196;
 
-/// Tables 1 to 5.
+/// The paper's Tables 1 to 5, recomputed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tables {
     /// Source of the printed numbers.

@@ -55,7 +55,7 @@ pub(super) fn modes() -> Result<Vec<Mode>, PaperError> {
     lines(2).into_iter().map(mode).collect()
 }
 
-/// Table 1.
+/// Recomputes Table 1.
 pub(super) fn overlaps() -> Result<Table<OverlapRow>, PaperError> {
     let row = |line: super::printed::Line| {
         let step_deg = line.printed("step_deg")?;
@@ -78,7 +78,7 @@ pub(super) fn overlaps() -> Result<Table<OverlapRow>, PaperError> {
     Ok(Table { number: 1, title: "Overlap of neighbouring beams, zeta / theta (Eq. 22)", rows, notes })
 }
 
-/// Table 2.
+/// Recomputes Table 2.
 pub(super) fn speeds() -> Result<Table<ModeRow>, PaperError> {
     let row = |line: super::printed::Line| {
         let (step_deg, period_s) = (line.printed("step_deg")?, line.printed("period_s")?);

@@ -7,10 +7,10 @@ use serde::{Serialize, Serializer};
 
 use super::PaperError;
 
-/// Tolerance of recomputed values, as a share of a printed number's last digit. In floating point, 0.196 x 8 / 2 is
-/// slightly off 0.784.
+/// Tolerance for rounding errors of recomputed values, as a share of a printed number's last digit. In floating point,
+/// 0.196 x 8 / 2 is slightly off 0.784.
 const ROUNDING: f64 = 1e-6;
-/// More decimals than any table has.
+/// Maximum number of decimals of a printed number; no table has as many.
 const MOST_DECIMALS: usize = 6;
 
 /// A number with its printed digits.
@@ -34,7 +34,7 @@ pub enum Digits {
     Neither,
 }
 
-/// Values of a quantity that are consistent with a printed number.
+/// Interval of values that are consistent with a printed number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
     /// Lower bound.
@@ -57,7 +57,7 @@ impl Printed {
         (decimals <= MOST_DECIMALS).then_some(Self { value, decimals })
     }
 
-    /// The number.
+    /// Value of the printed number.
     pub fn value(&self) -> f64 {
         self.value
     }
@@ -133,7 +133,7 @@ pub(super) fn difference_percent(ours: f64, printed: Printed) -> Option<f64> {
     percent.is_finite().then(|| math::round_to_i64(percent * 1e6) as f64 / 1e6)
 }
 
-/// A line of a table.
+/// A line of a table of printed numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Line {
     table: u8,

@@ -16,7 +16,7 @@ fn apart<'a>(cells: impl IntoIterator<Item = (String, &'a Cell)>) -> Vec<String>
     cells.filter(|(_, cell)| cell.digits == Digits::Neither).map(|(name, _)| name).collect()
 }
 
-/// Printed values that follow only from truncation.
+/// Names of cells whose printed digits follow from truncation but not from rounding.
 fn truncated<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Vec<f64> {
     let cells = cells.into_iter().filter(|cell| cell.digits == Digits::Truncated);
     cells.map(|cell| cell.printed.value()).collect()
@@ -41,7 +41,7 @@ fn printed_digits_are_recognised_as_rounded_or_truncated() {
 }
 
 #[test]
-fn table_1_matches_to_the_digit() {
+fn recomputed_table_1_matches_to_the_digit() {
     let table = tables().table_1;
     let expected = [[8.0, 4.67], [4.0, 2.33], [2.67, 1.55], [2.0, 1.16], [1.0, 0.0]];
     let printed =
@@ -57,7 +57,7 @@ fn table_1_matches_to_the_digit() {
 }
 
 #[test]
-fn table_2_matches_to_the_digit() {
+fn recomputed_table_2_matches_to_the_digit() {
     let table = tables().table_2;
     assert_eq!(table.rows.len(), 5);
     let cells = || table.rows.iter().flat_map(|row| [&row.samples_per_turn, &row.ping_rate_hz]);
@@ -141,7 +141,8 @@ fn fitted_head_positions_give_the_printed_extremes() {
 #[test]
 fn largest_step_is_at_the_corner() {
     let table = tables().table_3;
-    // Height: the blueprint's mid-height minus 1.65 m. Distance: half the base plus 1.5 m, seen at 15 degrees of yaw.
+    // Height of the head: the blueprint's mid-height minus 1.65 m. Distance of the corner: half the base plus 1.5 m,
+    // seen at 15 degrees of yaw.
     let aside_m = 6.449_655 / math::cos(15_f64.to_radians());
     let place = Place { floor_m: 2.701_094, aside_m };
     for (row, step_deg) in table.rows.iter().zip([0.3_f64, 0.6, 0.9, 1.2, 2.4]) {
@@ -177,7 +178,7 @@ fn differing_cells_refer_to_existing_notes() {
         along.into_iter().flatten().chain([r.t_y_mean_m, r.t_y_min_m, r.t_y_max_m])
     });
     for cell in cells.chain(several) {
-        // The printed 2.116 is SLOW's T_x with two heads.
+        // The printed 2.116 is T_x of mode SLOW with two heads.
         let cut = cell.digits == Digits::Truncated && cell.printed.to_string() == "2.116";
         assert_eq!(cell.note.is_none(), cell.digits.rounded() || cut, "{cell:?}");
         assert!(cell.note.is_none_or(|mark| ('a'..='e').contains(&mark)));
@@ -185,7 +186,7 @@ fn differing_cells_refer_to_existing_notes() {
 }
 
 #[test]
-fn every_file_names_its_source() {
+fn every_csv_file_of_printed_numbers_names_its_source() {
     for (number, text) in [
         include_str!("table1.csv"),
         include_str!("table2.csv"),

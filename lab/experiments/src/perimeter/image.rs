@@ -53,7 +53,7 @@ impl Image {
         (0..self.set.len()).filter(|k| self.set[*k]).collect()
     }
 
-    /// Dilates the image: sets all pixels within `by` of a set pixel. The border stays clear.
+    /// Dilates the image: sets all pixels within `by` pixels of a set pixel. The border stays clear.
     pub(super) fn grow(&mut self, by: usize) {
         if by == 0 {
             return;

@@ -13,9 +13,9 @@ pub(crate) struct Ping {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub(crate) struct Settings {
-    /// Range of the last bin's end, m.
+    /// Range at the far end of the last echo bin, m.
     pub range_max_m: f64,
-    /// Number of bins of an echo; 8 to 10,000.
+    /// Number of range bins of a ping's echo; 8 to 10,000.
     pub bins: usize,
     /// Length of a ray's echo along the range, m, centred on the wall.
     pub pulse_m: f64,

@@ -3,7 +3,7 @@ use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use super::*;
 
-/// Simulates a turn of 1200 pings from a position. Each ping is a fan of rays.
+/// Simulates a turn of 1200 pings of a head at a position in the cross-section. Each ping is a fan of rays.
 fn turn(profile: &Profile, from: Yz, beam_deg: f64, rays: u32) -> Vec<Ping> {
     let ping = |k: u32| {
         let angle_rad = f64::from(k) * TAU / 1200.0;
@@ -85,7 +85,7 @@ fn gap_between_pings_is_bridged_by_interpolation_or_reported() {
 }
 
 #[test]
-fn specks_inside_change_nothing() {
+fn specks_inside_the_wall_outline_do_not_change_the_perimeter() {
     let profile = shapes::circle(4.0).unwrap();
     let clean = turn(&profile, [0.0, 4.0], 0.0, 1);
     let mut noisy = clean.clone();

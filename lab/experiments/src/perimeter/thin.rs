@@ -1,4 +1,4 @@
-//! Thinning and pruning of images.
+//! Thinning and pruning of binary images.
 
 use super::image::Image;
 

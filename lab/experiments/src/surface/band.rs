@@ -22,7 +22,7 @@ const SLOPE: [[f64; 3]; 3] = [
     [1.0 / 24.0, 1.0 / 3.0, 1.0 / 8.0],
 ];
 
-/// Values of a cell's three functions at `t` in [0, 1].
+/// Values of a cell's three B-splines at the relative position `t` in the cell, from 0 to 1.
 pub(super) fn values(t: f64) -> [f64; 3] {
     [(1.0 - t) * (1.0 - t) / 2.0, 0.5 + t - t * t, t * t / 2.0]
 }
@@ -60,7 +60,7 @@ impl Band {
         Self::assemble(cells, &SLOPE)
     }
 
-    /// Entry on the diagonal.
+    /// Entry of the matrix on its main diagonal.
     pub(super) fn diagonal(&self, row: usize) -> f64 {
         self.rows.get(row).map_or(0.0, |r| r[2])
     }

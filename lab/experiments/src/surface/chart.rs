@@ -56,7 +56,7 @@ pub struct ChartError {
     why: String,
 }
 
-/// The interpolated wall.
+/// The wall interpolated between samples.
 pub(crate) struct Chart {
     triangles: DelaunayTriangulation<Vertex>,
     perimeter_m: f64,
@@ -65,7 +65,7 @@ pub(crate) struct Chart {
 /// Differences of the interpolated wall from the true wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChartSpread {
-    /// Unsigned differences along the ray from the reference point.
+    /// Absolute differences, measured along rays from the reference point.
     pub spread: Spread,
     /// Number of positions outside the samples' hull, which have no interpolated value.
     pub uncovered: usize,
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn boulder_between_samples_is_missed_and_counted_in_full() {
+    fn boulder_between_samples_counts_as_an_error_of_its_full_height() {
         let chart = Chart::new(20.0, &lattice(20.0, |_, _| 0.0)).unwrap();
         let boulder = |x: f64, s: f64| if math::hypot(x - 5.25, s - 10.25) < 0.2 { -0.3 } else { 0.0 };
         let compared = chart.compare(&Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.05 }, boulder);

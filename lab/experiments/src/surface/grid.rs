@@ -7,7 +7,7 @@ use super::{Xyz, band};
 /// Cells of a box in the tunnel's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Grid {
-    /// The box's least corner, m.
+    /// Corner of the box with the smallest coordinates, m.
     pub(super) origin: Xyz,
     /// Side of a cell, m.
     pub(super) cell_m: f64,
@@ -15,19 +15,19 @@ pub(super) struct Grid {
     pub(super) cells: [usize; 3],
 }
 
-/// The 27 functions that are non-zero at a position: index of the first function, and values along each axis.
+/// The 27 B-splines that are non-zero at a position: index of the first one, and values along each axis.
 pub(super) struct Local {
     first: usize,
     along: [[f64; 3]; 3],
 }
 
 impl Grid {
-    /// Number of functions along each axis.
+    /// Number of B-splines along each axis.
     pub(super) fn nodes(&self) -> [usize; 3] {
         self.cells.map(|n| n + 2)
     }
 
-    /// Number of functions of the grid.
+    /// Number of B-splines of the grid.
     pub(super) fn len(&self) -> usize {
         self.nodes().iter().product()
     }
@@ -37,7 +37,7 @@ impl Grid {
         Self { origin: self.origin, cell_m: self.cell_m * 2.0, cells: self.cells.map(|n| n.div_ceil(2)) }
     }
 
-    /// The functions at a position. Outside the box, the functions of the nearest cell are extrapolated.
+    /// The B-splines at a position. Outside the box, the B-splines of the nearest cell are extrapolated.
     pub(super) fn local(&self, place: Xyz) -> Local {
         let mut along = [[0.0; 3]; 3];
         let mut cell = [0_usize; 3];
@@ -57,7 +57,7 @@ impl Grid {
         self.gather(&self.local(place), field)
     }
 
-    /// Sum of the coefficients, weighted by the functions' values.
+    /// Sum of the coefficients, weighted by the B-splines' values.
     pub(super) fn gather(&self, local: &Local, field: &[f64]) -> f64 {
         let [_, ny, nz] = self.nodes();
         let mut sum = 0.0;
@@ -71,7 +71,7 @@ impl Grid {
         sum
     }
 
-    /// Adds `amount` times the functions' values to the coefficients: the transpose of [`Grid::gather`].
+    /// Adds `amount` times the B-splines' values to the coefficients: the transpose of [`Grid::gather`].
     pub(super) fn scatter(&self, local: &Local, amount: f64, field: &mut [f64]) {
         let [_, ny, nz] = self.nodes();
         for (i, wx) in local.along[0].iter().enumerate() {
@@ -84,8 +84,8 @@ impl Grid {
         }
     }
 
-    /// Adds `amount` times the squares of the functions' values to the coefficients: the diagonal of scatter times
-    /// gather.
+    /// Adds `amount` times the squares of the B-splines' values to the coefficients: the diagonal of `scatter` times
+    /// `gather`.
     pub(super) fn scatter_squares(&self, local: &Local, amount: f64, field: &mut [f64]) {
         let squares = local.along.map(|line| line.map(|w| w * w));
         self.scatter(&Local { first: local.first, along: squares }, amount, field);

@@ -7,9 +7,9 @@ use super::{Xyz, dot, norm, sub};
 /// A surface made of triangles.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Mesh {
-    /// Vertices, m.
+    /// Positions of the vertices, m.
     pub vertices: Vec<Xyz>,
-    /// Three vertex indices each.
+    /// Triangles, each as three vertex indices.
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -25,7 +25,7 @@ pub(crate) struct MeshIndex<'a> {
     members: Vec<u32>,
 }
 
-/// Maximum number of bins of an index.
+/// Maximum number of bins in which the triangles are sorted.
 const BINS_MAX: f64 = 4e6;
 
 impl MeshIndex<'_> {
@@ -106,7 +106,7 @@ impl MeshIndex<'_> {
         let last = centre.iter().zip(&self.bins).map(|(c, n)| (n - 1 - c).max(*c)).max().unwrap_or(0);
         let mut best = f64::INFINITY;
         for shell in first..=last {
-            // All bins of this shell are at least this far away.
+            // Every bin of this shell is at least this far from the position.
             if best <= (shell - 1) as f64 * self.bin_m {
                 break;
             }

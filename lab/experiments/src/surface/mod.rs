@@ -1,7 +1,7 @@
 //! Surfaces through scattered samples of a tunnel's wall, and their distance from the wall.
 //!
-//! `poisson` closes a surface around the samples as the paper did; `chart` interpolates deviations on the unrolled wall;
-//! `wall` measures the distance of the wall from a surface.
+//! `poisson` closes a surface around the samples as the paper did; `chart` interpolates deviations on the unrolled
+//! wall; `wall` measures the distance of the wall from a surface.
 
 mod band;
 pub(crate) mod chart;
@@ -21,9 +21,9 @@ pub(crate) type Xyz = [f64; 3];
 /// A sample of the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sample {
-    /// Position of the hit.
+    /// Position at which the beam hit the wall.
     pub place: Xyz,
-    /// Unit normal there, towards the water.
+    /// Unit normal of the wall at the hit, towards the water.
     pub normal: Xyz,
 }
 

@@ -1,4 +1,4 @@
-//! Estimated normals of samples.
+//! Estimates wall normals at samples.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;

@@ -18,7 +18,7 @@ use super::mesh::Mesh;
 use super::solver::{Screened, Solved, divergence};
 use super::{Sample, Xyz, extract};
 
-/// Maximum number of functions of a grid. This number of functions takes about 1.5 GB.
+/// Maximum number of B-splines of a grid, which take about 1.5 GB.
 const NODES_MAX: usize = 16_000_000;
 /// Ratio of the density grid's cells to the finest cells (2 levels, as in Kazhdan's program).
 const DENSITY_CELLS: usize = 4;
@@ -26,8 +26,8 @@ const DENSITY_CELLS: usize = 4;
 ///
 /// The factor is averaged over the position in a cell, which gives the integral of the spline's square.
 const ACROSS: f64 = 11.0 / 20.0;
-/// Number of levels below the finest one. A first solution is computed on them, and normals of sparse samples are
-/// spread on them.
+/// Number of grid levels coarser than the finest one. Coarser levels give the initial solution, and receive the normals
+/// of sparse samples.
 const COARSER_LEVELS: usize = 4;
 
 /// Settings of the reconstruction.
@@ -38,11 +38,11 @@ pub(crate) struct Settings {
     pub depth: u32,
     /// Weight of the constraint that the surface passes through the samples; 0 to 1000.
     pub point_weight: f64,
-    /// Normals are spread in cells large enough to hold about this many samples; above 0.
+    /// Approximate number of samples per cell on the grid level on which a normal is splatted; must be above 0.
     pub samples_per_node: f64,
     /// Ratio of the cube of 2^depth cells to the largest extent of the samples; at least 1.
     pub scale: f64,
-    /// Margin around the samples, cells; at least 2.
+    /// Margin between the samples and the edge of the grid, cells; at least 2.
     pub margin_cells: usize,
     /// Relative residual at which the solver stops.
     pub tolerance: f64,
@@ -97,7 +97,7 @@ pub enum PoissonError {
         "the grid would have {nodes:.0} nodes; at most {NODES_MAX} are allowed; a smaller depth needs fewer"
     )]
     TooLarge {
-        /// Number of nodes needed.
+        /// Number of grid nodes that would be needed.
         nodes: f64,
     },
     /// The solver hasn't converged within its step limit.
@@ -105,7 +105,7 @@ pub enum PoissonError {
     NotSolved {
         /// Steps taken on the finest grid.
         steps: usize,
-        /// Relative residual.
+        /// Relative residual that was reached.
         residual: f64,
     },
 }
@@ -138,7 +138,7 @@ impl Surface {
         let grid = grid_round(samples, settings)?;
         let cloud = Cloud::measure(samples, &grid, settings.samples_per_node);
         let (field, Solved { steps, residual }) = solve(&grid, &cloud, settings, COARSER_LEVELS);
-        // The solver reaches the tolerance except for rounding.
+        // The solver reaches the tolerance, apart from rounding errors.
         if residual > settings.tolerance * (1.0 + 1e-9) {
             return Err(PoissonError::NotSolved { steps, residual });
         }
@@ -147,7 +147,8 @@ impl Surface {
         Ok(Self { grid, field, level: sum / cloud.area_m2 })
     }
 
-    /// Value of the field: positive towards the water, negative behind the wall. The step across the wall is about one.
+    /// Value of the field: positive in the water, negative behind the wall. The field rises by about one across the
+    /// wall.
     pub(crate) fn value(&self, place: Xyz) -> f64 {
         self.grid.value(&self.field, place) - self.level
     }
@@ -197,7 +198,7 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
     }
     let cell_m = settings.scale * largest / f64::from(1_u32 << settings.depth);
     let margin = settings.margin_cells as f64;
-    // The box has whole cells, with the samples centred.
+    // The box consists of whole cells, and the samples are centred in it.
     let cells = extents.map(|extent| (extent / cell_m).ceil() + 2.0 * margin);
     let nodes: f64 = cells.iter().map(|n| n + 2.0).product();
     if nodes > NODES_MAX as f64 {
@@ -237,7 +238,7 @@ impl<'a> Cloud<'a> {
     fn normals(&self, grid: &Grid, level: usize, finest: usize) -> [Vec<f64>; 3] {
         let mut field = if level < COARSER_LEVELS && self.coarser.iter().any(|c| *c > level) {
             let coarse = grid.coarser();
-            // A slope per cell is half as large in cells half as large.
+            // In cells half as large, the slope per cell is half as large.
             self.normals(&coarse, level + 1, finest).map(|values| {
                 let halved: Vec<f64> = values.iter().map(|v| v / 2.0).collect();
                 grid.refined(&coarse, &halved)

@@ -5,7 +5,8 @@ use headrace_geometry::math;
 use super::band::Band;
 use super::grid::{Grid, Local};
 
-/// The left-hand side: integrals of products of gradients, plus `weight` times the products of values at the samples.
+/// Left-hand side of the equation: integrals of products of gradients, plus `weight` times the products of values at
+/// the samples.
 pub(super) struct Screened<'a> {
     grid: &'a Grid,
     mass: [Band; 3],
@@ -26,14 +27,14 @@ struct Scratch {
 /// Outcome of a solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Solved {
-    /// Steps taken.
+    /// Number of iterations.
     pub(super) steps: usize,
-    /// Relative residual.
+    /// Relative residual that was reached.
     pub(super) residual: f64,
 }
 
 impl<'a> Screened<'a> {
-    /// Creates the left-hand side; `weight` is the weight of one sample, in units of cells.
+    /// Creates the left-hand side of the equation; `weight` is the weight of one sample, in units of cells.
     pub(super) fn new(grid: &'a Grid, samples: Vec<Local>, weight: f64) -> Self {
         let mut system = Self {
             grid,
@@ -123,8 +124,8 @@ impl<'a> Screened<'a> {
     }
 }
 
-/// The right-hand side: integrals of a vector field times the functions' gradients. `field` has the vector field's
-/// coefficients.
+/// Right-hand side of the equation: integrals of a vector field times the B-splines' gradients. `field` has the vector
+/// field's coefficients.
 pub(super) fn divergence(grid: &Grid, field: &[Vec<f64>; 3]) -> Vec<f64> {
     let [_, ny, nz] = grid.nodes();
     let inner = [ny * nz, nz, 1];

@@ -9,9 +9,9 @@ use crate::Spread;
 /// A stretch of wall, evaluated on a lattice of positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stretch {
-    /// Chainage of the start, m.
+    /// Chainage of the start of the stretch, m.
     pub from_m: f64,
-    /// Chainage of the end, m.
+    /// Chainage of the end of the stretch, m.
     pub to_m: f64,
     /// Lattice spacing along the tunnel and around it, m; above 0.
     ///
@@ -63,7 +63,7 @@ mod tests {
     use super::super::Mesh;
     use super::*;
 
-    /// The design's tube, displaced outwards by `off_m` along rays from the reference point.
+    /// A tube with the design's cross-section, displaced outwards by `off_m` along rays from the reference point.
     fn tube(profile: &Profile, off_m: f64) -> Mesh {
         let (rings, round) = (41_u32, 720_u32);
         let at = |i: u32, k: u32| {
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn tube_5_cm_off_the_wall_has_that_mean_distance() {
+    fn tube_5_cm_off_the_wall_has_a_mean_distance_of_5_cm() {
         let profile = shapes::circle(2.0).unwrap();
         let stretch = Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.1 };
         let mesh = tube(&profile, 0.05);

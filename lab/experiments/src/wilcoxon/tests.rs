@@ -49,7 +49,7 @@ fn critical_values_match_published_ones() {
 }
 
 #[test]
-fn ten_pairs_with_a_rank_sum_of_eight_have_the_exact_p() {
+fn ten_pairs_with_a_rank_sum_of_eight_have_the_known_exact_p_value() {
     // The differences are 1 to 10; ranks 3 and 5 are positive, the others negative.
     let differences: Vec<f64> =
         (1..=10).map(|k| if k == 3 || k == 5 { f64::from(k) } else { -f64::from(k) }).collect();

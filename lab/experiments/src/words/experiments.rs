@@ -1,9 +1,9 @@
-//! The experiments as text.
+//! The results of the paper's experiments as text.
 
 use crate::paper::SOURCE;
 use crate::{Experiments, HiddenRow, MeshRow, Pair, Perimeter, RunRow, SignedRankRow};
 
-/// Formats all experiments.
+/// Formats the results of all experiments.
 pub fn words(report: &Experiments) -> String {
     let mut text = format!(
         "Experiments of {SOURCE}, repeated at {} m/s in the blueprint's tunnel. Each pair is the paper's figure and ours.\n",

@@ -5,7 +5,7 @@ use crate::paper::{
     SeveralHeadsRow, Table, Tables,
 };
 
-/// Line length of notes, characters.
+/// Maximum line length of the notes, characters.
 const WIDTH: usize = 108;
 
 /// Formats all five tables.
@@ -51,7 +51,7 @@ fn show<Row>(text: &mut String, table: &Table<Row>, blocks: &[Block<'_, Row>]) {
     }
 }
 
-/// A note wrapped to the line length.
+/// Formats a note as lines of limited length.
 fn wrapped(note: &Note) -> Vec<String> {
     let mut lines = vec![format!("  {}  {}:", note.mark, note.kind.as_str())];
     for word in note.text.split(' ') {
@@ -66,12 +66,12 @@ fn wrapped(note: &Note) -> Vec<String> {
     lines
 }
 
-/// A line of titles after `before`. Each title is over a group of columns, `width` characters wide.
+/// A line that consists of `before` and the titles of column groups, each `width` characters wide.
 fn titles(before: &str, groups: &[&str], width: usize) -> String {
     groups.iter().fold(before.to_owned(), |line, group| format!("{line}  {group:<0$}", width - 2))
 }
 
-/// Column headings after `before`, repeated for each of `count` groups.
+/// A line that consists of `before` and the column headings of a group, repeated for each of `count` groups.
 fn heads(before: &str, group: &str, count: usize) -> String {
     format!("{before}{}", group.repeat(count))
 }
@@ -163,7 +163,7 @@ fn cell(cell: &Cell, decimals: usize) -> String {
     format!("{:>7}{}", cell.printed, ours(cell, decimals))
 }
 
-/// The recomputed value, the difference, and a mark.
+/// A cell's recomputed value, its difference from the printed one, and the mark of its note.
 fn ours(cell: &Cell, decimals: usize) -> String {
     format!("{:>8.decimals$}{:>7} {}", cell.ours, percent(cell), sign(cell))
 }

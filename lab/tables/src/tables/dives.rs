@@ -1,11 +1,11 @@
-//! `dives`: one row for each log, readable or not.
+//! The table `dives`: one row for each log, readable or not.
 
 use headrace_monitor::report::Report;
 
 use crate::column::{Column, Get, Table, count};
 use crate::replay::Dive;
 
-/// A log, for a row of the table.
+/// A log with its replayed dive, from which a row of the table is made.
 pub(crate) struct Row<'a> {
     pub(crate) log: &'a str,
     pub(crate) sha256: &'a str,

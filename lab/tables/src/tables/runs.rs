@@ -1,11 +1,11 @@
-//! `runs`: adjacent flagged sections with one cause, and how to pass them again.
+//! The table `runs`: adjacent flagged sections with one cause, and the advice for passing them again.
 
 use headrace_monitor::report::{Report, ReturnReport, RunReport};
 
 use super::sections::words;
 use crate::column::{Column, Get, Table, count};
 
-/// A run and, if the run is open, how to return to it.
+/// A run of flagged sections and, until it is cleared, the advice for returning to it.
 pub(crate) struct Run<'a> {
     run: &'a RunReport,
     back: Option<&'a ReturnReport>,

@@ -1,19 +1,19 @@
-//! `sections`, `holes` and `flags`: the results of the sections of the coverage extent.
+//! The tables `sections`, `holes` and `flags`: results for each section of the coverage extent.
 
-use headrace_coverage::Evidence;
-use headrace_monitor::report::SectionReport;
+use headrace_coverage::{Evidence, Unsure};
+use headrace_monitor::section_row::SectionRow;
 
 use crate::column::{Column, Get, Table, count};
 
-fn evidence(row: &SectionReport) -> Option<&Evidence> {
+fn evidence(row: &SectionRow) -> Option<&Evidence> {
     row.cause.as_ref()
 }
 
-fn cause(row: &SectionReport) -> Option<String> {
+fn cause(row: &SectionRow) -> Option<String> {
     evidence(row).map(|evidence| evidence.cause.as_str().to_owned())
 }
 
-fn causes(row: &SectionReport) -> Option<String> {
+fn causes(row: &SectionRow) -> Option<String> {
     evidence(row).map(|evidence| words(evidence.causes.iter()))
 }
 
@@ -23,7 +23,7 @@ pub(super) fn words(causes: impl IntoIterator<Item = headrace_coverage::Cause>) 
 }
 
 #[expect(clippy::too_many_lines, reason = "a line for each column")]
-pub(crate) fn sections() -> Table<SectionReport> {
+pub(crate) fn sections() -> Table<SectionRow> {
     Table {
         name: "sections",
         about: "A section of the coverage extent, in the order of chainage.",
@@ -33,12 +33,16 @@ pub(crate) fn sections() -> Table<SectionReport> {
             Column(
                 "verdict",
                 "`pass`, `fail`, `cannot_say` or `open`",
-                Get::Text(|row| Some(row.verdict.to_owned())),
+                Get::Text(|row| Some(row.verdict.as_str().to_owned())),
             ),
             Column(
                 "cannot_say",
                 "Reason for `cannot_say`",
-                Get::Text(|row| row.cannot_say.map(str::to_owned)),
+                Get::Text(|row| {
+                    row.cannot_say
+                        .filter(|why| *why != Unsure::NotInspected)
+                        .map(|why| why.as_str().to_owned())
+                }),
             ),
             Column("cause", "Main cause, if the verdict is `fail`", Get::Text(cause)),
             Column("causes", "All causes, the main one first, separated by commas", Get::Text(causes)),
@@ -138,16 +142,16 @@ pub(crate) fn sections() -> Table<SectionReport> {
     }
 }
 
-/// A hole, with the adjacent sections whose largest hole it is.
+/// A hole, and the run of adjacent sections that share it as their largest hole.
 pub(crate) struct Hole<'a> {
-    section: &'a SectionReport,
+    section: &'a SectionRow,
     end_m: f64,
     sections: i64,
 }
 
-/// The holes of a dive. A hole shared by several adjacent sections occurs once.
-pub(crate) fn holes(sections: &[SectionReport]) -> Vec<Hole<'_>> {
-    let place = |section: &SectionReport| {
+/// The holes of a dive. A hole shared by several adjacent sections is listed once.
+pub(crate) fn holes(sections: &[SectionRow]) -> Vec<Hole<'_>> {
+    let place = |section: &SectionRow| {
         [section.hole_m, section.hole_x_m, section.hole_arc_m].map(|number| number.map(f64::to_bits))
     };
     let mut holes: Vec<Hole<'_>> = Vec::new();
@@ -203,16 +207,16 @@ pub(crate) fn holes_table<'a>() -> Table<Hole<'a>> {
             Column(
                 "verdict",
                 "Verdict of the first of them",
-                Get::Text(|row| Some(row.section.verdict.to_owned())),
+                Get::Text(|row| Some(row.section.verdict.as_str().to_owned())),
             ),
         ],
     }
 }
 
 /// A flagged section, whether or not it was cleared.
-pub(crate) struct Flag<'a>(&'a SectionReport);
+pub(crate) struct Flag<'a>(&'a SectionRow);
 
-pub(crate) fn flags(sections: &[SectionReport]) -> Vec<Flag<'_>> {
+pub(crate) fn flags(sections: &[SectionRow]) -> Vec<Flag<'_>> {
     sections.iter().filter(|section| section.flagged_s.is_some()).map(Flag).collect()
 }
 

@@ -1,4 +1,4 @@
-//! `sources` and `alerts`.
+//! The tables `sources` and `alerts`: a row for each sensor, and a row for each alert.
 
 use headrace_monitor::alert_list::{AlertState, ListedAlertJson};
 use headrace_monitor::report::SourceReport;
@@ -80,7 +80,7 @@ pub(crate) fn alerts() -> Table<ListedAlertJson> {
     }
 }
 
-/// Columns of an alert's kind and life.
+/// Columns for an alert's kind and state, and for the times at which it was raised, acknowledged and cleared.
 fn life_columns() -> Vec<Column<ListedAlertJson>> {
     vec![
         Column("number", "Its number, from 1", Get::Count(|row| count(row.number))),
@@ -125,7 +125,7 @@ fn life_columns() -> Vec<Column<ListedAlertJson>> {
     ]
 }
 
-/// Columns of an alert's place, extent and occurrences.
+/// Columns for an alert's place and extent along the tunnel, and for its number of occurrences.
 fn extent_columns() -> Vec<Column<ListedAlertJson>> {
     vec![
         Column("from_m", "Chainage of its start, or of the vehicle, m", Get::Number(|row| row.from_m)),

@@ -15,14 +15,14 @@ use super::reply::{ask_to_wait, plain, refused};
 use super::shared::Shared;
 use crate::access::{Role, tokens_of};
 
-/// Connection that a request arrived on.
+/// Connection on which a request arrived.
 #[derive(Clone)]
 pub(super) struct Caller {
     pub(super) peer: IpAddr,
     pub(super) place: Arc<Place>,
 }
 
-/// A request that may see the dive.
+/// A request that may see the dive, with its role and client.
 pub(super) struct Admitted {
     pub(super) role: Role,
     pub(super) client: Client,
@@ -36,7 +36,7 @@ pub(super) struct Admitted {
 pub(super) enum Denied {
     /// The request has no token, or only wrong ones.
     NoToken,
-    /// The client has sent too many wrong tokens, so its token isn't compared.
+    /// The client has sent too many wrong tokens, so the request's token isn't compared.
     Spent,
 }
 
@@ -101,8 +101,8 @@ impl Admitted {
 impl Shared {
     /// Returns the highest role among these tokens.
     ///
-    /// Each wrong token uses one guess of the client's budget. Two kinds of tokens are free: a right token already
-    /// shown on this connection, and a wrong token that is still remembered.
+    /// Each wrong token uses one guess of the client's budget. Two kinds of tokens use no guess: a right
+    /// token already shown on this connection, and a wrong token that is still remembered.
     fn role(&self, client: Client, place: &Place, tokens: &BTreeSet<String>) -> Result<Role, Denied> {
         if self.access.tokens.is_none() {
             return Ok(Role::Operator);

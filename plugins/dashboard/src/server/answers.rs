@@ -27,9 +27,9 @@ use crate::model::{Body, MOST_IN_RANGE, Message, Sort};
 
 /// The feed's WebSocket subprotocol.
 const SUBPROTOCOL: &str = "headrace.feed.1";
-/// Maximum length of a message that is read, bytes.
+/// Maximum length of a message accepted from a viewer, bytes.
 const LONGEST_READ: usize = 16 << 10;
-/// Lifetime of the token's cookie in a browser, seconds: a day.
+/// Lifetime of the cookie that stores the token in a browser, seconds: a day.
 const COOKIE_S: u32 = 86_400;
 const TOO_MANY_STREAMS: &str = "too many viewers, or too many from this address\n";
 
@@ -134,7 +134,7 @@ async fn asset(Path(path): Path<String>) -> Response {
 
 /// Checks a token, and stores it in the browser as a cookie.
 ///
-/// A cookie sent with this request is an old one and is ignored.
+/// A cookie sent with the request is from an earlier login and is ignored.
 async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMap, uri: Uri) -> Response {
     let home = [(header::LOCATION, "/")];
     if shared.access.tokens.is_none() {

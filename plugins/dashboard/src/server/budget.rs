@@ -10,14 +10,14 @@ use super::client::Client;
 /// Maximum number of clients in a table of budgets. A full table takes about 200 KiB.
 const MOST_CLIENTS: usize = 4096;
 
-/// Maximum of a budget, and refill per second.
+/// Maximum number of requests in a budget, and refill per second.
 #[derive(Debug, Clone, Copy)]
 struct Rate {
     most: f64,
     per_s: f64,
 }
 
-/// Remaining budget at a time.
+/// Number of requests left in a budget, and the time at which it was so.
 #[derive(Debug, Clone, Copy)]
 struct Left(f64, Instant);
 
@@ -27,7 +27,7 @@ impl Left {
     }
 }
 
-/// A budget that all clients share.
+/// A budget of requests that all clients share.
 pub(crate) struct Budget {
     rate: Rate,
     left: Mutex<Option<Left>>,
@@ -49,7 +49,7 @@ impl Budget {
     }
 }
 
-/// A budget for each client.
+/// A budget of requests for each client.
 pub(crate) struct Budgets {
     rate: Rate,
     left: Mutex<BTreeMap<Client, Left>>,

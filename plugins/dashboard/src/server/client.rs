@@ -8,7 +8,7 @@ use axum::http::{HeaderMap, HeaderName};
 /// from.
 const FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 
-/// Address by which limits count a client.
+/// Address by which rate limits identify a client.
 ///
 /// For IPv6 only the first half counts, because one machine has many addresses with the same first half.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,7 +43,7 @@ mod tests {
     use axum::http::HeaderValue;
 
     #[test]
-    fn forwarded_addresses_count_only_behind_declared_proxies() {
+    fn forwarded_addresses_are_used_only_from_declared_proxies() {
         let address = |text: &str| text.parse::<IpAddr>().unwrap();
         let mut headers = HeaderMap::new();
         headers.append(FORWARDED_FOR, HeaderValue::from_static("1.1.1.1, 10.0.0.9"));

@@ -17,9 +17,10 @@ use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};
 use crate::site::May;
 
-/// Time from an answer to the next ping, and timeout of an answer.
+/// Time from a viewer's pong to the next WebSocket ping, and timeout of a pong.
 ///
-/// Together they drop a stalled viewer within [`STALLED_AFTER`], even if its machine buffers the feed unread.
+/// Together they drop a stalled viewer within [`STALLED_AFTER`], even if the viewer's machine buffers the
+/// feed unread.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(8);
 /// Minimum speed at which a viewer must read a long message, bytes per second. Slower viewers are dropped.
@@ -29,7 +30,7 @@ const MOST_AFTER_CLOSE: usize = 64;
 /// Maximum rate of messages from a viewer, per second.
 pub(super) const MOST_PER_S: f64 = 20.0;
 
-/// Last message that a viewer received before it lost its connection.
+/// Run and number of the last message that a viewer received before it lost its connection.
 pub(super) struct Resume {
     pub(super) instance: String,
     pub(super) since: u64,
@@ -60,7 +61,7 @@ enum Over {
     Stalled,
     /// The viewer sent a message that isn't allowed.
     Refused,
-    /// The page ends.
+    /// The server of the page ends.
     Ended,
 }
 
@@ -74,9 +75,9 @@ struct Viewer {
     state_every: Duration,
     state_sent: Option<Instant>,
     budget: Budget,
-    /// Time of the next ping.
+    /// Time of the next WebSocket ping.
     ping_at: Instant,
-    /// Deadline for the answer to the last ping; `None` if no answer is due.
+    /// Deadline for the pong to the last WebSocket ping; `None` if no pong is due.
     answer_by: Option<Instant>,
 }
 
@@ -107,8 +108,9 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Ended => (close_code::AWAY, "ended"),
     };
     let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
-    // The viewer may already have disconnected. Otherwise wait for its answer, so that it reads all data sent before.
-    // The number of messages read is limited, because a client may flood the server.
+    // The viewer may already have disconnected. Otherwise wait for its answer to the close frame, so that it
+    // reads all data sent before. The number of messages read is limited, because a client may flood the
+    // server.
     let _closed = timeout(Duration::from_millis(500), async {
         if viewer.socket.send(close).await.is_ok() {
             for _ in 0..MOST_AFTER_CLOSE {
@@ -195,7 +197,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Whether the viewer's requested rate allows another state now.
+    /// Whether another live state may be sent now at the rate that the viewer requested.
     fn wants_state(&mut self) -> bool {
         let now = Instant::now();
         let is_due = self.state_sent.is_none_or(|sent| now.duration_since(sent) >= self.state_every);
@@ -221,8 +223,8 @@ impl Viewer {
         let within = STALLED_AFTER + Duration::from_secs_f64(bytes as f64 / SLOWEST_PER_S);
         match timeout(within, self.socket.send(frame)).await {
             Ok(Ok(())) => {
-                // The server reads no answers while it sends. A slow line delivers buffered data before an answer, so
-                // the deadline is extended.
+                // The server reads no pongs while it sends. A slow line delivers buffered data before a pong,
+                // so the pong's deadline is extended.
                 self.answer_by = self.answer_by.map(|by| by + began.elapsed());
                 Ok(())
             }
@@ -231,7 +233,7 @@ impl Viewer {
         }
     }
 
-    /// Sends a ping. Its answer shows that all earlier data has been read.
+    /// Sends a WebSocket ping. The viewer's pong shows that it has read all earlier data.
     async fn ping(&mut self) -> Result<(), Over> {
         if self.answer_by.is_some() {
             return Err(Over::Stalled);
@@ -285,7 +287,8 @@ impl Viewer {
     fn obey(&mut self, text: &str) -> Result<&'static str, String> {
         match Asked::parse(text)? {
             Asked::Rate(hz) => {
-                // Slightly shorter than the period, so that jitter of regular states doesn't skip one.
+                // The minimum interval is slightly shorter than the requested period, so that jitter skips no
+                // state.
                 self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
                 Ok("rate")
             }

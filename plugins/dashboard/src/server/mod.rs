@@ -47,12 +47,12 @@ pub use self::voice_desk::{Keep, Recall, Voices};
 pub const PORT: u16 = 8881;
 /// Number of ports tried, beginning with the requested port.
 const PORTS: u16 = 10;
-/// Maximum number of batches that a viewer may lag behind. Beyond that it gets all changes at once.
+/// Maximum number of message batches that a viewer may lag behind. Beyond that it gets all changes at once.
 const BATCHES: usize = 64;
 /// Budget of wrong tokens for a client: burst, and refill per second.
 const MOST_GUESSES: f64 = 20.0;
 const GUESSES_PER_S: f64 = 1.0;
-/// Time for viewers to receive the last messages.
+/// Time limit for viewers to receive the last messages when the page ends.
 const ENDS_WITHIN: Duration = Duration::from_secs(1);
 
 /// Address and access rules of the page.
@@ -81,10 +81,10 @@ pub enum PageError {
     Bind {
         /// Requested address.
         address: SocketAddr,
-        /// Error of the last attempt.
+        /// Error of the last port tried.
         source: io::Error,
     },
-    /// The thread or runtime can't be started.
+    /// The page's thread or its async runtime can't be started.
     #[error("the page's thread can't be started: {0}")]
     Thread(io::Error),
     /// TLS can't be set up.

@@ -11,14 +11,14 @@ use tokio::sync::Notify;
 use super::client::Client;
 use crate::access::Role;
 
-/// Maximum number of connections in a class. A browser opens up to six.
+/// Maximum number of connections in a class. One browser opens up to six.
 pub(super) const MOST_OF_CLASS: usize = 64;
 /// Maximum number of feed streams in a class.
 pub(super) const MOST_STREAMS: usize = 32;
 /// Maximum number of streams from an address behind a declared proxy: Cockpit's three widgets and the page, twice.
 const MOST_STREAMS_FORWARDED: usize = 8;
 
-/// Places of all connections, the oldest first.
+/// Places of all connections, the longest-standing first.
 #[derive(Default)]
 pub(super) struct Places {
     held: Mutex<Vec<Held>>,
@@ -31,7 +31,7 @@ struct Held {
     stream: Option<Client>,
 }
 
-/// A connection's place, which is freed on drop.
+/// A connection's place among the limited number of places. It is freed on drop.
 pub(super) struct Place {
     /// Notifies the connection to close, and identifies its place.
     key: Arc<Notify>,
@@ -73,7 +73,7 @@ fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
 }
 
 impl Place {
-    /// Waits until the place is taken away.
+    /// Waits until the connection must be closed to make room for another one.
     pub(super) async fn closed(&self) {
         self.key.notified().await;
     }
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_connections_take_no_place_of_viewers_or_operators() {
+    fn silent_connections_take_no_places_reserved_for_viewers_or_operators() {
         let places = Arc::new(Places::default());
         let of = |role| {
             let place = places.enter(client(1));
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn viewer_streams_take_no_stream_of_operators() {
+    fn viewer_streams_take_no_streams_reserved_for_operators() {
         let places = Arc::new(Places::default());
         let stream = |role, number, is_forwarded| {
             let place = places.enter(client(9));

@@ -11,12 +11,13 @@ use super::shared::Shared;
 use crate::fed::Fed;
 use crate::model::Message;
 
-/// Minimum interval between batches without urgent data: five a second, with a tolerance for early updates.
+/// Minimum interval between message batches without urgent data: five a second, with a tolerance for early
+/// updates.
 const BATCH_EVERY: Duration = Duration::from_millis(190);
-/// Interval at which the state is sent again if there is no new one, as in a paused replay.
+/// Interval at which the live state is sent again if there is no new one, as in a paused replay.
 const AGAIN_AFTER: Duration = Duration::from_secs(2);
 
-/// Runs until the page ends.
+/// Passes messages from the loop to the viewers until the page ends.
 pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
     let (mut flushed, mut is_due) = (Instant::now(), false);
     let mut is_open = true;
@@ -59,7 +60,7 @@ pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
     }
 }
 
-/// Applies a message and all that wait behind it to the model. Returns whether one of them is urgent.
+/// Applies a message and all that follow in the queue to the model. Returns whether one of them is urgent.
 fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
     let mut model = shared.model();
     let mut is_urgent = model.take(one);

@@ -1,4 +1,4 @@
-//! Helpers that build answers.
+//! Helpers that build answers to HTTP requests.
 
 use std::sync::Arc;
 

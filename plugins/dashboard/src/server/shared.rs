@@ -15,13 +15,13 @@ use crate::access::Access;
 use crate::command::{Command, Play};
 use crate::model::{Message, Model};
 
-/// Time without accepted data after which a peer is dropped.
+/// Time after which a peer that accepts no data is dropped.
 pub(super) const STALLED_AFTER: Duration = Duration::from_secs(10);
 
-/// Handler of operators' commands. Its error is the reason of a refusal.
+/// Handler of operators' commands. Its error is the reason for a refusal.
 pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
 
-/// Handler of commands to playback.
+/// Handler of commands to playback. Its error is the reason for a refusal.
 pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
 
 /// Counters that `/metrics` reports.
@@ -37,7 +37,7 @@ pub(crate) struct Counts {
     pub(crate) bytes: AtomicU64,
 }
 
-/// State shared by the handlers.
+/// State shared by all handlers of requests.
 pub(crate) struct Shared {
     pub(super) model: Mutex<Model>,
     pub(crate) access: Access,

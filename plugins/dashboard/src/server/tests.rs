@@ -5,6 +5,7 @@ use std::net::{Ipv4Addr, TcpStream};
 use std::sync::atomic::{AtomicU32, AtomicU64};
 
 use headrace_geometry::tunnel::shapes::circle;
+use headrace_sampling::Target;
 use tokio::time::Instant;
 
 use super::*;
@@ -15,7 +16,7 @@ use crate::site::Mode;
 const VIEWER: &str = "Authorization: Bearer viewer-0123456789\r\n";
 const OPERATOR: &str = "Authorization: Bearer operator-01234567\r\n";
 
-/// A page with tokens, and the number of commands that the page has passed on.
+/// A page that requires tokens, and the number of commands that it has passed to the loop.
 struct Served {
     page: Page,
     commands: Arc<AtomicU32>,
@@ -35,10 +36,9 @@ fn served(proxies: &[IpAddr]) -> Served {
         mode: Mode::Live,
         dive: "dive".to_owned(),
         vehicle: "vehicle".to_owned(),
-        target_m: 0.5,
+        target: Target::new(0.5),
         compared_m: None,
         section_m: 0.25,
-        confidence_sd: 2.0,
         length_m: 100.0,
         profile: circle(2.0).unwrap(),
         heads: Vec::new(),
@@ -226,7 +226,7 @@ fn unread_streams_are_dropped_after_10_s_without_progress() {
     let began = Instant::now();
     let mut dropped = Vec::new();
     while dropped.len() < 2 && began.elapsed() < Duration::from_secs(40) {
-        // About the data rate of a dive with four heads.
+        // The messages have about the data rate of a dive with four heads.
         served.feed(4400);
         std::thread::sleep(Duration::from_millis(200));
         while (dropped.len() as u64) < served.count(|counts| &counts.stalled) {
@@ -242,7 +242,7 @@ fn unread_streams_are_dropped_after_10_s_without_progress() {
 }
 
 #[test]
-fn samples_answer_has_one_content_type() {
+fn answer_to_a_samples_request_has_one_content_type() {
     let (status, head) = served(&[]).ask("GET /samples?from_m=0&to_m=1", VIEWER, "");
     assert_eq!((status, head.matches("content-type:").count()), (200, 1), "{head}");
     assert!(head.contains("content-type: application/octet-stream"), "{head}");
@@ -308,7 +308,7 @@ fn repeated_wrong_token_uses_one_guess() {
 }
 
 #[test]
-fn guesses_behind_a_declared_proxy_count_by_forwarded_address() {
+fn guesses_through_a_declared_proxy_count_for_the_forwarded_address() {
     let served = served(&[Ipv4Addr::LOCALHOST.into()]);
     let status = |of: &str, token: &str| {
         let headers = format!("X-Forwarded-For: {of}\r\nAuthorization: Bearer {token}\r\n");
@@ -325,7 +325,7 @@ fn guesses_behind_a_declared_proxy_count_by_forwarded_address() {
 }
 
 #[test]
-fn flood_gets_at_most_26_guesses_in_5_s() {
+fn flood_of_wrong_tokens_gets_at_most_26_guesses_in_5_s() {
     let served = served(&[]);
     let began = Instant::now();
     let (mut guesses, mut requests) = (0_u32, 0_u32);

@@ -14,13 +14,14 @@ const MOST_BEGUN: usize = 32;
 /// Maximum size of recordings kept in memory for playing, bytes. The oldest are dropped from memory but stay in the
 /// log.
 const MOST_HELD_BYTES: usize = 16 << 20;
-/// Maximum number of recordings received at the same time.
+/// Maximum number of recordings that are uploaded at the same time.
 const MOST_COMING: usize = 2;
-/// Budget of uploads: burst, and refill per second.
+/// Budget of recordings' uploads: burst, and refill per second.
 const RATE: (f64, f64) = (8.0, 0.2);
-/// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason of a refusal.
+/// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason for a
+/// refusal.
 pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
-/// Finds in a log the recording of the note with this id and time, seconds.
+/// Handler that finds in a log the recording of the voice note with this id and time, seconds.
 ///
 /// Returns `None` if the log has no readable recording of it. The search may take seconds.
 pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;
@@ -121,7 +122,7 @@ impl Desk {
     /// Returns the recording of a note, from memory or from the log.
     pub(super) async fn recall(&self, id: u32, at_s: f64) -> Result<Option<Arc<Voice>>, Refusal> {
         let Voices::Recalled(recall) = &self.to else { return Ok(self.get(id)) };
-        // Only one search at a time, because each may read much of a log.
+        // Only one search runs at a time, because each may read much of a log.
         let _turn = self.recalling.acquire().await;
         if let Some(voice) = self.get(id) {
             return Ok(Some(voice));

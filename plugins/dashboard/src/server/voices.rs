@@ -15,7 +15,7 @@ use super::feed;
 use super::reply::{Here, json_answer, plain, refused};
 use super::voice_desk::{Desk, Refusal};
 use crate::access::query;
-/// Timeout of an upload: 512 KiB at 10 kB/s.
+/// Timeout of a recording's upload: 512 KiB at 10 kB/s.
 const COMES_WITHIN: Duration = Duration::from_mins(1);
 
 /// Receives the recording of a voice note that was begun over the feed.

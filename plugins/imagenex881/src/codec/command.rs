@@ -5,23 +5,23 @@
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 use headrace_sensor::geometry::math;
 
-/// Length of a command.
+/// Length of a switch command, bytes.
 pub const COMMAND_BYTES: usize = 27;
 
 /// Range settings for profiling, m.
 pub const RANGES_M: [u8; 13] = [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100];
 
 const HEADER: [u8; 2] = [0xFE, 0x44];
-/// Terminates a command. The value must not occur elsewhere in the command.
+/// Byte that terminates a command. It must not occur elsewhere in the command.
 const TERMINATOR: u8 = 0xFD;
-/// Command bits: transmit (bit 0), send data (bit 1), slave (bit 6).
+/// Bits of the mode byte of a command: transmit (bit 0), send data (bit 1), slave (bit 6).
 const SLAVE: u8 = 0x43;
 const REVERSE: u8 = 0x40;
 /// Reply rate code for 115200 baud. No other code is known.
 const UP_BAUD: u8 = 0x06;
 const STEP_CODES: [u8; 6] = [0, 1, 2, 3, 4, 8];
 
-/// Number of echo points.
+/// Number of echo points in a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Points {
     /// Nominally 250 points. Returns with 8-bit points (`IMX`) have 252.
@@ -55,11 +55,11 @@ pub struct Command {
     pub pulse_us: f64,
     /// Minimum range of the profile point, 0 to 25 m in steps of 0.1.
     pub min_range_m: f64,
-    /// Number of echo points.
+    /// Number of echo points in the return.
     pub points: Points,
-    /// Number of bits of an echo point: 4, 8 or 16.
+    /// Number of bits of each echo point: 4, 8 or 16.
     pub data_bits: u8,
-    /// Whether the return has the profile point only (`IPX`).
+    /// Whether the return has the profile point only, without an echo (`IPX`).
     pub profile: bool,
     /// Whether the head calibrates its zero.
     pub calibrate: bool,
@@ -82,9 +82,9 @@ pub enum CommandError {
         value: f64,
         /// Unit of the setting.
         unit: &'static str,
-        /// Minimum.
+        /// Minimum of the setting.
         least: f64,
-        /// Maximum.
+        /// Maximum of the setting.
         most: f64,
     },
     /// A setting isn't one of the allowed values.
@@ -94,7 +94,7 @@ pub enum CommandError {
         field: &'static str,
         /// Value of the setting.
         value: f64,
-        /// Allowed values.
+        /// Allowed values of the setting.
         allowed: &'static str,
     },
     /// The code of a setting would terminate the command early.
@@ -105,14 +105,14 @@ pub enum CommandError {
         /// Index of the code in the command.
         index: usize,
     },
-    /// A constant byte has the wrong value.
+    /// A byte of the command that must be constant has another value.
     #[error("switch command: byte {index} is {got:#04X}; allowed is {wanted:#04X}")]
     Fixed {
         /// Index of the byte in the command.
         index: usize,
-        /// Actual value.
+        /// Actual value of the byte.
         got: u8,
-        /// Required value.
+        /// Required value of the byte.
         wanted: u8,
     },
 }
@@ -139,7 +139,7 @@ impl Scale {
         self.zero + f64::from(code) * self.num / self.den
     }
 
-    /// Code nearest to a value.
+    /// Code nearest to a value of the setting.
     fn code(&self, value: f64) -> Result<u8, CommandError> {
         let code = math::round_to_i64((value - self.zero) * self.den / self.num);
         match u8::try_from(code) {
@@ -154,7 +154,7 @@ impl Scale {
         }
     }
 
-    /// Value of a received code. The code's range is checked.
+    /// Value of the setting for a received code. The code's range is checked.
     fn checked(&self, code: u8) -> Result<f64, CommandError> {
         self.code(self.value(code)).map(|_| self.value(code))
     }
@@ -275,7 +275,7 @@ impl Command {
         })
     }
 
-    /// Step in counts of 0.3 degrees.
+    /// Step of the command in counts of 0.3 degrees.
     pub fn step_counts(&self) -> i32 {
         STEP.code(self.step_deg).map_or(0, i32::from)
     }

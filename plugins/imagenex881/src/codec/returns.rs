@@ -4,10 +4,10 @@
 
 use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
 
-/// Maximum echo length.
+/// Maximum length of a return's echo, bytes.
 pub const MAX_ECHO_BYTES: usize = MAX_ECHO as usize;
 
-/// Maximum return length.
+/// Maximum length of a return, bytes.
 pub const MAX_RETURN_BYTES: usize = HEADER_BYTES + MAX_ECHO_BYTES + 1;
 
 /// Maximum head position of an 881: +180 degrees.
@@ -17,23 +17,23 @@ const MAX_ECHO: u16 = 500;
 const HEADER_BYTES: usize = 12;
 const TERMINATOR: u8 = 0xFC;
 const CLOCKWISE: u8 = 0x40;
-/// Smallest range setting whose counts are 1 cm.
+/// Smallest range setting at which a count of profile range is 1 cm, m.
 const COARSE_FROM_M: u8 = 5;
 
-/// Type of a return.
+/// Type of a return, which its tag states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tag {
     /// `IMX`: echo at the 25-point setting.
     Imx,
     /// `IGX`: echo at the 50-point setting.
     Igx,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Ipx,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Ina,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Inb,
-    /// GS model, with attitude sensors.
+    /// Return of a GS model, which has attitude sensors.
     Inc,
 }
 
@@ -52,7 +52,8 @@ impl Tag {
         }
     }
 
-    /// Whether the return is from a GS model. GS models add fields after the common header, known from one source only.
+    /// Whether the return is from a GS model. GS models add fields after the common header. Only one source
+    /// describes these fields.
     pub const fn is_gs(self) -> bool {
         matches!(self, Self::Ina | Self::Inb | Self::Inc)
     }
@@ -78,7 +79,7 @@ impl Model {
     }
 }
 
-/// The serial status byte.
+/// The serial status byte of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status(pub u8);
 
@@ -107,7 +108,7 @@ pub struct Header {
     pub position: u16,
     /// Whether the head steps clockwise.
     pub clockwise: bool,
-    /// Range setting, m.
+    /// Range setting of the ping, m.
     pub range_m: u8,
     /// Profile range in counts of [`Header::count_mm`], 14 bits; 0 if no echo was above the threshold.
     pub profile_counts: u16,
@@ -116,7 +117,7 @@ pub struct Header {
 /// A whole return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Return {
-    /// The header.
+    /// The header of the return.
     pub header: Header,
     /// Echo strengths, packed by the command's number of data bits. Empty in [`Tag::Ipx`].
     pub echo: Bytes<MAX_ECHO_BYTES>,
@@ -126,13 +127,13 @@ pub struct Return {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReturnError {
-    /// The tag is unknown.
+    /// The tag, the first three bytes of the return, is unknown.
     #[error("return: tag {got:02X?}; allowed are IMX, IGX, IPX, INA, INB, INC")]
     Tag {
-        /// The three bytes received.
+        /// The three bytes received in place of a tag.
         got: [u8; 3],
     },
-    /// There are too few bytes.
+    /// There are too few bytes for a whole return.
     #[error("return: {got} bytes; needed are {needed}")]
     Short {
         /// Number of bytes present.
@@ -146,7 +147,7 @@ pub enum ReturnError {
         /// Bytes 5, 6 and 8 to 11 of the return.
         got: [u8; 6],
     },
-    /// A field above its maximum.
+    /// A field of the return is above its maximum.
     #[error("return: {field} is {got}; at most {max} is allowed")]
     TooGreat {
         /// Name of the field.
@@ -159,7 +160,7 @@ pub enum ReturnError {
     /// The terminator isn't 0xFC.
     #[error("return: ends in {got:#04X}; allowed is 0xFC")]
     Terminator {
-        /// Byte received.
+        /// Byte received in place of the terminator.
         got: u8,
     },
 }

@@ -13,11 +13,11 @@ use crate::settings::tests::settings;
 use crate::stepping::Head;
 
 const BEGUN: MonoNs = MonoNs(2_000_000_000);
-/// A pause that never ends.
+/// Pause within an answer that never ends.
 const STALLS: DurNs = DurNs(i64::MAX);
 const LATENCY: DurNs = DurNs(9_000_000);
 
-/// Faults of the line. Messages are identified by number.
+/// Faults of the line. Commands and answers are identified by their numbers.
 #[derive(Default)]
 struct Faults {
     /// Numbers of commands that are lost; then numbers of answers that are lost.
@@ -30,7 +30,7 @@ struct Faults {
     halved_answers: Vec<(usize, DurNs)>,
 }
 
-/// A driver, a head and the line between them.
+/// A driver, an emulated head and the simulated line between them.
 struct Rig {
     driver: HeadDriver,
     head: HeadEmulator,
@@ -42,7 +42,7 @@ struct Rig {
     answers: usize,
     /// Whether the last answer has been duplicated.
     doubled: bool,
-    /// Time and position of the pings whose returns, at the dive's settings, were delivered.
+    /// Time and position of each ping whose return was delivered and has the dive's range setting.
     pings: Vec<(MonoNs, u16)>,
     delivered: Vec<u8>,
 }
@@ -108,7 +108,7 @@ impl Rig {
         }
     }
 
-    /// Delivers a command to the head, and puts the head's answer on the line.
+    /// Delivers a command to the head, and puts the head's answer on the simulated line.
     fn carry(&mut self, command: &[u8]) {
         let number = self.sent.len();
         self.sent.push(self.now);
@@ -183,7 +183,7 @@ impl Rig {
         assert!(wide.len() <= lost && wide.iter().all(|moved| moved.abs() <= 2 * step), "{wide:?}");
     }
 
-    /// Asserts that each ping after `from` has the program's position and time.
+    /// Asserts that each ping after `from` has the position and time of the scan program.
     fn assert_on_time(&self, from: MonoNs) {
         let timetable = &self.driver.timetable;
         let late = DurNs(1_000_000);
@@ -212,7 +212,7 @@ fn after_s(seconds: i64) -> MonoNs {
 }
 
 #[test]
-fn head_is_homed_to_its_program_from_any_position() {
+fn head_is_homed_to_its_scan_program_from_any_position() {
     let sector = HeadProgram { start_rad: 0.5, growing: false, sector: Some((0.0, PI / 2.0)) };
     for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
         for program in [turning(0.0, true), turning(4.0, false), sector] {

@@ -8,10 +8,10 @@ use crate::plugin::HeadDecoder;
 use crate::settings::counts_of_rad;
 use crate::settings::tests::settings;
 
-/// Radius of the tube, m.
+/// Radius of the tube in which the head pings, m.
 const RADIUS_M: f64 = 4.0;
 
-/// Result of a run: send and receive times, ns, and the readings with their times.
+/// Result of an emulated run: send and receive times of messages, ns, and the readings with their times.
 struct Run {
     sent: Vec<u64>,
     received: Vec<u64>,
@@ -27,7 +27,7 @@ fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
     let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
     let mut due = Vec::new();
     let last = start + DurNs(settings.ping_period.0 * (pings as i64 - 1));
-    // `begin` is called twice, and still gives each ping once.
+    // The emulator's `begin` is called twice, and still gives each ping once.
     emulator.begin(start + DurNs(settings.ping_period.0 / 2), &mut due);
     emulator.begin(last + DurNs(1), &mut due);
     for sounding in due {
@@ -53,13 +53,13 @@ fn turning(start_rad: f64, growing: bool) -> HeadProgram {
     HeadProgram { start_rad, growing, sector: None }
 }
 
-/// Sensor angles of the readings, in counts.
+/// Sensor angles of the readings, in counts of 0.3 degrees.
 fn counts(run: &Run) -> Vec<i32> {
     run.readings.iter().map(|(_, sonar)| counts_of_rad(sonar.angle_rad)).collect()
 }
 
 #[test]
-fn pings_are_at_start_and_every_period() {
+fn pings_occur_at_the_start_and_once_per_ping_period() {
     let run = run("mode = \"fastest\"", DurNs::from_millis(5), turning(0.0, true), 400);
     for (i, k) in (0..400_u64).enumerate() {
         let ping = 7_000_000_000 + k * 32_000_000;
@@ -106,7 +106,7 @@ fn turn_ends_at_its_start_angle_and_continues_in_either_direction() {
 }
 
 #[test]
-fn inverted_sign_and_offset_do_not_change_the_program_in_the_sensor_frame() {
+fn inverted_angle_sign_and_offset_keep_the_scan_program_in_the_sensor_frame() {
     let text = "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 33";
     let run = run(text, DurNs::ZERO, turning(PI / 2.0, true), 50);
     for (k, got) in (0..).zip(counts(&run)) {
@@ -142,7 +142,7 @@ fn sector_sweep_pings_each_end_once() {
 }
 
 #[test]
-fn step_that_does_not_divide_the_sector_is_shortened_at_its_end() {
+fn step_that_does_not_divide_the_sector_is_shortened_at_the_sector_end() {
     check_sweep("mode = \"fastest\"", 8, 0, 300, 0, true);
     check_sweep("mode = \"fast\"", 3, 400, 400, 800, false);
 }

@@ -1,4 +1,4 @@
-//! Decodes frames into readings, according to a mapping.
+//! Decodes CAN frames into readings, according to a mapping of DBC signals.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framed, Framing, Verdict};
 use headrace_sensor::device::Decoder;
@@ -14,8 +14,8 @@ use super::mapping::{Attitude, Axes, Condition, Mapping, Part, Stamp};
 use crate::codec::can_frame;
 use crate::frame::{CanFrame, CanId, FRAME_BYTES, FrameKind};
 
-/// Maximum number of frames of a mapping, one for each signal: 3 of rate, 3 of force, 4 of attitude, 4 states and a
-/// time.
+/// Maximum number of frames that a mapping uses, if each signal has its own: 3 of rate, 3 of force, 4 of
+/// attitude, 4 states and a time.
 const MOST_FRAMES: usize = 15;
 
 /// Maximum time between the frames of one sample. A unit sends them back to back, and the next sample later.
@@ -33,7 +33,7 @@ pub struct Listened {
 /// differs from the DBC's.
 pub type DbcCodec = Framed<Listened, FRAME_BYTES>;
 
-/// Decodes bytes into readings.
+/// Decodes an inertial unit's bytes into readings.
 #[derive(Debug, Clone)]
 pub struct DbcDecoder {
     listened: Listened,
@@ -73,11 +73,11 @@ struct Vector<const N: usize> {
 stateful!(Vector<3> { slots: came; fixed: parts; });
 stateful!(Vector<4> { slots: came; fixed: parts; });
 
-/// Error: the components of a vector are from different samples.
+/// Error of a vector whose components are from different samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mixed;
 
-/// Validity as reported by the unit. Values count as valid until the unit reports otherwise.
+/// Validity of a quantity as reported by the unit. Values count as valid until the unit reports otherwise.
 #[derive(Debug, Clone, Copy)]
 struct Well {
     condition: Option<Condition>,
@@ -128,7 +128,7 @@ impl Framing for Listened {
 }
 
 impl DbcDecoder {
-    /// Creates a decoder.
+    /// Creates a decoder for this mapping.
     pub fn new(mapping: &Mapping) -> Self {
         let (quaternion, euler) = match mapping.attitude {
             Some(Attitude::Quaternion(parts)) => (Some(Vector::new(parts)), None),

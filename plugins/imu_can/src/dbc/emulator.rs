@@ -1,4 +1,5 @@
-//! Unit side of the bus. The emulator sends the DBC's frames of one sample at a fixed rate.
+//! Emulates an inertial unit on the CAN bus. At a fixed rate, it sends one sample as all frames that the DBC
+//! file defines.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -20,7 +21,7 @@ pub struct DbcEmulator {
     told: u64,
 }
 
-/// A frame of a sample: identifier, length and multiplexer value.
+/// A kind of frame that each sample has: identifier, length and multiplexer value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Frame {
     id: CanId,
@@ -53,7 +54,7 @@ impl DbcEmulator {
         DurNs::from_secs_f64(sample as f64 / self.rate_hz)
     }
 
-    /// Values of all signals.
+    /// Values of all mapped signals for this motion.
     fn values(&self, motion: &Inertia) -> Vec<(Place, f64)> {
         let axes = self.mapping.axes;
         let mut values = Vec::new();
@@ -76,7 +77,7 @@ impl DbcEmulator {
         values
     }
 
-    /// Encodes a frame; `None` if one of the frame's values is not finite, which means not measured.
+    /// Encodes a frame; `None` if one of its values isn't finite, because it wasn't measured.
     fn frame(&self, frame: Frame, values: &[(Place, f64)], elapsed: DurNs) -> Option<CanFrame> {
         let there = |place: &Place| {
             place.id == frame.id && place.switch.is_none_or(|(_, on)| Some(on) == frame.switch)

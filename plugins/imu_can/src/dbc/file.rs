@@ -1,4 +1,4 @@
-//! A DBC text and lookup of its signals. Used while reading a vehicle file, never in the loop.
+//! Parses a DBC text, and looks up its signals. Used while reading a vehicle file, never in the loop.
 
 use std::collections::BTreeMap;
 
@@ -21,33 +21,33 @@ const EXTENDED: u64 = 1 << 31;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DbcError {
-    /// The text is no DBC text.
+    /// The text isn't valid in the DBC format.
     #[error("reading the DBC: {problem}")]
     Parse {
-        /// Line, counted from one.
+        /// Number of the faulty line, counted from one.
         line: usize,
         /// Offending text.
         problem: String,
     },
-    /// The text is too long.
+    /// The DBC text is too long.
     #[error(
         "reading the DBC: {0} bytes; at most {MOST_BYTES} are allowed: keep only the messages of the unit"
     )]
     Long(usize),
-    /// There is no such signal.
+    /// The DBC has no signal of the requested name.
     #[error("looking for the signal {wanted:?}: the DBC has none of that name; it has {has}")]
     NoSignal {
-        /// Requested name.
+        /// Requested name of the signal.
         wanted: String,
-        /// Available names.
+        /// Names of signals that the DBC has.
         has: String,
     },
     /// Several messages have a signal of the requested name.
     #[error("looking for the signal {wanted:?}: it is in several messages; name one of {among}")]
     Ambiguous {
-        /// Requested name.
+        /// Requested name of the signal.
         wanted: String,
-        /// Unambiguous names.
+        /// Unambiguous names of the signals.
         among: String,
     },
     /// The signal extends beyond the end of its frame.
@@ -67,7 +67,7 @@ pub enum DbcError {
         /// Length of the signal's message.
         frame_bytes: u64,
     },
-    /// A float has a length other than 32 or 64 bits.
+    /// A signal that is a float has a length other than 32 or 64 bits.
     #[error(
         "laying out the signal {signal:?}: a float of {size} bits; allowed are 32 for SIG_VALTYPE_ 1 and 64 for 2"
     )]
@@ -77,7 +77,7 @@ pub enum DbcError {
         /// Size of the signal in bits.
         size: u64,
     },
-    /// The factor is zero, or factor or offset is not finite.
+    /// The factor of a signal is zero, or its factor or offset is not finite.
     #[error(
         "reading the signal {signal:?}: factor {factor}, offset {offset}; both must be finite, and the factor not zero"
     )]
@@ -110,12 +110,12 @@ pub enum DbcError {
     },
 }
 
-/// A signal found in the DBC.
+/// A signal that was found in the DBC.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
-    /// Name, as `Message.Signal`.
+    /// Name of the signal, as `Message.Signal`.
     pub name: String,
-    /// Unit as written.
+    /// Unit of the signal, as written in the DBC.
     pub unit: String,
     /// Location of the signal.
     pub place: Place,
@@ -124,7 +124,7 @@ pub struct Signal {
 /// Location of a signal in frames, and its conversion to a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Identifier of its frames.
+    /// Identifier of the frames that contain the signal.
     pub id: CanId,
     /// Length of the frames' data.
     pub frame_bytes: u8,
@@ -170,7 +170,7 @@ pub struct DbcFile {
 }
 
 impl DbcFile {
-    /// Parses a text.
+    /// Parses a DBC text.
     ///
     /// Errors: the text is no DBC text, with the offending line; the text is too long.
     pub fn parse(text: &str) -> Result<Self, DbcError> {

@@ -47,7 +47,7 @@ impl Layout {
         let all = 8 * u32::try_from(data_bytes.min(DATA_BYTES)).ok()?;
         let start = u32::try_from(start).ok().filter(|start| *start < all)?;
         let bits = u32::try_from(size).ok().filter(|bits| (1..=all).contains(bits))?;
-        // Number of bits before the signal's first bit, in the signal's bit order.
+        // Number of data bits before the signal's first bit, in the signal's bit order.
         let before = match order {
             Order::Intel => start,
             Order::Motorola => start - start % 8 + (7 - start % 8),
@@ -62,7 +62,7 @@ impl Layout {
         Some(Self { shift, bits, order })
     }
 
-    /// Number of bits.
+    /// Number of bits of the signal.
     pub fn bits(self) -> u32 {
         self.bits
     }
@@ -92,7 +92,8 @@ impl Layout {
 }
 
 impl Bits {
-    /// Value of the lowest `bits` bits of `raw`. Integers of more than 53 bits are rounded to the nearest double.
+    /// Value of the number that the lowest `bits` bits of `raw` represent. Integers of more than 53 bits are
+    /// rounded to the nearest double.
     pub fn value(self, raw: u64, bits: u32) -> f64 {
         let unused = 64 - bits.clamp(1, 64);
         match self {
@@ -103,7 +104,7 @@ impl Bits {
         }
     }
 
-    /// Raw bits of the representable value nearest to `value`.
+    /// Raw bits of the number nearest to `value` that `bits` bits can represent.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a double beyond the range of the signal saturates, as intended"
@@ -159,7 +160,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(4096))]
 
         #[test]
-        fn bits_match_a_walk_over_the_signal(
+        fn extracted_bits_match_a_bit_by_bit_reading_of_the_signal(
             data: [u8; 8], start in 0_u64..70, size in 0_u64..70, order in order(), bytes in 0_usize..=8,
         ) {
             let bits = walk(start, size, order);
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn value_out_of_range_encodes_as_the_nearest() {
+    fn value_out_of_range_is_encoded_as_the_nearest_allowed_value() {
         assert_eq!(Bits::Unsigned.raw(-3.0, 8), 0);
         assert_eq!(Bits::Unsigned.raw(1e30, 8), 255);
         assert_eq!(Bits::Signed.raw(1e30, 8), 127);
@@ -218,7 +219,7 @@ mod tests {
     /// Example of Motorola start bits in the DBC format: `7|16@0` is bytes 0 and 1, and `39|16@0` is bytes 4 and 5,
     /// most significant first.
     #[test]
-    fn motorola_start_bits_name_the_most_significant() {
+    fn motorola_start_bit_is_the_most_significant_bit() {
         let data = [1, 2, 3, 4, 5, 6, 7, 8];
         let extract = |start, order| Layout::new(start, 16, order, 8).unwrap().extract(data);
         assert_eq!(extract(7, Order::Motorola), 0x0102);

@@ -1,4 +1,4 @@
-//! Mapping of a unit's signals to readings, in the form that the loop uses.
+//! Mapping of an inertial unit's DBC signals to readings, in the form that the loop uses.
 
 use headrace_sensor::geometry::time::DurNs;
 
@@ -8,7 +8,7 @@ use super::layout::Bits;
 /// Standard gravity, m/s^2 (CGPM 1901).
 const G_MPS2: f64 = 9.806_65;
 
-/// Axis convention of the unit.
+/// Axis convention of the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axes {
     /// x forward, y left, z up; attitude relative to a z-up frame.
@@ -28,7 +28,7 @@ pub enum Unit {
     Gravities,
 }
 
-/// Quantity of a signal.
+/// Quantity that a signal measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Turn rate.
@@ -41,7 +41,7 @@ pub enum Kind {
     Share,
 }
 
-/// A reason why a signal can't be used as requested.
+/// A reason why a DBC signal can't be used as the vehicle file requests.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MappingError {
@@ -52,9 +52,9 @@ pub enum MappingError {
         signal: String,
         /// Expected quantity.
         quantity: &'static str,
-        /// Unit in the DBC.
+        /// Unit of the signal in the DBC.
         unit: String,
-        /// Allowed units.
+        /// Allowed units of the quantity.
         allowed: String,
     },
     /// The signal can't be a sample time, since its tick is unsuitable.
@@ -65,12 +65,12 @@ pub enum MappingError {
     Time {
         /// Name of the signal.
         signal: String,
-        /// Factor, as text.
+        /// Factor of the signal, as text.
         factor: String,
-        /// Unit in the DBC.
+        /// Unit of the signal in the DBC.
         unit: String,
     },
-    /// The mask or value has bits beyond the signal.
+    /// The mask or value of a validity condition has bits beyond the signal.
     #[error(
         "using {signal:?} as a state: mask {mask:#X}, value {value:#X}; allowed are an integer signal, a mask within its \
          {bits} bits, and a value within the mask"
@@ -82,15 +82,15 @@ pub enum MappingError {
         bits: u32,
         /// Mask of the checked bits.
         mask: u64,
-        /// Required value.
+        /// Value that the checked bits must have.
         value: u64,
     },
 }
 
-/// A signal as a component of a reading.
+/// A DBC signal used as a component of a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
-    /// Location in the frames.
+    /// Location of the signal in the frames.
     pub place: Place,
     /// Unit of the signal.
     pub unit: Unit,
@@ -108,7 +108,7 @@ pub enum Attitude {
 /// Condition of validity. Readings are withheld unless the signal's bits under `mask` equal `value`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condition {
-    /// Location of the state.
+    /// Location of the status signal in the frames.
     pub place: Place,
     /// Mask of the checked bits.
     pub mask: u64,
@@ -119,33 +119,33 @@ pub struct Condition {
 /// Timestamp of the unit's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stamp {
-    /// Location in the frames.
+    /// Location of the timestamp in the frames.
     pub place: Place,
-    /// Length of a tick.
+    /// Length of a tick of the unit's clock.
     pub tick: DurNs,
 }
 
 /// Conditions of validity of the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Conditions {
-    /// Condition for all readings.
+    /// Condition for the validity of all readings.
     pub all: Option<Condition>,
-    /// Condition for attitude.
+    /// Further condition for the validity of attitude.
     pub attitude: Option<Condition>,
-    /// Condition for turn rate.
+    /// Further condition for the validity of turn rate.
     pub rate: Option<Condition>,
-    /// Condition for specific force.
+    /// Further condition for the validity of specific force.
     pub force: Option<Condition>,
 }
 
-/// Mapping of a unit's signals.
+/// Mapping of an inertial unit's DBC signals to readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mapping {
-    /// Axis convention.
+    /// Axis convention of the unit.
     pub axes: Axes,
-    /// Turn rate about x, y, z.
+    /// Signals of the turn rate about x, y, z.
     pub rate: Option<[Part; 3]>,
-    /// Specific force along x, y, z.
+    /// Signals of the specific force along x, y, z.
     pub force: Option<[Part; 3]>,
     /// Signals of the attitude.
     pub attitude: Option<Attitude>,
@@ -174,7 +174,7 @@ impl Axes {
 }
 
 impl Unit {
-    /// Converts a value from this unit to SI.
+    /// Converts a value from this unit to the SI unit.
     pub fn to_si(self, value: f64) -> f64 {
         match self {
             Self::Si => value,
@@ -183,7 +183,7 @@ impl Unit {
         }
     }
 
-    /// Converts a value from SI to this unit.
+    /// Converts a value from the SI unit to this unit.
     pub fn of_si(self, value: f64) -> f64 {
         match self {
             Self::Si => value,
@@ -251,7 +251,7 @@ impl Part {
 }
 
 impl Condition {
-    /// Uses a signal as a state. Without `value`, all bits of the mask must be set.
+    /// Uses a signal as a status. Without `value`, readings are valid if all bits of the mask are set.
     ///
     /// Errors: bits beyond the signal, a value outside the mask, a float.
     pub fn of(signal: &Signal, mask: u64, value: Option<u64>) -> Result<Self, MappingError> {

@@ -47,7 +47,7 @@ rate_valid = { signal = "ImuStatus", mask = 0x2E1 }
 sample_time = "ImuTime"
 "#;
 
-/// Further content of DBC files of whole vehicles.
+/// DBC text with the further content that files of whole vehicles have.
 const RICH: &str = "VERSION \"1\"\n\nNS_ :\n\tNS_DESC_\n\tCM_\n\tBA_DEF_\n\nBS_:\n\nBU_: U H\n\
 VAL_TABLE_ OnOff 1 \"on\" 0 \"off\" ;\n\n\
 BO_ 2147483748 A: 8 U\n SG_ Rate : 7|16@0- (0.01,-1) [-10|10] \"deg/s\" Vector__XXX\n\
@@ -174,7 +174,7 @@ proptest! {
 
     /// Truncated texts, texts with changed bytes, and arbitrary texts give an error or a result, but never a panic.
     #[test]
-    fn any_text_is_parsed_without_a_panic(
+    fn arbitrary_text_is_parsed_without_a_panic(
         cut in 0_usize..4000, changes in proptest::collection::vec((0_usize..4000, any::<char>()), 0..4),
         any in "\\PC*", which in 0_usize..4,
     ) {
@@ -195,9 +195,9 @@ proptest! {
         }
     }
 
-    /// Numeric fields have out-of-range numbers.
+    /// The numeric fields of a valid DBC text are replaced by out-of-range numbers.
     #[test]
-    fn any_numbers_are_parsed_without_a_panic(
+    fn arbitrary_numbers_are_parsed_without_a_panic(
         id: u64, bytes: u64, start: u64, size: u64, order in 0_u8..2, factor in any::<f64>(), mux in 0_u64..5,
     ) {
         let signal = format!("SG_ A m{mux} : {start}|{size}@{order}- ({factor:e},0) [0|0] \"deg/s\" H");
@@ -236,7 +236,7 @@ fn dbc_readings_equal_the_preset_readings() {
 }
 
 #[test]
-fn clipped_axes_withhold_their_vector() {
+fn vector_with_a_clipped_axis_is_withheld() {
     let [(mapping, set), ..] = &*MAPPINGS;
     let (rate, force) = (frame(0x32, &[0; 6]), frame(0x34, &[0; 6]));
     for bit in 0..32_u32 {
@@ -260,7 +260,7 @@ BO_ 70000 Far: 8 U\n SG_ InFar : 0|8@1- (1,0) [0|0] \"\" H\n\
 SIG_VALTYPE_ 600 F32 : 1;\nSIG_VALTYPE_ 601 F64 : 2;\nSIG_VALTYPE_ 601 Bad : 1;\n";
 
 #[test]
-fn vector_in_several_frames_is_reported_once_complete() {
+fn vector_in_several_frames_is_reported_when_its_last_frame_arrives() {
     let own = "[signals]\nforce = [\"TX2.AX\", \"AY\", \"AZ\"]\n";
     let mut decoder = DbcDecoder::new(&mapped(OTHERS, own).unwrap());
     let half_g = [0, 0, 0, 0, 0x53, 0x8F, 0, 0];
@@ -311,7 +311,7 @@ fn worked_examples_of_other_makers_are_decoded() {
 }
 
 #[test]
-fn other_dbc_content_is_ignored() {
+fn dbc_content_other_than_signals_is_ignored() {
     let dbc = DbcFile::parse(&format!("\u{FEFF}{}", RICH.replace('\n', "\r\n"))).unwrap();
     let place = dbc.signal("Rate").unwrap().place;
     assert_eq!(place.id, CanId::Extended(100));

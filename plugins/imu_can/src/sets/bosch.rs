@@ -24,15 +24,15 @@ const ACCELERATION_OFFSET_G: f64 = -4.1768;
 /// One standard gravity, m/s^2.
 const STANDARD_GRAVITY_MPS2: f64 = 9.806_65;
 
-/// A turn rate on the wire.
+/// A turn rate in counts, as in the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RawRate(pub u16);
 
-/// An acceleration on the wire.
+/// An acceleration in counts, as in the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RawAcceleration(pub u16);
 
-/// One message.
+/// One message of the Bosch set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Turn rate about z, acceleration along y.

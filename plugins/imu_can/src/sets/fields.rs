@@ -10,11 +10,11 @@ pub struct MessageError {
     pub id: CanId,
     /// Length of the frame.
     pub len: usize,
-    /// Required length.
+    /// Length that the frame must have.
     pub needed: usize,
 }
 
-/// Converts integers to physical units, given the quantum.
+/// Converts counts to physical units; `quantum` is the size of one count.
 pub fn scaled<const N: usize>(raw: [i16; N], quantum: f64) -> [f64; N] {
     raw.map(|raw| f64::from(raw) * quantum)
 }

@@ -26,7 +26,7 @@ const ANGLE_OFFSET_DEG: f64 = -250.0;
 const ACCELERATION_OFFSET_MPS2: f64 = -320.0;
 const LATENCY_QUANTUM_MS: f64 = 0.5;
 
-/// Filter by sender.
+/// Filter of frames by their sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Network {
     /// Source address of the unit; `None` if it is the only sender of these groups.
@@ -36,9 +36,9 @@ pub struct Network {
 /// Pitch and roll with extended range and resolution (SSI2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slope {
-    /// Pitch, 24 bits.
+    /// Raw pitch, 24 bits.
     pub pitch: u32,
-    /// Roll, 24 bits.
+    /// Raw roll, 24 bits.
     pub roll: u32,
     /// Two bits each, from bit 0: pitch compensation, pitch figure of merit, roll compensation, roll figure of merit.
     pub figures: u8,
@@ -46,10 +46,10 @@ pub struct Slope {
     pub latency: u8,
 }
 
-/// Three values, in the maker's axis order.
+/// Three turn rates or accelerations, in the maker's axis order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triple {
-    /// Values in wire order.
+    /// Values in the order of the frame.
     pub raw: [u16; 3],
     /// Figures of merit, two bits each from bit 0: 0 good, 1 degraded, 2 error, 3 not available.
     pub figures: u8,
@@ -57,14 +57,14 @@ pub struct Triple {
     pub latency: u8,
 }
 
-/// One message.
+/// One message of the J1939 set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
-    /// Group 61481.
+    /// Parameter group 61481: slope.
     Slope(Slope),
-    /// Group 61482.
+    /// Parameter group 61482: angular rate.
     AngularRate(Triple),
-    /// Group 61485.
+    /// Parameter group 61485: acceleration.
     Acceleration(Triple),
 }
 
@@ -164,17 +164,17 @@ fn is_value(highest_byte: u8) -> bool {
     highest_byte < 0xFE
 }
 
-/// Raw turn rate from degrees per second.
+/// Converts a turn rate in degrees per second to its raw value.
 pub(crate) fn rate_raw(degps: f64) -> u16 {
     raw(degps, RATE_QUANTUM_DEGPS, ANGLE_OFFSET_DEG)
 }
 
-/// Raw acceleration from m/s^2.
+/// Converts an acceleration in m/s^2 to its raw value.
 pub(crate) fn acceleration_raw(mps2: f64) -> u16 {
     raw(mps2, ACCELERATION_QUANTUM_MPS2, ACCELERATION_OFFSET_MPS2)
 }
 
-/// Raw angle from degrees.
+/// Converts an angle in degrees to its raw value.
 pub(crate) fn slope_raw(deg: f64) -> u32 {
     let raw = headrace_sensor::geometry::math::round_to_i64((deg - ANGLE_OFFSET_DEG) / SLOPE_QUANTUM_DEG);
     u32::try_from(raw.clamp(0, 0xFD_FFFF)).unwrap_or_default()

@@ -1,4 +1,5 @@
-//! Makers' message sets. Values are kept as the wire's integers; constants beside them have their quanta.
+//! Makers' message sets. Values are kept as integer counts, as on the wire. Constants beside them state the
+//! size of one count.
 
 pub mod bosch;
 mod fields;

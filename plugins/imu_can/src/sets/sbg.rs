@@ -7,15 +7,15 @@
 use super::fields::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// Acceleration, m/s^2.
+/// Acceleration of one count, m/s^2.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 1e-2;
-/// Turn rate, rad/s.
+/// Turn rate of one count, rad/s.
 pub const RATE_QUANTUM_RADPS: f64 = 1e-3;
-/// Quaternion component.
+/// Quaternion component of one count.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
-/// Euler angles and their accuracies, radians.
+/// Euler angle, or accuracy of one, of one count, radians.
 pub const EULER_QUANTUM_RAD: f64 = 1e-4;
-/// Temperature, degrees Celsius.
+/// Temperature difference of one count, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1e-2;
 
 /// Status bits of valid specific force: the unit responds, and the accelerometers passed their tests and are within
@@ -42,16 +42,16 @@ impl ImuStatus {
     }
 }
 
-/// One message, in the device's axes.
+/// One message of the SBG set, in the device's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Header of an inertial sample.
     ImuInfo {
         /// Time since power-on, microseconds.
         time_us: u32,
-        /// Status bits.
+        /// Status bits of the unit.
         status: ImuStatus,
-        /// Temperature.
+        /// Temperature of the unit.
         temperature: i16,
     },
     /// Specific force.

@@ -7,22 +7,22 @@
 use super::fields::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// Quaternion component.
+/// Quaternion component of one count.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
-/// Euler angles, degrees.
+/// Euler angle of one count, degrees.
 pub const EULER_QUANTUM_DEG: f64 = 1.0 / 128.0;
-/// Turn rate, rad/s.
+/// Turn rate of one count, rad/s.
 pub const RATE_QUANTUM_RADPS: f64 = 1.0 / 512.0;
-/// Acceleration, m/s^2.
+/// Acceleration of one count, m/s^2.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 1.0 / 256.0;
-/// Magnetic field, in units of the earth's field.
+/// Magnetic field of one count, in units of the earth's field.
 pub const MAGNETIC_QUANTUM: f64 = 1.0 / 1024.0;
-/// Temperature, degrees Celsius.
+/// Temperature difference of one count, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1.0 / 256.0;
-/// Air pressure, Pa.
+/// Air pressure of one count, Pa.
 pub const PRESSURE_QUANTUM_PA: f64 = 1.0 / 32_768.0;
 
-/// Identifiers used by the device.
+/// CAN identifiers used by the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ids {
     /// Base of 29-bit identifiers, whose lowest byte is the code; `None` for the default 11-bit codes.
@@ -51,18 +51,18 @@ pub struct Utc {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatusWord(pub u32);
 
-/// One message.
+/// One message of the Xsens set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
     /// Error code; 1 means that the device dropped messages.
     Error(u8),
     /// Sample timestamp, in ticks of configurable length (100 us by most sources).
     SampleTime(u32),
-    /// Sample number, wrapping.
+    /// Number of the sample, which wraps.
     GroupCounter(u16),
     /// UTC of the sample.
     Utc(Utc),
-    /// Status bits.
+    /// Status bits of the device.
     StatusWord(StatusWord),
     /// Rotation from the sensor to the local earth frame (z up); w x y z.
     Quaternion([i16; 4]),
@@ -80,7 +80,7 @@ pub enum Message {
     FreeAcceleration([i16; 3]),
     /// Magnetic field.
     MagneticField([i16; 3]),
-    /// Temperature.
+    /// Temperature of the device.
     Temperature(i16),
     /// Air pressure inside the housing.
     BaroPressure(u32),

@@ -9,7 +9,7 @@ pub(super) type Payload = Bytes<MAX_FRAME_BYTES>;
 
 /// One or several consecutive fields of fixed length.
 pub(super) trait Field: Sized {
-    /// Length in bytes.
+    /// Length of the fields in bytes.
     const LEN: usize;
 
     /// Reads the fields off the front of `from`; `None` if bytes are missing.

@@ -88,7 +88,8 @@ pub(super) fn judge(front: &[u8]) -> Verdict {
     Verdict::on(front, whole, |frame| Frame::parse(frame).is_some())
 }
 
-/// Message id and payload length from the header, and the part of the payload that is present.
+/// Message id and payload length from the header of an incomplete frame, and the bytes of the payload present
+/// so far.
 pub(super) fn announced(front: &[u8]) -> Option<(u16, usize, &[u8])> {
     let (&[_, _, n0, n1, i0, i1, _, _], rest) = front.split_first_chunk::<HEADER_BYTES>()?;
     let len = usize::from(u16::from_le_bytes([n0, n1]));

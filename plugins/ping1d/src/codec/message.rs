@@ -50,7 +50,7 @@ record! {
 }
 
 record! {
-    /// Legacy status summary.
+    /// Legacy summary of the device's status.
     GeneralInfo {
         /// Firmware version, major.
         firmware_major: u16,
@@ -88,7 +88,7 @@ record! {
         pulse_us: u16,
         /// Number of pings since the device was switched on.
         ping_number: u32,
-        /// Listening range.
+        /// Listening range of the ping.
         scan: ScanRange,
         /// Gain index, 0 to 6.
         gain: u32,
@@ -107,7 +107,7 @@ pub struct Profile {
 /// Length of a profile before its strengths: the distance fields and the count.
 const PROFILE_HEADER: usize = Distance::LEN + u16::LEN;
 
-/// Maximum number of strengths in a payload.
+/// Maximum number of echo strengths in a payload.
 pub const MAX_STRENGTHS: usize = MAX_PAYLOAD_BYTES - PROFILE_HEADER;
 
 /// Text as sent: any bytes, with or without a terminating zero.
@@ -140,12 +140,12 @@ pub enum MessageError {
         /// Length of the payload.
         len: usize,
     },
-    /// The count of strengths doesn't match the payload length.
+    /// The stated number of echo strengths doesn't match the payload length.
     #[error("ping profile: {announced} strengths are announced, but {present} are present")]
     Count {
-        /// Count as stated in the profile.
+        /// Number of echo strengths as stated in the profile.
         announced: u16,
-        /// Count as computed from the payload length.
+        /// Number of echo strengths as computed from the payload length.
         present: usize,
     },
     /// The id may not be sent as an unknown message.
@@ -169,7 +169,7 @@ macro_rules! messages {
             $($(#[$meta])* pub const $constant: u16 = $id;)*
             /// Refusal of a message.
             pub const NACK: u16 = 2;
-            /// Human-readable text.
+            /// Human-readable text from the device.
             pub const ASCII_TEXT: u16 = 3;
             /// Switches the device to its bootloader. Never sent.
             pub const GOTO_BOOTLOADER: u16 = 1100;
@@ -183,12 +183,12 @@ macro_rules! messages {
             $($(#[$meta])* $name($type),)*
             /// Refusal of the message with this id.
             Nack {
-                /// Id of the refused message.
+                /// Id of the message that the device refuses.
                 nacked_id: u16,
-                /// Reason.
+                /// Reason of the refusal, as text.
                 text: Text,
             },
-            /// Human-readable text.
+            /// Human-readable text from the device.
             AsciiText(Text),
             /// A ping with its echo strengths.
             Profile(Profile),
@@ -263,7 +263,7 @@ messages! {
     SetAnyDeviceId(u8) = SET_ANY_DEVICE_ID 100,
     /// Sets the echosounder's device id.
     SetDeviceId(u8) = SET_DEVICE_ID 1000,
-    /// Sets the listening range.
+    /// Sets the listening range of the device.
     SetRange(ScanRange) = SET_RANGE 1001,
     /// Sets the speed of sound, mm/s.
     SetSpeedOfSound(u32) = SET_SPEED_OF_SOUND 1002,
@@ -279,7 +279,7 @@ messages! {
     Voltage5(u16) = VOLTAGE_5 1202,
     /// Speed of sound setting, mm/s.
     SpeedOfSound(u32) = SPEED_OF_SOUND 1203,
-    /// Listening range.
+    /// Listening range of the device.
     Range(ScanRange) = RANGE 1204,
     /// Whether the device chooses range and gain.
     ModeAuto(bool) = MODE_AUTO 1205,
@@ -289,7 +289,7 @@ messages! {
     Gain(u32) = GAIN 1207,
     /// Pulse length, us.
     TransmitDuration(u16) = TRANSMIT_DURATION 1208,
-    /// Legacy status summary.
+    /// Legacy summary of the device's status.
     GeneralInfo(GeneralInfo) = GENERAL_INFO 1210,
     /// Distance and confidence.
     DistanceSimple(DistanceSimple) = DISTANCE_SIMPLE 1211,

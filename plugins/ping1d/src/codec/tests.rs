@@ -169,7 +169,7 @@ fn stray_start_byte_before_a_frame_loses_no_frame() {
 }
 
 #[test]
-fn false_length_loses_only_its_own_frame() {
+fn frame_with_a_false_length_hides_no_other_frame() {
     let good = examples().swap_remove(4).0;
     let mut profile = examples().swap_remove(6).0;
     profile[2] = 0xFF;

@@ -10,7 +10,7 @@ use crate::settings::tests::settings;
 
 const LATENCY: DurNs = DurNs::from_millis(20);
 
-/// A driver, a device and the line between them.
+/// A driver, an emulated echosounder and the simulated line between them.
 struct Rig {
     driver: PingDriver,
     device: PingEmulator,
@@ -18,9 +18,9 @@ struct Rig {
     line: Vec<(MonoNs, Vec<u8>)>,
     sent: Vec<Message>,
     heard: Vec<(MonoNs, Message)>,
-    /// Every n-th message from the host is lost; 0 means that none is lost.
+    /// n, if every n-th message from the host is lost; 0 if none is lost.
     loses: usize,
-    /// Index of a single further message from the host that is lost.
+    /// Index of one message from the host that is lost in addition.
     loses_only: Option<usize>,
 }
 

@@ -6,7 +6,7 @@ use super::*;
 use crate::plugin::PingDecoder;
 use crate::settings::tests::settings;
 
-/// Runs the emulator; returns the send times, and the readings with their times, ms.
+/// Runs the emulator; returns the send times of the messages, and the readings with their times, ms.
 ///
 /// `range_m` returns the distance of the wall at a time in seconds.
 fn run(

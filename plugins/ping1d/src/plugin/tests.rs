@@ -55,7 +55,7 @@ fn zero_confidence_or_distance_gives_no_range() {
 }
 
 #[test]
-fn other_messages_devices_and_undefined_values_give_no_reading() {
+fn other_messages_other_devices_and_undefined_values_give_no_reading() {
     let mut decoder = decoder();
     let nonsense = Distance { confidence_percent: 101, ..PING };
     for message in [Message::Ack(1004), Message::PingInterval(66), Message::Distance(nonsense)] {
@@ -67,7 +67,7 @@ fn other_messages_devices_and_undefined_values_give_no_reading() {
 }
 
 #[test]
-fn datagram_may_hold_a_part_of_a_frame_or_several() {
+fn datagram_may_hold_part_of_a_frame_or_several_frames() {
     let mut decoder = decoder();
     let two = [frame(&Message::Distance(PING)), frame(&Message::Distance(PING))].concat();
     assert_eq!(decode(&mut decoder, 100, &two[..20]), []);
@@ -76,7 +76,7 @@ fn datagram_may_hold_a_part_of_a_frame_or_several() {
 }
 
 #[test]
-fn truncated_frame_delays_nothing_after_a_silence() {
+fn truncated_frame_does_not_delay_frames_after_a_silence() {
     let mut decoder = decoder();
     let longer = Message::Profile(Profile { distance: PING, strengths: Bytes::new(&[9; 200]).unwrap() });
     assert_eq!(decode(&mut decoder, 100, &frame(&longer)[..30]), []);

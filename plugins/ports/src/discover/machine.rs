@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::{Access, access};
 
-/// User whose access rights are checked.
+/// User for whom access to device files is checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum User {
     /// The user running this program. The kernel checks the rights, so access control lists count.
@@ -90,7 +90,8 @@ impl Machine {
         line.split(':').next().map(str::to_owned)
     }
 
-    /// Whether `/etc/group` lists the user in the group. The present session may have begun before that.
+    /// Whether `/etc/group` lists the user in the group. A session that began before the user was added lacks
+    /// the group's rights.
     pub(super) fn is_listed(&self, group: &str) -> bool {
         let listed = || {
             let user = self.name_of("/etc/passwd", self.ids().0)?;

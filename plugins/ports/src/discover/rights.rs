@@ -20,7 +20,8 @@ pub struct Rights {
     pub may_open: bool,
     /// Whether the group has access and isn't root's group.
     by_group: bool,
-    /// Whether the group lists the user, although this session may have begun before that.
+    /// Whether `/etc/group` lists the user in the group. A session that began before the user was added lacks
+    /// the group's rights.
     listed: bool,
 }
 
@@ -52,7 +53,7 @@ impl Rights {
         })
     }
 
-    /// Returns an error if the user can't open the file.
+    /// Returns the open error if the user can't open the device file.
     pub(super) fn trouble(&self, path: &str) -> Option<OpenError> {
         (!self.may_open).then(|| OpenError::denied(path, &self.remedy(path)))
     }

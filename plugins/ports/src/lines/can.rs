@@ -21,7 +21,7 @@ const DATA_AT: usize = 8;
 /// Flag that marks an identifier of 29 bits. Source: Linux, `CAN_EFF_FLAG`.
 const EXTENDED: u32 = 0x8000_0000;
 
-/// Errors that a socket reports once: interface down, and interface removed. Source: Linux, errno.
+/// Errors that a CAN socket reports only once: interface down, and interface removed. Source: Linux, errno.
 ///
 /// A socket receives again when its interface comes up. It never receives again after its interface was removed.
 const ENETDOWN: i32 = 100;

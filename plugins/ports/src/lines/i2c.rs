@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn transaction_returns_written_bytes_then_read_bytes() {
+    fn i2c_transaction_returns_written_bytes_then_read_bytes() {
         let mut line = Bus { bus: Echo(Vec::new()), address: 0x40 };
         let (_, bytes) = line.exchange(&[0xAC], DurNs(0), 5).unwrap().unwrap();
         assert_eq!(bytes, [0xAC; 6]);

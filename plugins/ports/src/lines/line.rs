@@ -11,7 +11,7 @@ use headrace_sensor::driver::IgnoredSenders;
 /// Maximum number of bytes returned by one read.
 pub const READ_BYTES: usize = 2048;
 
-/// Senders on a line that accepts any sender. They are kept when the line is reopened.
+/// Accepted and rejected senders on a line that accepts any sender. They are kept when the line is reopened.
 #[derive(Default)]
 pub struct Senders {
     /// The accepted sender, which is taken to be the device.
@@ -20,10 +20,10 @@ pub struct Senders {
     pub strangers: IgnoredSenders,
 }
 
-/// Whether bytes contain a message of a device on the line.
+/// Function that checks whether bytes contain a message of a device on the line.
 pub type IsValid<'a> = &'a dyn Fn(&[u8]) -> bool;
 
-/// An open line.
+/// An open line to one or several devices.
 pub trait Line: Send {
     /// Waits up to `wait` for bytes. Returns the receive time of the first byte, and the count; `None` on timeout.
     ///
@@ -100,12 +100,13 @@ pub(super) fn exchange_by_datagram(
     Ok(None)
 }
 
-/// Read timeout of a socket. It is set only when it changes, because most waits are as long as the one before.
+/// Read timeout of a socket. The timeout is set only when it changes, because most waits are as long as the
+/// previous one.
 #[derive(Default)]
 pub(super) struct ReadTimeout(Duration);
 
 impl ReadTimeout {
-    /// Sets the timeout of the next read.
+    /// Sets the timeout of the socket's next read.
     pub(super) fn set(
         &mut self,
         wait: Duration,

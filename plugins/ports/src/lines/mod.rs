@@ -20,7 +20,7 @@ use crate::open_error::OpenError;
 pub use line::{IsValid, Line, READ_BYTES, Senders};
 pub(crate) use same_device::same_device;
 
-/// Opens the target of a `connect`.
+/// Opens the port or connection that a `connect` names.
 ///
 /// Errors: the cause, with its fix.
 pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, OpenError> {

@@ -16,7 +16,7 @@ use crate::open_error::OpenError;
 
 /// Bits per byte on the line: a start bit, eight data bits and a stop bit.
 const BITS_A_BYTE: i64 = 10;
-/// Write timeout.
+/// Timeout of a write to the port.
 const WRITE_TIME: Duration = Duration::from_millis(500);
 
 struct Serial {

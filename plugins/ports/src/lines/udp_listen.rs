@@ -17,7 +17,8 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// Maximum number of candidates whose bytes are kept until one is valid. Beyond it the oldest is forgotten.
+/// Maximum number of senders whose bytes are kept until one sends a valid message. Beyond it the oldest is
+/// forgotten.
 const MAX_CANDIDATES: usize = 8;
 
 struct UdpListen {
@@ -30,7 +31,7 @@ struct UdpListen {
     candidates: VecDeque<Candidate>,
 }
 
-/// The sender given by the configuration.
+/// The sender that the key `?from=` of `connect` allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum From {
     Anybody,
@@ -114,7 +115,8 @@ impl UdpListen {
         Some((first, count))
     }
 
-    /// Adds bytes to a candidate. If its bytes are now valid together, returns their receive time and length.
+    /// Adds bytes to those of a possible sender. If they now contain a valid message, returns their receive
+    /// time and length.
     fn hold(
         &mut self,
         received: MonoNs,
@@ -185,7 +187,7 @@ impl Line for UdpListen {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // Commands have no destination before a device is accepted.
+        // Before a sender is accepted, commands have no destination.
         self.peer.map_or(Ok(()), |peer| self.socket.send_to(bytes, peer).map(|_| ()))
     }
 

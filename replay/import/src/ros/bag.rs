@@ -17,11 +17,11 @@ use crate::input::{Input, Source as _};
 use crate::order::Order;
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// Upper bound on the length of a header, bytes.
+/// Upper bound on the length of a record's header, bytes.
 const MOST_HEADER: usize = 1 << 16;
 /// Maximum number of bytes read from the definitions at the end of a bag.
 const MOST_INDEX: u64 = 64 << 20;
-/// Timestamps before this one, in 2001, don't count as UTC.
+/// Timestamps earlier than this time in 2001 don't count as UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
 
 const NO_RECORD: &str = "no bag record";
@@ -34,16 +34,16 @@ pub struct Bag {
     /// Whether the reader has lost the position of the next record.
     astray: bool,
     connections: BTreeMap<u32, Topic>,
-    /// The chunk being read.
+    /// The chunk whose records are being read.
     chunk: Option<Chunk>,
     first_ns: Option<u64>,
-    /// Counts stated in the bag's header.
+    /// Position of the index, and counts, as stated in the bag's header.
     stated: Option<Stated>,
     chunks: u64,
     lost: BTreeMap<&'static str, u64>,
 }
 
-/// Index position and counts stated in the bag's header.
+/// Position of the index, and counts, as stated in the bag's header.
 #[derive(Debug, Clone, Copy)]
 struct Stated {
     index_at: u64,
@@ -51,36 +51,37 @@ struct Stated {
     chunks: u32,
 }
 
-/// An unpacked chunk, the position reached in it, and the step to return at its end.
+/// An unpacked chunk, the position reached in it, and the parsing result to return at its end.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
     step: Step,
 }
 
-/// A record: its fields, its data, and its total length.
+/// A record of the bag: its fields, its data, and its total length.
 struct Record<'a> {
     fields: Fields<'a>,
     data: &'a [u8],
     len: usize,
 }
 
-/// Result of accepting a record.
+/// Result of accepting a record of the bag.
 enum Accepted<'a> {
-    /// The record has been processed.
+    /// The record has been processed completely.
     Read,
-    /// The record is a chunk with this compression.
+    /// The record is a chunk with this compression; its content must be unpacked.
     Chunk(&'a [u8]),
 }
 
-/// Reason why a record can't be read.
+/// Reason why a record of the bag can't be read.
 enum Stop<'a> {
-    /// The record is incomplete. If its fields are complete, they are given with the available part of its data.
+    /// The record is incomplete. If its header fields are complete, they are given with the available part of its
+    /// data.
     More(Option<(Fields<'a>, &'a [u8])>),
     Bad,
 }
 
-/// Fields of a header.
+/// Fields of a record's header.
 #[derive(Clone, Copy)]
 struct Fields<'a>(&'a [u8]);
 
@@ -117,7 +118,7 @@ impl<'a> Fields<'a> {
         Some(u64::from_le_bytes(self.get(name)?.try_into().ok()?))
     }
 
-    /// Reads a time: seconds, then nanoseconds.
+    /// Reads a time field: seconds, then nanoseconds.
     fn time_ns(&self, name: &[u8]) -> Option<u64> {
         let (seconds, nanoseconds) = self.get(name)?.split_at_checked(4)?;
         let number = |bytes: &[u8]| Some(u64::from(u32::from_le_bytes(bytes.try_into().ok()?)));
@@ -129,7 +130,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Splits length-prefixed bytes from the rest.
+/// Splits bytes with a length prefix from the rest.
 fn sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (len, rest) = bytes.split_first_chunk()?;
     rest.split_at_checked(usize::try_from(u32::from_le_bytes(*len)).ok()?)
@@ -305,7 +306,7 @@ impl Bag {
             3 => self.stated = Some(Self::bag_header(fields)?),
             5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
             7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
-            // Index records hold no messages, and unknown kinds may be ignored.
+            // Records of an index hold no messages, and records of unknown kinds may be ignored.
             _ => (),
         }
         Some(Accepted::Read)
@@ -348,7 +349,7 @@ impl Bag {
         Step::Held
     }
 
-    /// Processes the next record of a chunk.
+    /// Processes the next record within a chunk.
     fn read_on(&mut self, mut chunk: Chunk, out: &mut Vec<Entry>) -> Step {
         let rest = chunk.bytes.get(chunk.at..).unwrap_or_default();
         match record(rest) {
@@ -375,12 +376,12 @@ impl Bag {
 /// Maximum unpacked size of a chunk, bytes. Recorders make chunks of less than a megabyte plus one message.
 const MOST_UNPACKED: usize = 64 << 20;
 
-/// Result of unpacking a chunk.
+/// Result of unpacking a chunk of the bag.
 #[derive(Debug, PartialEq, Eq)]
 enum Unpacked {
-    /// The whole chunk.
+    /// The whole chunk was unpacked.
     Whole(Vec<u8>),
-    /// The available part of a chunk that is cut off by the end of the file.
+    /// Only the available part was unpacked, because the end of the file cuts off the chunk.
     Cut(Vec<u8>),
     /// The chunk can't be unpacked, for this reason.
     Bad(&'static str),

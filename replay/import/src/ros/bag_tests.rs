@@ -120,7 +120,7 @@ fn bag_cut_anywhere_delivers_messages_before_the_cut() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_read_as_a_bag_without_a_panic(
+    fn arbitrary_bytes_are_read_as_a_bag_without_a_panic(
         bytes in proptest::collection::vec(any::<u8>(), 0..600),
         at in 0_usize..400,
     ) {
@@ -133,7 +133,7 @@ proptest! {
 }
 
 #[test]
-fn chunks_of_another_length_than_stated_are_refused() {
+fn chunks_whose_unpacked_length_differs_from_the_stated_one_are_refused() {
     assert_eq!(unpack(b"none", b"abc", 3, false), Unpacked::Whole(b"abc".to_vec()));
     assert!(matches!(unpack(b"none", b"abc", 4, false), Unpacked::Bad(_)));
     assert_eq!(unpack(b"none", b"abc", 4, true), Unpacked::Cut(b"abc".to_vec()));

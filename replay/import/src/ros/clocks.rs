@@ -1,38 +1,38 @@
 //! Compares the timestamps in message headers with the times at which the messages were recorded.
 
-/// Lead over the record time above which a timestamp must come from another clock.
+/// Lead of a header's timestamp over the record time, ns, above which the timestamp must come from another clock.
 const AHEAD_NS: i64 = 5_000_000;
-/// Maximum recording delay of messages from a computer with a synchronised clock.
+/// Maximum recording delay of messages from a computer with a synchronised clock, ns.
 const LATE_NS: i64 = 1_000_000_000;
-/// Maximum variation of the recording delay.
+/// Maximum variation of the recording delay, ns. A larger variation means late messages or another clock.
 const VARIES_NS: i64 = 500_000_000;
-/// Offset between clocks above which their epochs differ. Smaller offsets are clock errors.
+/// Offset between two clocks above which their epochs differ, ns. Smaller offsets are clock errors.
 const OTHER_BASE_NS: i64 = 3_600_000_000_000;
-/// Deviation from the present offset above which a new offset begins.
+/// Deviation from the present clock offset above which a new offset begins, ns.
 const ASTRAY_NS: i64 = 10_000_000_000;
 
 /// Choice of the time that applies to a message's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Base {
-    /// The time at which the message was recorded.
+    /// The time at which the message was recorded applies.
     #[default]
     Record,
-    /// The timestamp in the message's header.
+    /// The timestamp in the message's header applies.
     Header,
 }
 
-/// Timestamp statistics of one topic.
+/// Statistics of the header timestamps of one topic.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Clocks {
     base: Base,
     messages: u64,
-    /// Number of messages with a zero timestamp.
+    /// Number of messages whose header has a zero timestamp.
     unstamped: u64,
-    /// Least and greatest difference of record time minus timestamp.
+    /// Least and greatest difference of record time minus header timestamp, ns.
     lag_ns: Option<(i64, i64)>,
     before_ns: u64,
     backwards: u64,
-    /// Offset added to timestamps, if they are used and their epoch differs.
+    /// Offset added to header timestamps, ns, if they are used and their epoch differs.
     moved_ns: Option<i64>,
     anew: u64,
 }
@@ -67,7 +67,7 @@ impl Clocks {
         (stamp_ns.saturating_add_signed(near), true)
     }
 
-    /// Returns the findings for the user, as text.
+    /// Returns the findings about the topic's timestamps for the user, as text.
     pub(super) fn words(&self) -> Vec<String> {
         let mut all = Vec::new();
         if self.messages == 0 {
@@ -122,7 +122,7 @@ impl Clocks {
 
 fn difference(one_ns: u64, other_ns: u64) -> i64 {
     let difference = i128::from(one_ns) - i128::from(other_ns);
-    // Half the range of i64, so that the difference of two values still fits.
+    // Half the range of i64, so that the difference of two clock offsets still fits.
     let most = i128::from(i64::MAX / 2);
     i64::try_from(difference.clamp(-most, most)).unwrap_or_default()
 }
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn agreeing_timestamps_give_no_findings() {
+    fn header_times_that_agree_with_record_times_give_no_findings() {
         let (times, said) = words(Base::Record, &[(1000 * S, 1000 * S - 3), (1001 * S, 1001 * S - 900)]);
         assert_eq!((times, said.as_str()), (vec![1000 * S, 1001 * S], ""));
         assert_eq!(words(Base::Header, &[(1000 * S, 1000 * S - 3)]).0, [1000 * S - 3]);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn clock_offsets_are_reported() {
+    fn clock_offsets_of_message_headers_are_reported() {
         assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
         assert!(
             words(Base::Record, &[(10 * S, 8 * S)])

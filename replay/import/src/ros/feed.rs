@@ -27,7 +27,7 @@ impl Default for Manner {
     }
 }
 
-/// Converter of one topic's messages.
+/// Converter of one topic's messages to a sensor's bytes.
 pub(super) struct Feed {
     of: Type,
     sensor: EmulatedSensor,
@@ -35,15 +35,15 @@ pub(super) struct Feed {
     clocks: Clocks,
     taken: u64,
     frame_id: Option<Vec<u8>>,
-    /// Number of messages with another frame than the first message.
+    /// Number of messages whose coordinate frame differs from the first message's.
     other_frames: u64,
     /// Sum of the specific force along z over all messages, m/s^2.
     upward_mps2: f64,
-    /// Highest pressure so far, Pa.
+    /// Highest pressure in the messages so far, Pa.
     highest_pa: f64,
     /// Number of lost messages, points or ranges, by reason.
     lost: BTreeMap<&'static str, u64>,
-    /// Counts of remarks that aren't losses.
+    /// Number of remarks that aren't losses, by text.
     noted: BTreeMap<&'static str, u64>,
 }
 
@@ -203,7 +203,7 @@ impl Feed {
         if said { Ok(()) } else { Err("with values that the sensor can't encode") }
     }
 
-    /// Adds losses and remarks to the report.
+    /// Adds the topic's losses and remarks to the report.
     pub(super) fn tell(&self, topic: &str, told: &mut ImportReport) {
         let counted = |counts: &BTreeMap<&'static str, u64>| -> Vec<String> {
             counts.iter().map(|(why, count)| format!("{topic}: {count} {}{why}", messages(why))).collect()
@@ -240,7 +240,8 @@ impl Feed {
     }
 }
 
-/// Returns the unit that a reason counts: messages, unless the reason itself begins with another unit.
+/// Returns the unit in which losses of a reason are counted: messages, unless the reason itself begins with another
+/// unit.
 fn messages(why: &str) -> &'static str {
     if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
 }

@@ -8,32 +8,32 @@ use super::wire::Encoding;
 use crate::entry::{Entry, ImportReport};
 use crate::order::WINDOW_NS;
 
-/// A topic of a recording.
+/// A topic of a ROS recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topic {
     /// Name of the topic.
     pub name: String,
-    /// Name of the message type.
+    /// Name of the topic's message type.
     pub type_name: String,
     /// Message type, if it is supported; otherwise the reason why it isn't.
     pub known: Result<Type, String>,
 }
 
-/// Sensors that receive the messages of topics.
+/// The sensors that receive messages, by topic.
 #[derive(Default)]
 pub struct Feeds {
     pub(super) by_topic: BTreeMap<String, Feed>,
-    /// Assignments made without a mapping, as text.
+    /// Assignments of topics to sensors made without a mapping, as text.
     pub(super) matched: Vec<String>,
 }
 
 impl Feeds {
-    /// Returns the assignments made without a mapping, as text.
+    /// Returns the assignments of topics to sensors made without a mapping, as text.
     pub fn matched(&self) -> &[String] {
         &self.matched
     }
 
-    /// Returns how old values may be when their message is recorded, ns.
+    /// Returns the greatest age that values may have when their message is recorded, ns.
     ///
     /// One message may contain the beams of a head's whole turn.
     pub(super) fn reach_ns(&self) -> u64 {
@@ -54,7 +54,7 @@ impl Feeds {
         let feed = self.by_topic.get_mut(&topic.name);
         match feed.filter(|feed| topic.known.as_ref().is_ok_and(|known| feed.is_of(*known))) {
             Some(feed) => feed.take(encoding, record_ns, bytes, out),
-            // This entry is counted as belonging to no sensor.
+            // A message without a feed becomes an empty entry, which counts as belonging to no sensor.
             None => out.push(Entry { stamp_ns: record_ns, stream: String::new(), bytes: Vec::new() }),
         }
     }

@@ -16,27 +16,27 @@ use crate::emulated::EmulatedSensor;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
-    /// The mapping is invalid.
+    /// The mapping of topics to sensors is invalid.
     #[error(transparent)]
     Mapping(#[from] ConfigError),
-    /// Several assignments are possible.
+    /// More than one assignment of topics to sensors is possible.
     #[error(
         "can't tell which {sense} sends which topic: topics {topics}, sensors {sensors}; assign them with --map MAPPING.toml"
     )]
     Several {
         /// The kind of measurement that has several topics or sensors.
         sense: &'static str,
-        /// The topics of this kind.
+        /// The topics with this kind of measurement.
         topics: String,
-        /// The sensors of this kind.
+        /// The sensors with this kind of measurement.
         sensors: String,
     },
-    /// No assignment is possible.
+    /// No assignment of topics to sensors is possible.
     #[error("no topic belongs to a sensor of the vehicle file: topics {topics}; sensors {sensors}")]
     None {
-        /// The topics, each with its type and its problem.
+        /// The topics of the recording, each with its message type.
         topics: String,
-        /// The sensors, each with its kind of measurement.
+        /// The sensors of the vehicle file, each with its kind of measurement.
         sensors: String,
     },
 }
@@ -180,7 +180,7 @@ fn shown<'a>(topics: impl ExactSizeIterator<Item = &'a Topic>) -> String {
     }
     all.join(", ")
 }
-/// Returns a noun with its article, "a" or "an".
+/// Returns a noun with its indefinite article, "a" or "an".
 fn with_article(noun: &str) -> String {
     let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     format!("{article} {noun}")

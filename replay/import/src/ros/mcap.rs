@@ -17,10 +17,10 @@ use crate::order::Order;
 use headrace_replay::log::format::FORMAT_KEY;
 use headrace_replay::log::{ChannelInfo, LogReader};
 
-/// Maximum number of messages per read.
+/// Maximum number of messages read at once.
 const AT_A_TIME: usize = 64;
 
-/// A recording in MCAP.
+/// A ROS recording in MCAP.
 pub struct Mcap<R> {
     name: String,
     reader: LogReader<R>,
@@ -31,7 +31,7 @@ pub struct Mcap<R> {
     first_ns: Option<u64>,
     /// Number of messages that the recording's summary states; `None` if it states none.
     stated: Option<u64>,
-    /// Number of messages read.
+    /// Number of messages read so far.
     read: u64,
     is_at_end: bool,
 }
@@ -43,7 +43,7 @@ impl<R: Read + Seek> Mcap<R> {
     pub fn open(name: &str, mut file: R) -> Result<Self, ImportError> {
         let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
         let bytes = file.seek(std::io::SeekFrom::End(0)).map_err(failed)?;
-        // If this fails, the log reader reports what is unreadable.
+        // If reading the summary fails here, the log reader reports what is unreadable.
         let stated = stated_messages(&mut file, bytes).ok().flatten();
         let reader = LogReader::new(file, name.to_owned())?;
         if reader.header().metadata.contains_key(FORMAT_KEY) {
@@ -159,7 +159,7 @@ const END_BYTES: u64 = HEAD_BYTES + FOOTER_BYTES + 8;
 /// Maximum number of records skipped in a summary. A recording of a day has some thousands of chunks.
 const MOST_RECORDS: usize = 100_000;
 
-/// Returns the number of messages stated in a file of `bytes` bytes.
+/// Returns the number of messages that the summary of an MCAP file states. `bytes` is the file's length.
 ///
 /// Returns `None` without a summary, or without statistics in it.
 ///
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn files_without_statistics_have_no_message_count() {
+    fn mcap_files_without_statistics_state_no_message_count() {
         let endless = [&[0x08][..], &u64::MAX.to_le_bytes(), &[7; 100]].concat();
         for (summary, at) in [(&record(0x08, &[7; 100])[..], 50), (&[], 0), (&endless, 50), (&[], u64::MAX)] {
             assert_eq!(stated(summary, at), None);

@@ -8,32 +8,32 @@ use headrace_sensor::device::Sense;
 use super::points::{Beams, cloud, heard, points, scan};
 use super::wire::{Encoding, Header, Wire};
 
-/// A type of message.
+/// A supported type of message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Type {
-    /// Attitude, turn rate and specific force.
+    /// Message with attitude, turn rate and specific force.
     Imu,
-    /// One distance.
+    /// Message with one distance.
     Range,
-    /// Pressure.
+    /// Message with a pressure.
     FluidPressure,
-    /// Ranges at equally spaced angles about an axis.
+    /// Message with ranges at equally spaced angles about an axis.
     LaserScan,
-    /// Points with named fields.
+    /// Message with points that have named fields.
     PointCloud2,
-    /// Points with x, y and z.
+    /// Message with points that have x, y and z.
     PointCloud,
-    /// Velocity.
+    /// Message with a velocity.
     Twist,
-    /// Velocity with covariance.
+    /// Message with a velocity and its covariance.
     TwistWithCovariance,
-    /// A number.
+    /// Message with a bare number.
     Float32,
-    /// A number of double precision.
+    /// Message with a bare number of double precision.
     Float64,
 }
 
-/// All types, each with its name, and the MD5 of its definition in ROS 1.
+/// All message types, each with its name, and the MD5 of its definition in ROS 1.
 const TYPES: [(Type, &str, &str); 10] = [
     (Type::Imu, "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"),
     (Type::Range, "sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148"),
@@ -76,7 +76,7 @@ impl Type {
         }
     }
 
-    /// Whether the type states what was measured. A bare number may be anything.
+    /// Whether the message type states what was measured. A bare number may be anything.
     pub(super) fn is_telling(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
@@ -85,13 +85,13 @@ impl Type {
 /// Values of a message, in the units and axes of its type.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Values {
-    /// Inertial values. Parts that the sender marks as missing are `None`.
+    /// Values of an inertial unit. Parts that the sender marks as missing are `None`.
     Inertial {
         wxyz: Option<[f64; 4]>,
         rate_radps: Option<[f64; 3]>,
         force_mps2: Option<[f64; 3]>,
     },
-    /// A range; `None` without an echo.
+    /// A range, m; `None` without an echo.
     Range(Option<f64>),
     /// A pressure, or a length of cable, in the mapping's unit, which is SI by default.
     Scalar(f64),
@@ -172,7 +172,7 @@ fn is_minus_one(value: f64) -> bool {
 fn range(wire: &mut Wire<'_>) -> Option<Values> {
     let _radiation = wire.u8()?;
     let [_field_of_view, least, most, range] = wire.singles()?;
-    // Newer definitions append a variance.
+    // Newer definitions of this message append a variance.
     if !wire.is_done() {
         wire.f32()?;
     }

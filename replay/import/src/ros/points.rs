@@ -1,7 +1,7 @@
 //! Converts scans and point clouds of a profiling head to beams: angle, range and time.
 //!
-//! A scan turns about its own z axis, counted from x towards y. This axis is the head's x. The scan's x is the head's
-//! zero angle (down, -z), and the scan's y is the head's y.
+//! The angles of a scan are about its own z axis, from x towards y. This axis is the head's x. The scan's x is the
+//! head's zero angle (down, -z), and the scan's y is the head's y.
 //!
 //! The points of a cloud are in the head's own frame, with the beam in the plane of y and z. With `xy` in the mapping
 //! they are in the frame of a scan.
@@ -10,7 +10,7 @@ use headrace_geometry::math;
 
 use super::wire::Wire;
 
-/// Maximum number of beams in a head's turn.
+/// Maximum number of beams in one turn of a head.
 const MOST_BEAMS: usize = 1 << 16;
 /// Maximum time between a beam and its message's timestamp, s.
 const LONGEST_S: f64 = 120.0;
@@ -27,18 +27,18 @@ pub(super) fn heard(range_m: f64, least_m: f64, most_m: f64) -> Option<f64> {
     (range_m.is_finite() && range_m > 0.0 && within).then_some(range_m)
 }
 
-/// A beam of a head.
+/// A beam of a head, as converted from a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Beam {
     /// Angle of the beam, as in [`headrace_sensor::reading::SonarReturn::angle_rad`].
     pub(super) angle_rad: f64,
-    /// Range; `None` without an echo.
+    /// Range of the beam, m; `None` without an echo.
     pub(super) range_m: Option<f64>,
-    /// Time after the message's timestamp, s.
+    /// Time of the beam after the message's timestamp, s.
     pub(super) after_s: f64,
 }
 
-/// Plane in which a beam rotates.
+/// Plane of a message's axes in which the head's beam rotates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Plane {
     /// Plane of y and z, in the head's own axes.
@@ -50,18 +50,18 @@ pub(super) enum Plane {
 /// Beams of a message, not checked yet.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Beams {
-    /// Beams with their angles.
+    /// Beams whose angles are stated.
     Turned(Vec<Beam>),
-    /// Points, each with its time after the message's timestamp, s.
+    /// Points of a cloud, each with its time after the message's timestamp, s.
     Points(Vec<([f64; 3], f64)>),
 }
 
 /// Valid beams of a message, and counts of the invalid points.
 #[derive(Debug, Default)]
 pub(super) struct Told {
-    /// Beams, sorted by time.
+    /// Valid beams, sorted by time.
     pub(super) beams: Vec<Beam>,
-    /// Number of points outside the beam's plane.
+    /// Number of points that are too far from the plane in which the beam rotates.
     pub(super) off_plane: u64,
     /// Number of points that are NaN or at the origin, which means no echo at an unknown angle.
     pub(super) nowhere: u64,
@@ -143,7 +143,7 @@ pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
     Some(Beams::Points(points))
 }
 
-/// Encoding of a number in a sensor_msgs/PointCloud2.
+/// Encoding of a numerical field in a sensor_msgs/PointCloud2.
 #[derive(Debug, Clone, Copy)]
 enum Number {
     U32,
@@ -151,7 +151,7 @@ enum Number {
     F64,
 }
 
-/// Offset and encoding of a field in a point.
+/// Offset and number encoding of a field within a point of a cloud.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     offset: usize,
@@ -161,11 +161,11 @@ struct Field {
 /// Unit of a point's time, and the time from which it counts.
 #[derive(Debug, Clone, Copy)]
 enum Time {
-    /// Nanoseconds after the message's timestamp.
+    /// The time is in nanoseconds after the message's timestamp.
     After,
-    /// Seconds after the message's timestamp.
+    /// The time is in seconds after the message's timestamp.
     AfterSeconds,
-    /// Seconds on the clock of the message's timestamp.
+    /// The time is in seconds on the clock of the message's timestamp.
     Seconds,
 }
 
@@ -189,7 +189,7 @@ impl Field {
     }
 }
 
-/// Fields of a cloud that the conversion uses.
+/// Fields of a point cloud that the conversion uses.
 #[derive(Debug, Default)]
 struct Layout {
     place: [Option<Field>; 3],

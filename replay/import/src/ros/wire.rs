@@ -3,19 +3,19 @@
 //! Sources: ROS wiki, "Message serialization", for ROS 1: little-endian and packed. OMG DDS-XTypes 1.3, 7.4.3, plain
 //! CDR, for ROS 2: numbers are aligned to their size, counted from the end of four bytes that state the byte order.
 
-/// Serialisation of a recording's messages.
+/// Serialisation of the messages in a ROS recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// Serialisation of ROS 1.
+    /// Serialisation of messages in ROS 1.
     Ros1,
-    /// Serialisation of ROS 2: plain CDR, version 1.
+    /// Serialisation of messages in ROS 2: plain CDR, version 1.
     Cdr,
 }
 
 /// Maximum number of padding bytes after a message's last field.
 const MOST_PADDING: usize = 7;
 
-/// A message, and the position up to which it has been read.
+/// A serialised message, and the position up to which it has been read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wire<'a> {
     bytes: &'a [u8],
@@ -24,7 +24,7 @@ pub(super) struct Wire<'a> {
     big_endian: bool,
 }
 
-/// The header of a stamped message.
+/// The header of a message with a timestamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
     /// Timestamp, nanoseconds on the sender's clock, which may have any epoch.
@@ -42,7 +42,7 @@ macro_rules! numbers {
 }
 
 impl<'a> Wire<'a> {
-    /// Starts at the beginning of a message. Returns `None` if its encapsulation isn't plain CDR.
+    /// Starts at the beginning of a serialised message. Returns `None` if its encapsulation isn't plain CDR.
     pub(super) fn new(message: &'a [u8], encoding: Encoding) -> Option<Self> {
         let (bytes, big_endian) = match (encoding, message) {
             (Encoding::Ros1, bytes) => (bytes, false),
@@ -71,7 +71,8 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// Reads the count of a sequence. Returns `None` if its elements, of at least `element_bytes` each, can't fit.
+    /// Reads the number of elements in a sequence. Returns `None` if its elements, of at least `element_bytes` each,
+    /// can't fit.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);
@@ -83,7 +84,7 @@ impl<'a> Wire<'a> {
         (0..count).map(|_| self.f32()).collect()
     }
 
-    /// Reads length-prefixed bytes.
+    /// Reads bytes with a length prefix.
     pub(super) fn bytes(&mut self) -> Option<&'a [u8]> {
         let count = self.count(1)?;
         self.take(count)
@@ -145,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_counts_are_refused() {
+    fn sequence_counts_beyond_the_message_are_refused() {
         let bytes = [0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 3, 4];
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().single_sequence(), None);
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().text(), None);

@@ -1,4 +1,4 @@
-//! Tests of the formats with constructed and arbitrary bytes.
+//! Tests of the file formats with constructed and arbitrary bytes.
 
 use headrace_config::Document;
 use headrace_devices::KINDS;
@@ -14,7 +14,8 @@ use crate::ping::PingFormat;
 use crate::tlog::TlogFormat;
 use crate::{Entry, Format, Step};
 
-/// Returns the entries, the losses with their reasons, and the number of bytes left at the end.
+/// Splits a file by a format. Returns the entries, the losses with their reasons, and the number of bytes left at the
+/// end.
 fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {
     let (mut entries, mut lost) = (Vec::new(), Vec::new());
     while !file.is_empty() {
@@ -34,7 +35,7 @@ fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'s
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // The last field isn't zero, so that the frame has all 28 bytes: MAVLink drops trailing zeros.
+    // The last field of the test frame isn't zero, so that the frame has all 28 bytes: MAVLink drops trailing zeros.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()
@@ -129,7 +130,8 @@ fn table_values_are_converted_to_wire_units() {
     let (entries, lost, left) = cut(&mut table, b"\"t\"; p\r\n20.5;-1.5005\r\n");
     assert_eq!((entries.len(), lost.len(), left), (1, 0, 0));
     assert_eq!((entries[0].stamp_ns, entries[0].stream.as_str()), (20_500_000, "d"));
-    // SCALED_PRESSURE2 has a header of ten bytes, then the time, then the absolute pressure in hPa.
+    // The MAVLink message SCALED_PRESSURE2 has a header of ten bytes, then the time, then the absolute pressure in
+    // hPa.
     assert_eq!(entries[0].bytes[14..18], 1500.5_f32.to_le_bytes());
     let (entries, lost, left) = cut(&mut table, b"20.5;-1.5005\n20.6;-1");
     assert_eq!((entries.len(), left), (1, 0), "a row that may be cut short is not imported");
@@ -138,7 +140,7 @@ fn table_values_are_converted_to_wire_units() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_split_into_entries_or_lost(
+    fn arbitrary_bytes_are_split_into_entries_or_lost(
         bytes in proptest::collection::vec(any::<u8>(), 0..3000),
         which in 0_usize..3,
         at in 0_usize..400,
@@ -161,7 +163,7 @@ proptest! {
     }
 
     #[test]
-    fn any_table_is_read_to_its_end(
+    fn arbitrary_table_is_read_to_its_end(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(-?[0-9e.]{0,22},[-0-9einaf.]{0,9},[0-9.]{0,3}\n?){0,40}".prop_map(String::into_bytes),

@@ -44,7 +44,8 @@ fn taker(source: u16, stream: &str) -> Taker {
     Taker { source, stream: stream.to_owned(), driver: None }
 }
 
-/// Imports a file. Returns the result, and for each message its source, ms after the beginning and last byte.
+/// Imports a file. Returns the result, and for each message its source, its time in ms after the beginning, and its
+/// last byte.
 fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
     let import = open(file, Box::new(Eights)).unwrap();
     let path = std::env::temp_dir().join(format!(
@@ -69,7 +70,7 @@ fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
 }
 
 #[test]
-fn entries_are_sorted_by_time_and_losses_counted() {
+fn imported_entries_are_sorted_by_time_and_losses_counted() {
     let file = [
         eight(5000, b'E', b'a', 1),
         eight(5020, b'E', b'b', 3),
@@ -131,7 +132,7 @@ fn invalid_candump_line_loses_only_itself() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_read_as_candump_without_a_panic(
+    fn arbitrary_bytes_are_read_as_candump_without_a_panic(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(\\([0-9.]{0,12}\\) can[0-9] [0-9A-F]{0,9}#[0-9A-FR_.]{0,18}\n?){0,40}".prop_map(String::into_bytes),

@@ -1,4 +1,4 @@
-//! Messages that aren't synced yet: written since the last sync, or waiting for a medium that can be written.
+//! Messages that aren't synced yet: written since the last sync, or waiting for a medium that accepts data.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -8,10 +8,10 @@ use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick, VOICE_TOPIC};
 use super::part::Progress;
 use super::writer::{Lane, LogHeader};
 
-/// Maximum memory of the messages, enough for minutes of four heads, bytes.
+/// Maximum memory of the messages, bytes. It is enough for some minutes of a dive with four heads.
 const MAX_BYTES: usize = 16 << 20;
 
-/// Properties of a message, without its bytes.
+/// Properties of an unsynced message, without its bytes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Head {
     pub(super) lane: Lane,
@@ -64,7 +64,7 @@ impl Backlog {
         Some(head)
     }
 
-    /// Returns the memory that the messages take, bytes.
+    /// Returns the memory that the unsynced messages take, bytes.
     pub(super) fn bytes(&self) -> usize {
         self.data.len() + self.heads.len() * size_of::<Head>()
     }
@@ -101,7 +101,7 @@ pub(super) struct Tally {
     messages: u64,
     tick: Option<u64>,
     next: BTreeMap<Lane, u32>,
-    /// Log time of the last message.
+    /// Log time of the recording's last message.
     pub(super) last: Option<MonoNs>,
 }
 
@@ -114,7 +114,7 @@ impl Tally {
         self.last = Some(head.log_time);
     }
 
-    /// Returns the totals as stated in a part.
+    /// Returns the totals in the form in which a part's metadata contain them.
     pub(super) fn progress(&self, header: &LogHeader) -> Progress {
         let source = |prefix: &str, number: u16| {
             header.sources.get(usize::from(number)).map(|source| format!("{prefix}{}", source.id))

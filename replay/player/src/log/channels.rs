@@ -13,7 +13,7 @@ use super::writer::SourceInfo;
 /// Rank of the first channel that isn't raw. Source numbers are u16, so raw channels rank lower.
 const OTHER_RANK: u32 = 1 << 16;
 
-/// Content of a channel.
+/// Kind of content that a channel of a log has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ChannelKind {
     Raw(u16),
@@ -24,7 +24,7 @@ pub(super) enum ChannelKind {
     Other,
 }
 
-/// A known channel.
+/// A channel whose definition was found in the log.
 #[derive(Debug, Clone)]
 pub(super) struct Channel {
     pub(super) definition: Definition,
@@ -36,33 +36,33 @@ pub(super) struct Channel {
 /// Result of adding a channel's definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Admission {
-    /// The channel was added, or was known before.
+    /// The channel was added, or was known before with the same definition.
     Known,
     /// The definition contradicts a known channel.
     Conflict,
-    /// The channel would exceed a limit.
+    /// The channel would exceed a limit on the log's content.
     Beyond(Many),
 }
 
-/// All channels known so far.
+/// All channels of a log that are known so far.
 #[derive(Debug, Default)]
 pub(super) struct Channels {
     by_id: BTreeMap<u16, Channel>,
     sources: Vec<SourceInfo>,
     others: u32,
-    /// Memory used by the definitions.
+    /// Memory used by the channels' definitions.
     budget: HeaderBudget,
-    /// Limit that the initial definitions exceeded, if any.
+    /// Limit that the definitions known at opening exceeded, if any.
     refused: Option<Many>,
-    /// Definitions found among the messages, in order of appearance.
+    /// Channel definitions found among the messages, in order of appearance.
     later: Vec<Definition>,
 }
 
 impl Channels {
     /// Creates the channels, and numbers their sources.
     ///
-    /// The numbers come from the channels' metadata if these number all sources from 0, and otherwise from the order
-    /// of names.
+    /// The numbers are those in the channels' metadata, if every source has one and they count from 0. Otherwise the
+    /// sources are numbered in the order of their names.
     pub(super) fn new(definitions: BTreeMap<u16, Definition>, budget: HeaderBudget) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
         let numbers: BTreeMap<&str, Option<u16>> =
@@ -103,7 +103,7 @@ impl Channels {
         admission
     }
 
-    /// Returns the definitions found among the messages so far.
+    /// Returns the channel definitions found among the messages so far.
     pub(super) fn later(&self) -> &[Definition] {
         &self.later
     }
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_defined_after_a_position_are_forgotten_on_going_back() {
+    fn channels_defined_after_a_position_are_forgotten_on_return_to_it() {
         let mut channels = channels(&[("/raw/a", None)]);
         let first = channels.get(0).unwrap().definition.clone();
         for (id, topic) in [(7, "/raw/b"), (5, "/imu"), (9, "/sent/c")] {

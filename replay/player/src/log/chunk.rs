@@ -1,4 +1,4 @@
-//! Unpacks chunks, and verifies the checksums of larger parts of a file, with the `mcap` crate's reader.
+//! Uses the `mcap` crate's reader to unpack chunks, and to verify the checksums of larger parts of a file.
 //!
 //! The decompressor of zstd works like that crate's, but limits the window, which a frame may otherwise set to 128 MiB.
 //! Formats of zstd before 0.8 have windows of another kind, and aren't supported.
@@ -16,15 +16,15 @@ use super::framing::{ChunkPlace, LogFile};
 use super::limits::{MAX_UNPACKED_BYTES, MAX_WINDOW_LOG, RECORD_COST};
 use super::loss::LossKind;
 
-/// Read size, bytes.
+/// Number of bytes read from the file at once.
 const READ_BYTES: usize = 1 << 20;
 
 /// Result of unpacking a chunk.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Unpacked {
-    /// The whole chunk is valid.
+    /// The whole chunk is valid and unpacked.
     Whole,
-    /// The file ends within the chunk. The records before the end parse, but no checksum covers them.
+    /// The file ends within the chunk. The records before the end can be parsed, but no checksum covers them.
     Cut,
     /// The chunk is damaged, and none of its records can be trusted.
     Bad(LossKind),
@@ -43,7 +43,7 @@ pub(super) fn unpack<R: Read + Seek>(
     }
     let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
     if let Err(error) = reader.add_decompressor(Unzstd::default()) {
-        // This can't happen, because the decompressor has a name.
+        // The only possible error is a decompressor without a name, and this one has a name.
         tracing::error!(%error, "chunks packed by zstd can't be read");
     }
     // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum would then
@@ -89,7 +89,7 @@ pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Resul
     Ok(!matches!(result, Err(McapError::BadDataCrc { .. })))
 }
 
-/// Whether the summary parses and matches its checksum, if it has one. It begins after the data end record at
+/// Whether the summary can be parsed and matches its checksum, if it has one. It begins after the data end record at
 /// `data_end`.
 pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64) -> Result<bool, LogError> {
     let reader =
@@ -153,7 +153,7 @@ const SKIPPABLE: u32 = 0x184D_2A50;
 /// Decompressor of zstd for frames with windows of up to 2^[`MAX_WINDOW_LOG`] bytes.
 #[derive(Default)]
 struct Unzstd {
-    /// Decompression context, created on first use.
+    /// Decompression context of zstd, created on first use.
     context: Option<DCtx<'static>>,
     /// Number of bytes that zstd suggests to read next; 0 before a frame.
     need: usize,

@@ -1,4 +1,4 @@
-//! Computes digests of log files.
+//! Computes SHA-256 digests of log files.
 
 use std::io::Read;
 use std::path::Path;

@@ -21,11 +21,11 @@ use super::writer::SourceInfo;
 /// A file of a dive's log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartFile {
-    /// Path of the file.
+    /// Path of the log file.
     pub path: PathBuf,
     /// Number of source messages read from the file so far.
     pub messages: u64,
-    /// Part number, if the recording has parts.
+    /// Part number of the file, if the recording has parts.
     number: Option<u32>,
 }
 
@@ -35,7 +35,7 @@ type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError> + Send>;
 /// A position in a dive's log, to continue reading from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DivePlace {
-    /// Index of the file.
+    /// Index of the file in the dive's list of files.
     at: usize,
     place: LogPlace,
     /// Number of source messages read from each file.
@@ -45,7 +45,7 @@ pub struct DivePlace {
     delivered: u64,
 }
 
-/// Reads a dive's log.
+/// Reads a dive's log from one or several files.
 pub struct DiveLog<R = File> {
     open: Open<R>,
     files: Vec<PartFile>,
@@ -57,7 +57,7 @@ pub struct DiveLog<R = File> {
     /// For each source of the file being read, its source number in the dive.
     numbers: Vec<u16>,
     topics: Vec<String>,
-    /// Losses between files.
+    /// Losses before, between and after the files, such as missing parts.
     between: Vec<Loss>,
     /// Losses of the files already read.
     earlier: Vec<Loss>,
@@ -125,7 +125,7 @@ impl DiveLog<File> {
 }
 
 impl<R: Read + Seek> DiveLog<R> {
-    /// Creates a dive log from a single reader.
+    /// Creates a dive log with a single file, from its reader.
     pub fn of(reader: LogReader<R>) -> Self {
         let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
         // A single log has no further file, so this is never called.
@@ -165,7 +165,7 @@ impl<R: Read + Seek> DiveLog<R> {
         &self.info
     }
 
-    /// Returns the topics of results read so far.
+    /// Returns the topics of the result channels known so far.
     pub(crate) fn result_topics(&self) -> Vec<String> {
         self.channels_found().0
     }
@@ -191,7 +191,7 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(())
     }
 
-    /// Returns the files, in reading order.
+    /// Returns the files of the dive's log, in reading order.
     pub fn files(&self) -> &[PartFile] {
         &self.files
     }
@@ -219,7 +219,8 @@ impl<R: Read + Seek> DiveLog<R> {
         !(self.between.is_empty() && self.earlier.is_empty() && self.reader.losses().is_empty())
     }
 
-    /// Returns how many messages were delivered after a message with a later log time, in a log without ticks.
+    /// Returns the number of messages delivered out of order: after a message with a later log time. It is 0 for a log
+    /// with ticks.
     pub fn late(&self) -> u64 {
         self.late + self.reader.late()
     }
@@ -274,7 +275,7 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(Some(message))
     }
 
-    /// Returns the current position.
+    /// Returns the current reading position.
     pub fn place(&self) -> DivePlace {
         DivePlace {
             at: self.at,
@@ -305,7 +306,7 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(())
     }
 
-    /// Moves to the next file.
+    /// Moves on to the next file of the dive's log.
     fn go_on(&mut self) -> Result<(), LogError> {
         let read: Vec<Loss> = self.reader.losses().iter().filter_map(|loss| self.in_part(loss)).collect();
         self.earlier.extend(read);
@@ -371,7 +372,7 @@ impl Glance {
     }
 }
 
-/// Parts in order, and the losses of unreadable parts.
+/// Parts of a recording in order, and the losses of unreadable parts.
 struct Arranged {
     parts: Vec<(PathBuf, Glance)>,
     losses: Vec<Loss>,
@@ -427,7 +428,7 @@ fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Returns losses before, between and after the parts.
+/// Returns losses before, between and after the parts of a recording.
 fn between(parts: &[Glance]) -> Vec<Loss> {
     let mut losses = Vec::new();
     let from = |glance: &Glance| glance.times.map(|times| times.1);

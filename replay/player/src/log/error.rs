@@ -7,28 +7,28 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// The file could not be created.
+    /// The log file could not be created.
     #[error("could not create {}: {source}", path.display())]
     Create {
-        /// Path of the file.
+        /// Path of the log file.
         path: PathBuf,
         /// Error of the system.
         source: io::Error,
     },
-    /// The file could not be opened.
+    /// The log file could not be opened.
     #[error("could not open {}: {source}", path.display())]
     Open {
-        /// Path of the file.
+        /// Path of the log file.
         path: PathBuf,
         /// Error of the system.
         source: io::Error,
     },
-    /// Reading fails with an I/O error.
+    /// Reading the log fails with an I/O error.
     #[error("could not read {name} at byte {offset}: {source}")]
     Read {
         /// Name of the log, given by the caller.
         name: String,
-        /// Offset, bytes.
+        /// Offset in the log at which reading failed, bytes.
         offset: u64,
         /// Error of the system.
         source: io::Error,
@@ -46,17 +46,17 @@ pub enum LogError {
     Encode {
         /// Item that was being written.
         what: &'static str,
-        /// Reason, as text.
+        /// Reason why MCAP can't represent the item, as text.
         source: mcap::McapError,
     },
     /// The file isn't an MCAP file.
     #[error("{name} is not an MCAP file: it begins with [{found}]; expected [{wanted}]")]
     NotMcap {
-        /// Name of the log, given by the caller.
+        /// Name of the file, given by the caller.
         name: String,
-        /// First bytes of the file, in hex.
+        /// First bytes of the file that isn't MCAP, in hex.
         found: String,
-        /// First bytes of an MCAP file, in hex.
+        /// First bytes that an MCAP file must have, in hex.
         wanted: String,
     },
     /// The log was written by a later version of this program.
@@ -64,15 +64,15 @@ pub enum LogError {
     TooNew {
         /// Name of the log, given by the caller.
         name: String,
-        /// Format version of the log.
+        /// Format version that the log states.
         found: String,
-        /// Latest format version supported here.
+        /// Latest format version that this program can read.
         known: u32,
     },
     /// The folder contains no log.
     #[error("{} holds no log: nothing in it ends in .mcap", folder.display())]
     NoLogs {
-        /// Path of the folder.
+        /// Path of the folder without a log.
         folder: PathBuf,
     },
     /// There are several logs, and one of them isn't part of a recording.
@@ -81,7 +81,7 @@ pub enum LogError {
         path.display()
     )]
     NotAPart {
-        /// Path of that log.
+        /// Path of the log that isn't part of a recording.
         path: PathBuf,
     },
     /// The files are parts of different recordings.
@@ -90,35 +90,35 @@ pub enum LogError {
         one.display(), other.display()
     )]
     OtherDive {
-        /// A part of one recording.
+        /// Path of a part of one recording.
         one: PathBuf,
-        /// Identifier of that recording.
+        /// Identifier of the recording that `one` belongs to.
         one_dive: String,
-        /// A part of another recording.
+        /// Path of a part of another recording.
         other: PathBuf,
-        /// Identifier of that recording.
+        /// Identifier of the recording that `other` belongs to.
         other_dive: String,
     },
     /// Two files have the same part number.
     #[error("{} and {} are both part {number} of the recording; name one of them", one.display(), other.display())]
     PartTwice {
-        /// The part number.
+        /// Part number that both files have.
         number: u32,
-        /// One of the files.
+        /// Path of one of the files.
         one: PathBuf,
-        /// The other file.
+        /// Path of the other file.
         other: PathBuf,
     },
     /// The topic of a result doesn't begin with the result prefix.
     #[error("topic {topic:?} of a result must begin with {:?}", super::format::RESULT_PREFIX)]
     Topic {
-        /// The topic.
+        /// Topic of the result.
         topic: String,
     },
     /// The header declares no channel for a message.
     #[error("a message for {channel}, which the log's header does not announce")]
     NoChannel {
-        /// Kind and number of the channel.
+        /// Kind and number of the undeclared channel.
         channel: String,
     },
     /// A tick has more packets than a tick message can count.
@@ -133,12 +133,12 @@ pub enum LogError {
         /// Error of the system.
         source: io::Error,
     },
-    /// The medium neither accepts data nor fails.
+    /// At the end of a recording, the medium neither accepts data nor fails.
     #[error(
         "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; how much of the log is on it isn't known"
     )]
     Stuck {
-        /// Time that was waited, s.
+        /// Time that the program has waited for the medium, s.
         waited_s: u64,
     },
     /// The recorder's thread has panicked, which is a bug.

@@ -10,11 +10,11 @@ const MAX_FAULTS: usize = 100;
 /// A fault after which a part of a recording could no longer be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordingFault {
-    /// Path of the part.
+    /// Path of the part that could no longer be written.
     pub path: PathBuf,
-    /// The failed action, and the error of the system.
+    /// The failed action, and the operating system's error.
     pub error: String,
-    /// Number of messages that no part contains.
+    /// Number of messages that were lost, because no part contains them.
     pub lost: u64,
     /// Log time of the last synced message before the fault, if any.
     pub from: Option<MonoNs>,
@@ -52,25 +52,25 @@ pub enum RecordingEvent {
     /// A part can't be written any more. Nothing is recorded until another part has been begun, which is tried
     /// repeatedly.
     Failed {
-        /// Path of the part.
+        /// Path of the part that can't be written.
         path: PathBuf,
-        /// The failed action, and the error of the system.
+        /// The failed action, and the operating system's error.
         error: String,
     },
-    /// The recording continues.
+    /// The recording continues in another part after a fault.
     Resumed(RecordingFault),
-    /// The medium doesn't accept data, without an error. The queue is full, so new data isn't recorded.
+    /// The medium accepts no data, but reports no error. The queue is full, so new data isn't recorded.
     Behind,
-    /// The medium accepts data again.
+    /// The medium, which blocked the recording, accepts data again.
     CaughtUp {
-        /// Number of packets that were not recorded.
+        /// Number of packets that were not recorded in the meantime.
         packets: u64,
     },
     /// The medium is slow. A power cut would lose the last seconds.
     Late {
         /// Path of the recording.
         path: PathBuf,
-        /// Dive time that isn't on the medium yet.
+        /// Amount of dive time that isn't on the medium yet.
         by: DurNs,
     },
     /// The medium is no longer slow.
@@ -86,7 +86,7 @@ impl RecordingEvent {
         matches!(self, Self::Failed { .. } | Self::Behind | Self::Late { .. })
     }
 
-    /// Returns the event as text.
+    /// Returns the event as text for display.
     pub fn words(&self) -> String {
         match self {
             Self::Failed { path, error } => {
@@ -109,7 +109,7 @@ impl RecordingEvent {
     }
 }
 
-/// Adds a fault to a bounded list.
+/// Adds a fault to a list of limited length.
 pub(super) fn add(faults: &mut Vec<RecordingFault>, fault: RecordingFault) {
     if faults.len() < MAX_FAULTS {
         faults.push(fault);

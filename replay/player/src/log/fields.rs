@@ -19,12 +19,12 @@ impl<'a> Fields<'a> {
         Self { rest: bytes, taken: 0 }
     }
 
-    /// Returns the number of bytes read so far.
+    /// Returns the number of bytes of the record read so far.
     pub(super) fn taken(&self) -> u64 {
         self.taken
     }
 
-    /// Returns the unread bytes.
+    /// Returns the unread bytes of the record.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_beyond_the_record_are_none() {
+    fn fields_beyond_the_end_of_a_record_are_none() {
         assert_eq!(Fields::new(&[5, 0, 0, 0, b'a']).text(), None);
         assert_eq!(Fields::new(&[0xFF; 12]).map(), None);
         assert_eq!(Fields::new(&[1, 0, 0, 0, 0xFF]).text(), None);

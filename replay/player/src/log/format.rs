@@ -27,13 +27,13 @@ pub const LIBRARY: &str = "headrace ";
 pub const RAW_PREFIX: &str = "/raw/";
 /// Topic prefix for bytes sent to a source; its id follows.
 pub const SENT_PREFIX: &str = "/sent/";
-/// Topic prefix of results.
+/// Topic prefix of the channels with the loop's results.
 pub const RESULT_PREFIX: &str = "/result/";
 /// Topic prefix of results for viewers.
 pub const VIEW_PREFIX: &str = "/result/view/";
-/// Topic of the channel of voice recordings.
+/// Topic of the channel with recordings of voice notes.
 pub const VOICE_TOPIC: &str = "/notes/voice";
-/// Topic of the channel of ticks.
+/// Topic of the channel with the loop's ticks.
 pub const TICK_TOPIC: &str = "/loop/tick";
 /// Message encoding of raw, sent, tick and voice channels.
 pub const BYTES_ENCODING: &str = "application/octet-stream";
@@ -49,7 +49,7 @@ pub const CHANNEL_LIST: &str = "headrace.channels";
 /// The key is `<number>`, the value is `<from> <to> <words>`, with log times in ns, or `-` without a time. A recorder
 /// writes them when the disk is full or after a fault, and `headrace recover` writes them too.
 pub const LOSSES: &str = "headrace.losses";
-/// Prefix of attachment names in [`CHANNEL_LIST`].
+/// Prefix of the keys in [`CHANNEL_LIST`] that contain attachment names.
 pub const ATTACHMENT_PREFIX: &str = "attachment/";
 /// Key of [`FORMAT_VERSION`] in [`METADATA`].
 pub const FORMAT_KEY: &str = "format";
@@ -74,9 +74,9 @@ pub const TICK_HEAD_BYTES: usize = 20;
 /// source are consumed in the order of their sequence numbers, so the list identifies every packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tick<'a> {
-    /// Number of the tick, from 0.
+    /// Number of the tick in the dive, from 0.
     pub index: u64,
-    /// Time of the tick.
+    /// Time at the end of the tick.
     pub now: MonoNs,
     order: &'a [u8],
 }
@@ -89,7 +89,7 @@ pub struct Tick<'a> {
 pub struct TickError {
     /// Packet count stated in the message; 0 if the message is too short to state one.
     pub packets: u32,
-    /// Length of the message, bytes.
+    /// Length of the malformed message, bytes.
     pub len: usize,
 }
 
@@ -134,7 +134,7 @@ pub(super) fn stated_loss(from: Option<MonoNs>, to: Option<MonoNs>, words: &str)
     format!("{} {} {words}", time(from), time(to))
 }
 
-/// Parses the text of [`stated_loss`] into from, to and words.
+/// Parses the text of [`stated_loss`] into start time, end time and words.
 pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
     let mut parts = text.splitn(3, ' ');
     let mut time = || parts.next().and_then(|time| time.parse().ok()).map(MonoNs);
@@ -177,10 +177,10 @@ pub(super) fn hex(bytes: &[u8]) -> String {
 
 /// Names of the streams of results, in the order of [`headrace_monitor::view::DiveView::streams`].
 pub(crate) const STREAMS: [&str; 6] = ["poses", "pings", "judgements", "advice", "states", "alerts"];
-/// Number of words in a message before its records.
+/// Number of u64 words in a result message before its records.
 pub(crate) const HEAD_WORDS: usize = 2;
 
-/// Returns the index of the stream with this topic.
+/// Returns the index of the result stream with this topic.
 pub(crate) fn stream_of(topic: &str) -> Option<usize> {
     let name = topic.strip_prefix(RESULT_PREFIX)?;
     STREAMS.iter().position(|stream| *stream == name)
@@ -249,7 +249,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_decode_to_a_tick_or_an_error(bytes: Vec<u8>) {
+        fn arbitrary_bytes_decode_to_a_tick_or_an_error(bytes: Vec<u8>) {
             if let Ok(tick) = Tick::decode(&bytes) {
                 prop_assert_eq!(TICK_HEAD_BYTES + 2 * tick.order().len(), bytes.len());
             }

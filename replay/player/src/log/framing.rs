@@ -22,9 +22,9 @@ use super::medium::Medium;
 
 /// Maximum plausible length of a record that is neither a chunk nor an attachment. A greater length counts as damage.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
-/// Length of opcode and length field, bytes.
+/// Length of a record's opcode and length field, bytes.
 const RECORD_HEAD_BYTES: usize = 9;
-/// Maximum number of bytes read to identify a record. They hold fields of fixed length, and names.
+/// Maximum number of bytes read to identify a record. Fields of fixed length and names fit into them.
 const GLANCE_BYTES: usize = 1024;
 /// Length of a chunk record before its data, without the name of the compression, bytes.
 const CHUNK_HEAD_BYTES: u64 = 40;
@@ -47,7 +47,7 @@ impl<R: Read + Seek> LogFile<R> {
         self.medium().len()
     }
 
-    /// Returns the medium of the file.
+    /// Returns the medium that the file is on.
     pub(super) fn medium(&self) -> &Medium<R> {
         self.input.get_ref()
     }
@@ -89,7 +89,7 @@ impl<R: Read + Seek> LogFile<R> {
     }
 }
 
-/// Definition of a channel.
+/// Definition of a channel in an MCAP file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Definition {
     pub(super) id: u16,
@@ -99,7 +99,7 @@ pub(super) struct Definition {
     pub(super) form: Option<(u16, String)>,
 }
 
-/// Compares the fields that the log's list of channels contains, so without `form`.
+/// Compares only the fields that the log's list of channels contains. `form` isn't among them.
 impl PartialEq for Definition {
     fn eq(&self, other: &Self) -> bool {
         (self.id, &self.topic, &self.metadata) == (other.id, &other.topic, &other.metadata)
@@ -116,7 +116,7 @@ impl Definition {
         Some(Self { id, topic: topic.to_owned(), metadata: fields.map()?, form })
     }
 
-    /// Returns the memory of the definition, see [`map_cost`].
+    /// Returns the memory that the channel's definition takes, see [`map_cost`].
     pub(super) fn cost(&self) -> u64 {
         let form = self.form.as_ref().map_or(0, |(_, encoding)| encoding.len());
         let texts = self.metadata.iter().map(|(key, value)| key.len() + value.len());
@@ -125,7 +125,7 @@ impl Definition {
     }
 }
 
-/// Parses the number and name of a schema.
+/// Parses the number and name of a schema from its record.
 pub(super) fn schema(fields: &mut Fields<'_>) -> Option<(u16, String)> {
     Some((fields.u16()?, fields.text()?.to_owned()))
 }
@@ -146,11 +146,11 @@ pub(super) struct ChunkPlace {
     pub(super) doubtful: bool,
 }
 
-/// An attachment: its name and lengths.
+/// An attachment of the log: its name and lengths.
 #[derive(Debug, Clone)]
 pub(super) struct AttachmentPlace {
     pub(super) name: String,
-    /// Length of the record before the data, bytes.
+    /// Length of the attachment's record before the data, bytes.
     pub(super) head_len: u64,
     pub(super) data_len: u64,
 }
@@ -183,7 +183,7 @@ pub(super) enum Item {
     Other,
 }
 
-/// A record and its position.
+/// A record and its position in the file.
 #[derive(Debug, Clone)]
 pub(super) struct Frame {
     pub(super) at: u64,
@@ -194,22 +194,22 @@ pub(super) struct Frame {
     pub(super) confirmed: bool,
 }
 
-/// Content found at a position.
+/// Content found at a position of a log file.
 #[derive(Debug)]
 pub(super) enum Found {
-    /// A record that lies within the file.
+    /// A record that lies completely within the file.
     Record(Frame),
     /// A record that the end of the file cuts off, or a record with a wrong length.
     Cut(Frame),
-    /// The closing magic bytes.
+    /// The magic bytes that close an MCAP file.
     Closing,
     /// The end of the file.
     End,
-    /// No record starts here.
+    /// No record starts at this position.
     Nothing,
 }
 
-/// Identifies the content at `at`.
+/// Identifies the content of the file at position `at`.
 pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Found, LogError> {
     let mut head = [0; RECORD_HEAD_BYTES];
     let got = file.read_at(at, &mut head)?;
@@ -257,7 +257,8 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
 
 /// Identifies a record by its content, for a record whose opcode is damaged.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
-    // A message may contain any bytes. But bytes that parse as a chunk with matching lengths are no coincidence.
+    // A message may contain any bytes. But bytes that can be parsed as a chunk with matching lengths are no
+    // coincidence.
     let kinds: &[u8] =
         if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
     kinds
@@ -298,8 +299,8 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
 
 /// Identifies a chunk, which implies its length twice.
 ///
-/// If the two lengths differ, the length that another record follows is right. If both are the largest u64, the
-/// writer never closed the chunk.
+/// If the two lengths differ, the right length is the one after which another record begins. If both are the largest
+/// u64, the writer never closed the chunk.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,
@@ -336,7 +337,8 @@ fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool
     Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
 }
 
-/// Parses the fields that are needed of a record. Also returns the minimum record length that they imply.
+/// Parses those fields of a record that framing and scanning need. Also returns the minimum record length that they
+/// imply.
 fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {
@@ -410,7 +412,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     Some((item, fields.taken()))
 }
 
-/// Returns the item, and the record length that a list at the end of the record implies.
+/// Reads the length of the list that ends a record. Returns the item, and the record length that the list implies.
 fn with_list(mut fields: Fields<'_>, item: Item) -> Option<(Item, u64)> {
     let len = fields.u32()?;
     Some((item, fields.taken() + u64::from(len)))

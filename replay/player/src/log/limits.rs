@@ -24,12 +24,12 @@ pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
 const UNPACKED_ANYWAY: u64 = 64 << 20;
 /// Maximum window of a chunk packed by zstd, as a power of two: 16 MiB. Levels up to 19 use less.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
-/// Maximum memory of overlapping pieces that are being merged, bytes. One more piece may exceed it.
+/// Memory limit for overlapping pieces being merged, bytes. At most one piece may exceed the limit.
 pub(super) const MAX_HELD_BYTES: usize = 32 << 20;
 /// Maximum number of pieces, which are chunks and runs of messages outside chunks. Three days of half-second chunks
 /// fit.
 pub(super) const MAX_PIECES: usize = 1 << 19;
-/// Maximum number of channels.
+/// Maximum number of channels in a log.
 pub(super) const MAX_CHANNELS: usize = 4096;
 /// Maximum number of sources, which are the names after `/raw/` and `/sent/`.
 pub(super) const MAX_SOURCES: usize = 1024;
@@ -37,7 +37,7 @@ pub(super) const MAX_SOURCES: usize = 1024;
 pub(super) const MAX_HEADER_BYTES: u64 = 8 << 20;
 /// Memory of a map entry in addition to its bytes, bytes.
 const ENTRY_COST: u64 = 128;
-/// Maximum total length of all attachments, bytes.
+/// Maximum total length of all attachments of a log, bytes.
 pub(super) const MAX_ATTACHMENT_BYTES: u64 = 16 << 20;
 /// Maximum length of a text from the log that a loss quotes, bytes.
 const MAX_QUOTED_BYTES: usize = 100;
@@ -52,12 +52,12 @@ pub(super) fn map_cost(entries: u64, bytes: u64) -> u64 {
     entries.saturating_mul(ENTRY_COST).saturating_add(bytes)
 }
 
-/// Bytes in use out of [`MAX_HEADER_BYTES`].
+/// Memory in use by definitions and metadata, bytes, at most [`MAX_HEADER_BYTES`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct HeaderBudget(u64);
 
 impl HeaderBudget {
-    /// Reserves memory. Returns `false`, and reserves nothing, if there isn't enough.
+    /// Reserves memory for definitions or metadata. Returns `false`, and reserves nothing, if there isn't enough.
     pub(super) fn take(&mut self, cost: u64) -> bool {
         let used = self.0.saturating_add(cost);
         let fits = used <= MAX_HEADER_BYTES;
@@ -67,13 +67,13 @@ impl HeaderBudget {
         fits
     }
 
-    /// Releases reserved memory.
+    /// Releases memory reserved for definitions or metadata.
     pub(super) fn give_back(&mut self, cost: u64) {
         self.0 = self.0.saturating_sub(cost);
     }
 }
 
-/// Returns a text of the log for a quotation in a loss, shortened if too long.
+/// Returns a text from the log in the form in which a loss quotes it: shortened if it is too long.
 pub(super) fn quoted(text: &str) -> String {
     if text.len() <= MAX_QUOTED_BYTES {
         return text.to_owned();

@@ -10,7 +10,7 @@ use super::limits::LATEST;
 /// Maximum number of losses in the list. Later losses extend the last entry.
 const MAX_LOSSES: usize = 1000;
 
-/// Kind of damage.
+/// Kind of damage to a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum LossKind {
@@ -24,33 +24,33 @@ pub enum LossKind {
     Contents,
     /// A chunk, or messages outside chunks, that the medium fails to read; with the medium's error.
     Unreadable(String),
-    /// A chunk with an unsupported compression.
+    /// A chunk with a compression that this program doesn't support.
     Compression(String),
     /// A chunk or attachment that exceeds the limit for reading into memory.
     TooLarge {
-        /// Limit, bytes.
+        /// Maximum length of a chunk or attachment, bytes.
         limit: u64,
     },
     /// Chunks that would unpack to many times the length of the log. None of their messages is delivered.
     Swells {
-        /// Limit, as a multiple of the log's length up to the chunk.
+        /// Maximum unpacked length, as a multiple of the log's length up to the chunk.
         limit: u64,
     },
     /// A chunk that would take more memory to unpack than allowed.
     Window {
-        /// Limit, bytes.
+        /// Maximum memory for unpacking a chunk, bytes.
         limit: u64,
     },
-    /// There are more items of a kind than allowed.
+    /// The log has more items of a kind, such as channels, than allowed.
     Beyond {
-        /// Kind of item.
+        /// Kind of item that exceeds its limit.
         what: Many,
-        /// Limit.
+        /// Maximum number of items of this kind, or their maximum memory.
         limit: u64,
     },
     /// Messages with a timestamp later than allowed.
     Stamped {
-        /// Number of messages not delivered.
+        /// Number of messages not delivered because of their timestamps.
         messages: u64,
         /// Earliest timestamp of these messages, ns.
         first: u64,
@@ -66,26 +66,26 @@ pub enum LossKind {
     },
     /// Messages in a log of this program whose numbers have occurred before.
     Repeated {
-        /// Number of messages delivered again.
+        /// Number of messages that were delivered a second time.
         messages: u64,
     },
     /// Messages in a log of this program that come after messages with higher numbers.
     Disordered {
-        /// Number of messages delivered too late.
+        /// Number of messages that were delivered too late.
         messages: u64,
     },
     /// A record of a kind that isn't allowed in chunks, such as a chunk within a chunk.
     Misplaced,
     /// Messages of a channel whose definition is missing from the log.
     UnknownChannel {
-        /// Channel number.
+        /// Number of the undefined channel.
         channel: u16,
-        /// Number of messages not delivered.
+        /// Number of that channel's messages, which are not delivered.
         messages: u64,
     },
     /// A second definition of a channel that contradicts the first one. The first is used.
     Conflict {
-        /// Channel number.
+        /// Number of the channel with two definitions.
         channel: u16,
     },
     /// All records are readable, but the summary isn't where the footer says, so records are missing or were
@@ -94,39 +94,39 @@ pub enum LossKind {
     /// All records are readable, but their common checksum doesn't match, so a byte has changed at an unknown
     /// position.
     DataSection,
-    /// Damage in one part of a recording.
+    /// Damage within one part of a recording.
     InPart {
-        /// Part number.
+        /// Number of the damaged part.
         part: u32,
-        /// The damage.
+        /// Damage in that part.
         kind: Box<LossKind>,
     },
     /// Parts missing from a recording; the last one is `None` if unknown.
     PartsMissing {
-        /// First missing part.
+        /// Number of the first missing part.
         first: u32,
-        /// Last missing part.
+        /// Number of the last missing part.
         last: Option<u32>,
     },
     /// A part whose totals contradict those in the next part's header.
     PartUnlike {
-        /// Part number.
+        /// Number of the part with contradicting totals.
         part: u32,
         /// Number of messages up to the end of this part, as this part states it.
         messages: u64,
-        /// The same number, as the next part's header states it.
+        /// Number of messages up to the end of this part, as the next part's header states it.
         wanted: u64,
     },
     /// A part of a recording that isn't an MCAP file.
     PartUnreadable {
-        /// Part number in the file name.
+        /// Part number that the file name states.
         part: u32,
-        /// First bytes of the file, in hex.
+        /// First bytes of the part's file, in hex.
         found: String,
     },
     /// A part whose part metadata is unreadable. Its number was taken from the file name.
     PartByName {
-        /// Part number.
+        /// Part number that the file name states.
         part: u32,
     },
     /// A loss that the log itself states: the recorder left messages out, or the log was recovered from a damaged
@@ -139,9 +139,9 @@ pub enum LossKind {
 pub enum Many {
     /// Chunks, and runs of messages outside chunks.
     Pieces,
-    /// Channels.
+    /// Channels of the log.
     Channels,
-    /// Sources.
+    /// Sources of the log.
     Sources,
     /// Memory of definitions and metadata, bytes.
     HeaderBytes,
@@ -164,15 +164,15 @@ impl Many {
 /// A loss: a damaged range of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loss {
-    /// The damage.
+    /// Kind of damage.
     pub kind: LossKind,
-    /// Offset in the file, bytes.
+    /// Offset of the damaged range in the file, bytes.
     pub offset: u64,
-    /// Length in the file, bytes.
+    /// Length of the damaged range in the file, bytes.
     pub bytes: u64,
-    /// Last receive time before the loss; `None` if unknown.
+    /// Receive time of the last message before the loss; `None` if unknown.
     pub from: Option<MonoNs>,
-    /// First receive time after the loss; `None` if unknown.
+    /// Receive time of the first message after the loss; `None` if unknown.
     pub to: Option<MonoNs>,
 }
 
@@ -297,7 +297,7 @@ impl fmt::Display for Loss {
     }
 }
 
-/// List of losses with limited length.
+/// List of losses with a limited number of entries.
 #[derive(Debug, Default)]
 pub(super) struct Losses(Vec<Loss>);
 

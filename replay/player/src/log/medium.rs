@@ -14,7 +14,7 @@ pub(super) struct Medium<R> {
     at: u64,
     len: u64,
     failed: Vec<Range<u64>>,
-    /// Text of the first error.
+    /// Text of the first error that the medium reported.
     error: String,
 }
 
@@ -32,17 +32,17 @@ impl<R: Read + Seek> Medium<R> {
         self.len
     }
 
-    /// Whether any of these bytes couldn't be read.
+    /// Whether any byte of this range couldn't be read.
     pub(super) fn has_failed_within(&self, part: &Range<u64>) -> bool {
         self.failed.iter().any(|failed| failed.start < part.end && part.start < failed.end)
     }
 
-    /// Returns the ranges found unreadable so far.
+    /// Returns the byte ranges found unreadable so far.
     pub(super) fn failed(&self) -> &[Range<u64>] {
         &self.failed
     }
 
-    /// Returns the text of the first error.
+    /// Returns the text of the first error that the medium reported.
     pub(super) fn error(&self) -> &str {
         &self.error
     }

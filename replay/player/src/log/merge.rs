@@ -12,17 +12,17 @@ use super::fields::{Fields, MessageHead};
 const KEPT: usize = 4;
 const KEPT_BYTES: usize = 3 << 20;
 
-/// A message in a batch.
+/// A message in the batch of its piece.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
     pub(super) head: MessageHead,
-    /// Sort rank of the channel, see [`super::channels::Channel::rank`].
+    /// Sort rank of the message's channel, see [`super::channels::Channel::rank`].
     pub(super) rank: u32,
     start: usize,
     end: usize,
 }
 
-/// The messages of one piece.
+/// Batch with the messages of one piece.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     bytes: Vec<u8>,
@@ -52,8 +52,8 @@ impl Batch {
     }
 }
 
-/// Sort key of a message: time, rank and sequence number, then position in the file. In file order the first three are
-/// zero.
+/// Sort key of a message: time, rank and sequence number, then position in the file. If the log is read in file order,
+/// the first three are zero.
 type Key = (u64, u32, u32, usize, usize);
 
 /// Pieces in memory, whose messages are being merged.
@@ -81,12 +81,12 @@ impl Merge {
         }
     }
 
-    /// Returns the memory of the pieces, bytes.
+    /// Returns the memory of the pieces being merged, bytes.
     pub(super) fn memory(&self) -> usize {
         self.memory
     }
 
-    /// Returns the log time of the next message.
+    /// Returns the log time of the next message in the merged order.
     pub(super) fn next_time(&self) -> Option<u64> {
         self.heads.peek().map(|Reverse(((time, ..), _))| *time)
     }
@@ -108,7 +108,7 @@ impl Merge {
         batch
     }
 
-    /// Adds the messages of piece number `span`, beginning with message number `next`.
+    /// Adds the messages of the piece with index `span`, beginning with the message with index `next`.
     pub(super) fn add(&mut self, span: usize, mut batch: Batch, next: usize) {
         if self.by_time {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));
@@ -133,7 +133,7 @@ impl Merge {
         self.heads.iter().map(|Reverse(((_, _, _, span, next), _))| (*span, *next))
     }
 
-    /// Drops all pieces.
+    /// Drops all pieces being merged.
     pub(super) fn clear(&mut self) {
         while let Some(Reverse((_, slot))) = self.heads.pop() {
             self.release(slot);

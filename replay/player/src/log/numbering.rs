@@ -25,25 +25,25 @@ struct Run {
     last: u64,
 }
 
-/// Message numbers of a channel read so far.
+/// Runs of a channel's message numbers read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Count {
-    /// Expected number of the channel's first message.
+    /// Number that the channel's first message should have.
     first: u64,
     runs: Vec<Run>,
 }
 
-/// Message numbers of all channels read so far.
+/// Runs of message numbers of all channels read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(super) struct Numbering {
     channels: BTreeMap<u16, Count>,
-    /// Number of messages read.
+    /// Number of messages read so far.
     messages: u64,
     /// Number of messages that the closing records of the log state.
     wanted: Option<u64>,
 }
 
-/// Kind of numbering fault.
+/// Kind of fault in the message numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fault {
     Missing,
@@ -56,8 +56,8 @@ enum Fault {
 struct Break {
     fault: Fault,
     messages: u64,
-    /// First and last piece of a range. The break lies before one of these pieces. The number after the last piece
-    /// stands for the end of the log.
+    /// First and last piece of a range. The break lies before one of the pieces in this range. One past the last
+    /// piece of the log stands for the log's end.
     pieces: (usize, usize),
 }
 
@@ -68,7 +68,7 @@ impl Numbering {
     ///
     /// Also reports a part that was closed without an end record.
     pub(super) fn of(scan: &mut Scan, part: Option<&Part>, channels: &Channels, end: u64) -> Option<Self> {
-        // A log that was not closed already has a loss.
+        // If the log was not closed, the scan has already reported that as a loss.
         if part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
             let kind = LossKind::Metadata(PART_END.to_owned());
             scan.losses.push(Loss { kind, offset: end, bytes: 0, from: None, to: None });
@@ -83,7 +83,7 @@ impl Numbering {
         Some(Self { channels, messages: 0, wanted })
     }
 
-    /// Adds the messages of a piece, in file order.
+    /// Adds the message numbers of a piece, in file order.
     pub(super) fn add(&mut self, piece: usize, entries: &[Entry]) {
         for head in entries.iter().map(|entry| entry.head) {
             self.messages += 1;
@@ -128,7 +128,7 @@ impl Numbering {
     }
 }
 
-/// Whether a loss leaves the number of messages before the closing records unchanged.
+/// Whether a loss of this kind leaves the number of messages before the closing records unchanged.
 fn is_elsewhere(known: &Loss) -> bool {
     matches!(known.kind, LossKind::Stated(_) | LossKind::Misplaced | LossKind::Truncated)
 }
@@ -138,27 +138,27 @@ fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
     match known.kind {
         // The log's writer stated this loss. It numbers only messages that it writes, so the loss leaves no break.
         LossKind::Stated(_) => false,
-        // A loss of these kinds may cover several places, but has only one range.
+        // A loss of these kinds may affect several positions in the file, but states only one range.
         LossKind::Swells { .. } | LossKind::Beyond { .. } | LossKind::Unreadable(_) => true,
         _ => known.offset <= to && from <= known.offset.saturating_add(known.bytes),
     }
 }
 
 impl Break {
-    /// Whether both breaks may be the same place, seen in two channels.
+    /// Whether breaks in two channels may be at the same position in the file.
     fn meets(&self, other: &Self) -> bool {
         let (first, last) = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
         self.fault == other.fault && first <= last
     }
 
-    /// Merges the break of another channel, and narrows the range of pieces. A channel with few messages has a wide
-    /// range.
+    /// Merges a break in another channel into this one, and narrows the range of pieces to the common part. A channel
+    /// with few messages has a wide range.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
     }
 
-    /// Returns the file offsets between which the break lies.
+    /// Returns the file offsets between which the break in the message numbers lies.
     fn place(&self, spans: &[Span]) -> (u64, u64) {
         let before = self.pieces.0.checked_sub(1).and_then(|piece| spans.get(piece));
         let from = before.map_or(0, |span| span.end);
@@ -241,7 +241,7 @@ impl Count {
     }
 }
 
-/// Returns the lower 32 bits.
+/// Returns the lower 32 bits of a message number.
 fn low_word(number: u64) -> u32 {
     u32::try_from(number & u64::from(u32::MAX)).unwrap_or_default()
 }

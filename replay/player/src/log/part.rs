@@ -33,31 +33,31 @@ const DIVE_DIGITS: usize = 16;
 /// Totals of a recording up to a certain point.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Progress {
-    /// Number of messages of all channels.
+    /// Number of messages of all channels up to that point.
     pub messages: u64,
-    /// Index of the last tick; `None` before the first.
+    /// Index of the last tick up to that point; `None` before the first.
     pub tick: Option<u64>,
     /// Number of each topic's next message; empty at the end of a part.
     pub sequences: BTreeMap<String, u32>,
 }
 
-/// Metadata at the start of a part.
+/// Metadata at the start of a part of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PartHead {
     /// Identifier of the recording that the part belongs to, see [`dive_name`].
     pub dive: String,
-    /// Part number, from 1.
+    /// Number of the part, from 1.
     pub number: u32,
-    /// Totals of the earlier parts.
+    /// Totals of all earlier parts of the recording.
     pub before: Progress,
 }
 
-/// Metadata at the end of a part.
+/// Metadata at the end of a part of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartEnd {
-    /// Totals up to the end of this part.
+    /// Totals of the recording up to the end of this part.
     pub after: Progress,
-    /// Whether another part follows.
+    /// Whether another part follows this part.
     pub follows: bool,
 }
 
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn part_names_sort_and_contain_the_number() {
+    fn part_file_names_contain_the_part_number_and_sort_by_it() {
         let recording = Path::new("logs/gate 3.mcap");
         let names: Vec<PathBuf> = [1, 2, 10, 100].map(|number| part_path(recording, number)).into();
         assert_eq!(names.first(), Some(&PathBuf::from("logs/gate 3.part001.mcap")));

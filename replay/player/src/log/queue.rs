@@ -13,13 +13,13 @@ use super::fault::RecordingEvent;
 use super::fields::Fields;
 use super::writer::Lane;
 
-/// An entry doesn't fit in the queue. Nothing of it was written.
+/// An entry doesn't fit in the queue. No part of the entry was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
 pub struct Full {
-    /// Free bytes.
+    /// Number of free bytes in the queue.
     pub free: usize,
-    /// Bytes needed.
+    /// Number of bytes that the entry needs.
     pub needed: usize,
 }
 
@@ -46,9 +46,9 @@ pub(super) struct State {
     /// Bytes that port threads sent to devices. They don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
-    /// Packets that the lines dropped before the loop could receive them.
+    /// Packets that the connections to devices dropped before the loop could receive them.
     pub(super) dropped: ArrayQueue<Dropped>,
-    /// Number of dropped packets whose records didn't fit in `dropped`.
+    /// Number of dropped packets that aren't in `dropped`, because that queue was full.
     pub(super) dropped_besides: AtomicU64,
     /// Recordings of voice notes. They don't pass through the loop either.
     pub(super) voices: ArrayQueue<Vec<u8>>,
@@ -58,7 +58,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Notes the time of a tick that the loop has recorded or skipped.
+    /// Stores the time of a tick that the loop has recorded or skipped.
     pub(super) fn hand(&self, now: MonoNs) {
         // The dive's time begins with the first tick. Earlier data doesn't count as unsynced.
         if self.handed_ns.swap(now.0, Ordering::Relaxed) == 0 {
@@ -82,7 +82,7 @@ pub(super) struct Gap {
     pub(super) packets: u64,
 }
 
-/// Bytes sent to a device.
+/// A message with bytes sent to a device.
 pub(super) struct SentMessage {
     pub(super) source: u16,
     pub(super) at: MonoNs,
@@ -93,12 +93,12 @@ pub(super) struct SentMessage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Dropped {
     pub(super) source: u16,
-    /// Times between which the packets were dropped.
+    /// Times between which the source's packets were dropped.
     pub(super) span: (MonoNs, MonoNs),
     pub(super) packets: u64,
 }
 
-/// Records line traffic that doesn't pass through the loop. Any thread may use it.
+/// Records traffic on the connections to devices that doesn't pass through the loop. Any thread may use it.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
@@ -148,7 +148,7 @@ pub(super) fn entry_head(
     head
 }
 
-/// The loop's end of the queue.
+/// The end of the queue at which the loop adds entries.
 pub(super) struct Entries<R: ByteProducer = Prod<Arc<HeapRb<u8>>>> {
     pub(super) ring: R,
 }
@@ -195,10 +195,10 @@ pub(super) fn until_stopped(
     }
 }
 
-/// The thread's end of the queue.
+/// The end of the queue at which the recorder's thread takes entries.
 pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
     pub(super) ring: R,
-    /// Message of the entry that was taken last.
+    /// Message of the queue entry that was taken last.
     pub(super) message: Vec<u8>,
 }
 
@@ -211,7 +211,7 @@ impl Drop for ClosedWhenDropped {
     }
 }
 
-/// An entry without its message.
+/// Header of a queue entry, without the entry's message.
 pub(super) struct Entry {
     pub(super) lane: Lane,
     pub(super) log_time: MonoNs,
@@ -269,7 +269,7 @@ mod tests {
 
     /// Explores all interleavings of a loop and a recorder.
     ///
-    /// The loop pushes two entries and sets the flag. The recorder takes entries until `until` ends it.
+    /// The loop pushes two entries and sets the stop flag. The recorder takes entries until `until` ends it.
     fn explored<R: ByteConsumer + 'static>(
         name: &str,
         reading: fn(ModelConsumer) -> R,
@@ -316,13 +316,13 @@ mod tests {
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn model_detects_a_recorder_that_takes_incomplete_entries() {
+    fn interleaving_model_detects_a_recorder_that_takes_incomplete_entries() {
         explored("the recorder's queue, a message not waited for", Hasty, as_it_is);
     }
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn model_detects_a_recorder_that_reads_the_stop_flag_last() {
+    fn interleaving_model_detects_a_recorder_that_reads_the_stop_flag_last() {
         explored(
             "the recorder's stop, the flag read last",
             |consumer| consumer,

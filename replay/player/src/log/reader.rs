@@ -27,44 +27,45 @@ use crate::regular_file;
 /// First opcode that other programs may use. Source: MCAP format specification, "Records".
 const PRIVATE: u8 = 0x80;
 
-/// A log's header.
+/// The header of a log, as read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LogInfo {
     /// Text of the vehicle file; `None` if the log has none, or it isn't valid UTF-8.
     pub vehicle_toml: Option<String>,
-    /// Name and content of each other attachment.
+    /// Name and content of each attachment other than the vehicle file.
     pub attachments: Vec<(String, Vec<u8>)>,
-    /// Metadata. Entries of this program's own record have their key, others have `<name of the record>/<key>`.
+    /// Metadata of the log. Entries of this program's own record keep their key. Other entries have the key `<name of
+    /// the record>/<key>`.
     pub metadata: BTreeMap<String, String>,
     /// The sources. A source's index is its number in [`MessageKind`].
     ///
-    /// The channels' metadata number the sources in this program's logs. If metadata don't number all of them, they
-    /// are numbered by name: `/raw/...` first, then `/sent/...`.
+    /// In this program's logs, the channels' metadata contain the numbers. If some are missing, the sources are
+    /// numbered by name: `/raw/...` first, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
     /// Position of this log in a recording with several parts.
     pub part: Option<Part>,
 }
 
-/// Kind of message.
+/// Kind of a message in a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageKind<'a> {
-    /// Bytes received from a source.
+    /// Bytes received from a source such as a sensor.
     Raw {
-        /// Source number.
+        /// Number of the source.
         source: u16,
     },
-    /// Bytes sent to a source.
+    /// Bytes sent to a source such as a sensor.
     Sent {
-        /// Source number.
+        /// Number of the source.
         source: u16,
     },
     /// A tick of the loop, see [`super::format::Tick`].
     Tick,
     /// The recording of a voice note, see [`super::voice`].
     Voice,
-    /// A result of the loop.
+    /// A message with results of the loop.
     Result {
-        /// Topic of the result.
+        /// Topic of the result channel.
         topic: &'a str,
     },
     /// A message of a channel that this program doesn't know.
@@ -76,11 +77,11 @@ pub enum MessageKind<'a> {
 pub struct LogMessage<'a> {
     /// Kind of the message.
     pub kind: MessageKind<'a>,
-    /// Channel number.
+    /// Number of the message's channel.
     pub channel: u16,
     /// Time at which the message was received or created.
     pub log_time: MonoNs,
-    /// Time for which the message is valid.
+    /// Time at which the message's content was valid.
     pub publish_time: MonoNs,
     /// Number of the message in its channel.
     pub sequence: u32,
@@ -91,7 +92,7 @@ pub struct LogMessage<'a> {
 /// A position in a log, from which reading can be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogPlace {
-    /// Number of pieces read so far.
+    /// Number of pieces of the log read so far.
     read: usize,
     /// Pieces with messages left: piece number, and number of messages taken.
     open: Vec<(usize, usize)>,
@@ -113,7 +114,7 @@ pub struct ChannelInfo<'a> {
     pub id: u16,
     /// Topic of the channel.
     pub topic: &'a str,
-    /// Message encoding; empty if unknown.
+    /// Encoding of the channel's messages; empty if unknown.
     pub encoding: &'a str,
     /// Name of the schema, if the log contains the schema.
     pub schema: Option<&'a str>,
@@ -138,11 +139,11 @@ pub struct LogReader<R = File> {
     channels: Channels,
     schemas: BTreeMap<u16, String>,
     losses: Losses,
-    /// Pieces in file order.
+    /// Pieces of the log, in file order.
     spans: Vec<Span>,
     /// Times stated by chunk headers, by piece, where they differ from those of the messages.
     stated: BTreeMap<usize, (u64, u64)>,
-    /// Piece numbers in reading order.
+    /// Numbers of the pieces, in reading order.
     plan: Vec<u32>,
     /// Number of pieces read so far, in the order of `plan`.
     read: usize,
@@ -212,7 +213,7 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Returns the log's header.
+    /// Returns the header of the log.
     pub fn header(&self) -> &LogInfo {
         &self.info
     }
@@ -289,7 +290,8 @@ impl<R: Read + Seek> LogReader<R> {
         self.losses.list()
     }
 
-    /// Returns how many messages were delivered after a message with a later log time, in a log without ticks.
+    /// Returns the number of messages delivered out of order: after a message with a later log time. It is 0 for a log
+    /// with ticks.
     pub fn late(&self) -> u64 {
         self.late
     }
@@ -308,7 +310,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Returns the next message; `None` at the end.
     ///
-    /// Errors: an I/O error that doesn't concern certain bytes. Damage and unreadable bytes are losses, not errors.
+    /// Errors: an I/O error other than unreadable bytes. Damage and unreadable bytes are losses, not errors.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -354,7 +356,7 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
-    /// Returns the current position.
+    /// Returns the current reading position.
     pub fn place(&self) -> LogPlace {
         let times = |number: &usize| self.spans.get(*number).map(|span| (*number, (span.from, span.to)));
         LogPlace {
@@ -397,7 +399,7 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(())
     }
 
-    /// Sets the times of a piece, and keeps those that its header states.
+    /// Sets the times of a piece. The times that its header states are stored separately.
     fn correct(&mut self, number: usize, times: (u64, u64)) {
         let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
             return;
@@ -443,7 +445,7 @@ impl<R: Read + Seek> LogReader<R> {
         match &span.chunk(&mut self.file)? {
             Some(place) => read_chunk(&mut self.file, place, batch, &mut self.channels, found)?,
             None if span.piece == Piece::Run => read_run(&mut self.file, span, batch)?,
-            // The file has changed since it was scanned.
+            // The chunk's header can't be read any more, so the file has changed since it was scanned.
             None => found.push(LossKind::Contents),
         }
         Ok(())
@@ -579,7 +581,7 @@ fn place_entries(
     let mut unknown: BTreeMap<u16, u64> = BTreeMap::new();
     let (mut messages, mut first) = (0, u64::MAX);
     batch.entries.retain_mut(|entry| {
-        // Message numbers wrap at 32 bits.
+        // Message numbers wrap at 32 bits, so the comparison is modulo 2^32.
         let is_from = |number: &u32| entry.head.sequence.wrapping_sub(*number) <= u32::MAX / 2;
         if repeated.get(&entry.head.channel).is_some_and(is_from) {
             return false;

@@ -38,10 +38,10 @@ const SENT_MESSAGES: usize = 2048;
 const VOICES: usize = 8;
 /// Time to wait at the end for a medium that neither accepts data nor fails.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Capacity for events of the recording.
+/// Maximum number of waiting events about the recording.
 const EVENTS: usize = 64;
 
-/// Starts recorders.
+/// Starts recorders on threads of their own.
 pub struct Recorder;
 
 /// The loop's end of a recorder. Its methods don't block, allocate or make system calls.
@@ -50,7 +50,7 @@ pub struct RecorderPort {
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
-    /// Ticks skipped since the last recorded tick.
+    /// Ticks that were skipped since the last recorded tick.
     gap: Option<Gap>,
 }
 
@@ -175,7 +175,7 @@ fn run(mut worker: RecorderWorker) -> Summary {
 }
 
 impl RecorderPort {
-    /// Records bytes from `source`, received at `received` and valid for `valid`.
+    /// Records bytes from `source`, received at `received` and valid at `valid`.
     ///
     /// Errors: there is no room; nothing was written.
     pub fn raw(&mut self, source: u16, received: MonoNs, valid: MonoNs, bytes: &[u8]) -> Result<(), Full> {
@@ -217,7 +217,7 @@ impl RecorderPort {
 
     /// Skips a tick of `packets` packets for which there is no room.
     ///
-    /// The log states the skipped ticks. The first one is also reported as an event.
+    /// The log records the skipped ticks. The first one is also reported as an event.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {
@@ -229,7 +229,7 @@ impl RecorderPort {
         gap.packets += packets;
     }
 
-    /// Whether the last tick was skipped.
+    /// Whether the recorder skipped the last tick.
     pub fn is_behind(&self) -> bool {
         self.gap.is_some()
     }
@@ -239,7 +239,7 @@ impl RecorderPort {
         self.result_channels
     }
 
-    /// Returns the free bytes of the queue.
+    /// Returns the number of free bytes in the queue.
     pub fn vacant_bytes(&self) -> usize {
         self.entries.ring.vacant_len()
     }
@@ -270,7 +270,8 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Ends a stretch of skipped ticks. If there is no room to state it, it is stated together with the next stretch.
+    /// Ends a stretch of skipped ticks. If there is no room to record the stretch, it is recorded together with the
+    /// next one.
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();
@@ -280,7 +281,7 @@ impl RecorderPort {
         }
     }
 
-    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, they are stated first.
+    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, the log gets their entry first.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         if Self::entry_bytes(len) <= self.vacant_bytes() {
             self.end_gap();
@@ -314,7 +315,7 @@ impl RecorderHandle {
         self.state.unsafe_for()
     }
 
-    /// Returns a port for line traffic that doesn't pass through the loop.
+    /// Returns a port that records traffic with devices that doesn't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }

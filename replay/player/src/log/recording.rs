@@ -28,20 +28,20 @@ const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
 /// Number of attempts to write the rest after the dive has ended.
 const LAST_ATTEMPTS: u32 = 3;
-/// Maximum number of statements kept while no part can be begun.
+/// Maximum number of statements of losses kept while no part can be begun.
 const MAX_STATEMENTS: usize = 100;
 /// Maximum number of names tried for a part, if files with these names exist.
 const NAMES: u32 = 1000;
 
-/// The part being written.
+/// The part of the recording that is being written.
 struct OpenPart {
     path: PathBuf,
     log: LogWriter<Buffered>,
     /// Log time of the part's first message, or of the last failed rotation.
     began: Option<MonoNs>,
-    /// File size at which the part should end, bytes.
+    /// File size at which the open part should end, bytes.
     ends_at: u64,
-    /// Whether only the part's header is synced.
+    /// Whether nothing but the part's header has been synced.
     fresh: bool,
     /// Number of synced messages from sources in this part.
     raw_messages: u64,
@@ -51,7 +51,7 @@ struct OpenPart {
     before: Option<MonoNs>,
 }
 
-/// An interruption, during which no part can be written.
+/// An interruption of the recording, during which no part can be written.
 struct Outage {
     fault: RecordingFault,
     retry_at: Duration,
@@ -76,7 +76,7 @@ pub(super) struct Recording {
     /// Totals of all messages that are synced or lost, which are all messages before the backlog.
     settled: Tally,
     backlog: Backlog,
-    /// Statements of losses that aren't synced yet.
+    /// Statements of losses that aren't synced to the medium yet.
     statements: Vec<Statement>,
     /// Whether packets have been written, but not yet the tick that consumed them.
     within_tick: bool,
@@ -136,7 +136,7 @@ impl Recording {
         self.open.is_none()
     }
 
-    /// Returns the events since the last call.
+    /// Returns the recording's events since the last call.
     pub(super) fn take_events(&mut self) -> Vec<RecordingEvent> {
         core::mem::take(&mut self.events)
     }
@@ -149,7 +149,7 @@ impl Recording {
         }
     }
 
-    /// Writes a message.
+    /// Writes a message to the recording.
     pub(super) fn message(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, bytes: &[u8]) {
         if !self.header.has(lane) {
             self.refused = Some(self.refused.map_or((1, lane), |(count, first)| (count + 1, first)));
@@ -171,7 +171,7 @@ impl Recording {
         }
     }
 
-    /// Counts a message that is lost.
+    /// Counts a message that the recording loses.
     fn lose(&mut self, lost: &Head) {
         self.settled.add(lost);
         if let Some(outage) = &mut self.outage {
@@ -283,7 +283,7 @@ impl Recording {
         add(&mut self.sum.faults, fault);
     }
 
-    /// Writes the statements and the backlog to the part just begun, and syncs it.
+    /// Writes the statements of losses and the backlog of messages to the part just begun, and syncs it.
     fn write_again(&mut self, path: &Path) -> Result<(), LogError> {
         let Some(part) = &mut self.open else { return Ok(()) };
         if let Some(outage) = &mut self.outage {
@@ -300,7 +300,7 @@ impl Recording {
         log.flush()
     }
 
-    /// Whether the part should end before this message.
+    /// Whether the open part should end before this message.
     fn is_due(&mut self, lane: Lane, at: MonoNs) -> bool {
         // A part ends only between two ticks, so that no tick is split.
         let between = match lane {
@@ -377,7 +377,7 @@ impl Recording {
                 })
             }
             Err(error) => {
-                // A file without a header isn't a part.
+                // A file without a complete header isn't a part, so it is removed.
                 self.discard(&path);
                 Err(error)
             }

@@ -15,21 +15,21 @@ use super::writer::{Lane, LogHeader, LogWriter, ResultChannel, SourceInfo};
 /// Metadata key of a recovered log. Its value is the name of the original log.
 pub const RECOVERED_FROM: &str = "recovered_from";
 
-/// Result of a recovery.
+/// Result of recovering a damaged log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recovered {
-    /// Number of messages written.
+    /// Number of messages written to the recovered log.
     pub messages: u64,
     /// Log times of the first and last message written, in log order.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Losses, which the recovered log states too.
+    /// Losses of the damaged log, which the recovered log lists too.
     pub losses: Vec<Loss>,
 }
 
 /// Writes the readable content of a log to `output`, in the same order.
 ///
 /// The content is attachments, metadata, device messages, ticks and results. The new log replays to the same digest,
-/// and states its losses. All parts of a recording become one log; a single part remains a part.
+/// and lists the losses. All parts of a recording become one log; a single part remains a part.
 ///
 /// `open` opens the log; it is called twice, first to find all damage. `known` are the result channels whose schemas
 /// this program has. `from` is the name of the original log.

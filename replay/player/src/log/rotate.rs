@@ -18,7 +18,7 @@ use crate::atomic_file::folder_of;
 pub enum Every {
     /// The file reaches this many bytes. The second in which it reaches them still belongs to the part.
     Bytes(u64),
-    /// The messages reach this span of dive time.
+    /// The messages of the part reach this span of dive time.
     Span(DurNs),
 }
 

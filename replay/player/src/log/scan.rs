@@ -46,14 +46,14 @@ pub(super) struct Span {
     pub(super) piece: Piece,
 }
 
-/// Result of the scan.
+/// Result of scanning a log.
 #[derive(Default)]
 pub(super) struct Scan {
     pub(super) spans: Vec<Span>,
     pub(super) losses: Losses,
     pub(super) attachments: Vec<(String, Vec<u8>)>,
     pub(super) metadata: BTreeMap<String, String>,
-    /// Names of schemas by schema number.
+    /// Names of the log's schemas, by schema number.
     pub(super) schemas: BTreeMap<u16, String>,
     definitions: BTreeMap<u16, Definition>,
     /// Definitions in the summary. They are used only if the summary's checksum matches.
@@ -119,7 +119,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     Ok((scan, channels))
 }
 
-/// Returns the loss for exceeding a limit.
+/// Returns the kind of loss that reports content beyond a limit.
 pub(super) fn beyond(what: Many) -> LossKind {
     let limit = match what {
         Many::Pieces => MAX_PIECES as u64,
@@ -146,7 +146,7 @@ impl Scan {
     fn walk<R: Read + Seek>(&mut self, file: &mut LogFile<R>, start: u64) -> Result<(), LogError> {
         let (mut at, mut found) = (start, look(file, start)?);
         loop {
-            // Position at which the scan continues after damage.
+            // Position in the file at which the scan continues after damage.
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
@@ -263,7 +263,8 @@ impl Scan {
 
     fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        // Only chunks that will be unpacked as a whole count: not chunks over the limit, and not truncated chunks.
+        // A chunk is counted only if it will be unpacked completely. Chunks over the limit and truncated chunks are
+        // not.
         if !place.compression.is_empty() && !place.cut && place.unpacked_len <= MAX_UNPACKED_BYTES {
             let unpacked = self.unpacked.saturating_add(place.unpacked_len);
             if unpacked > unpacked_limit(end) {
@@ -526,7 +527,7 @@ impl Span {
         })
     }
 
-    /// Whether the times are valid. A chunk without messages has no times.
+    /// Whether the piece has times. A chunk without messages has none: both are 0.
     pub(super) fn is_dated(&self) -> bool {
         (self.from, self.to) != (0, 0)
     }
@@ -538,7 +539,7 @@ pub(super) struct FoundDefinitions {
     pub(super) channels: Vec<Definition>,
     pub(super) schemas: Vec<(u16, String)>,
     budget: HeaderBudget,
-    /// Whether definitions were dropped because of the limit.
+    /// Whether definitions were dropped because of the memory limit.
     pub(super) beyond: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Searches byte by byte for records after damage.
+//! Searches a damaged file byte by byte for the next intact records.
 
 use std::io::{Read, Seek};
 
@@ -9,7 +9,7 @@ use super::framing::{Found, Item, LogFile, look};
 
 /// Number of consecutive records after which a position is accepted.
 const CHAIN: usize = 3;
-/// Read size, bytes.
+/// Number of bytes searched at once.
 const SEARCH_BYTES: usize = 64 * 1024;
 
 /// Returns the first position in `from..until` at which consecutive records begin.
@@ -29,7 +29,7 @@ pub(super) fn find_records<R: Read + Seek>(
     Ok(first.map(|chain| chain.at))
 }
 
-/// The first of several consecutive records.
+/// The first of several consecutive records found after damage.
 struct Chain {
     at: u64,
     end: u64,

@@ -16,7 +16,7 @@ const WARN_BELOW_BYTES: u64 = 1 << 30;
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
 /// Maximum length of a sonar packet that is kept, bytes. Longer packets are echoes, shorter ones have only ranges.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;
-/// Interval between queries of the free space.
+/// Interval between queries of the free disk space.
 const ASK_EVERY: Duration = Duration::from_secs(2);
 
 /// Messages that a recorder dropped because its disk was nearly full.
@@ -24,14 +24,14 @@ const ASK_EVERY: Duration = Duration::from_secs(2);
 pub struct LeftOut {
     /// Number of dropped messages: echoes, results per echo, and viewer messages.
     pub messages: u64,
-    /// Bytes of the dropped messages.
+    /// Total length of the dropped messages, bytes.
     pub bytes: u64,
     /// Log times of the first and last dropped message.
     pub span: Option<(MonoNs, MonoNs)>,
 }
 
 impl LeftOut {
-    /// Returns the text that states the dropped messages, without the times.
+    /// Returns the log's text about the dropped messages, without the times.
     pub fn words(&self) -> String {
         let Self { messages, bytes, .. } = self;
         format!(
@@ -46,7 +46,7 @@ pub(super) struct Space {
     asked: Option<Duration>,
     warned: bool,
     sparing: bool,
-    /// Free bytes at the last query.
+    /// Free bytes of the disk at the last query.
     free: u64,
     left_out: LeftOut,
 }
@@ -82,7 +82,7 @@ impl Space {
         self.sparing = sparing;
     }
 
-    /// Whether echoes must be dropped now.
+    /// Whether echoes must be dropped now to save disk space.
     pub(super) fn is_scarce(&self) -> bool {
         self.sparing
     }
@@ -99,7 +99,7 @@ impl Space {
             .then(|| format!("the recorder leaves echo returns out: the disk had {free} bytes free"))
     }
 
-    /// Returns the messages dropped so far.
+    /// Returns the counts of messages dropped so far.
     pub(super) fn left_out(&self) -> LeftOut {
         self.left_out
     }

@@ -68,7 +68,7 @@ impl Storage for Disk {
 
     fn free_bytes(&mut self, path: &Path) -> Option<u64> {
         let disk = rustix::fs::statvfs(folder_of(path)).ok()?;
-        // Space that is available to users other than root.
+        // Space on the disk that is available to users other than root.
         Some(disk.f_bavail.saturating_mul(disk.f_frsize))
     }
 }
@@ -85,7 +85,7 @@ pub(super) enum Taken {
 }
 
 impl Taken {
-    /// Whether an error reports a change by another program to the file.
+    /// Whether an error means that another program has changed the file.
     pub(super) fn is_in(error: &io::Error) -> bool {
         error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Self>)
     }
@@ -114,7 +114,7 @@ impl DiskFile {
         Self { file, path: path.to_owned(), written: 0, known, is_begun: false }
     }
 
-    /// Returns the change by another program, if any.
+    /// Returns the change that another program has made to the file, if any.
     fn taken(&self) -> Option<Taken> {
         // If the system can't tell, the file counts as unchanged.
         let own = self.file.metadata().ok()?;
@@ -144,7 +144,7 @@ impl StoredFile for DiskFile {
     }
 }
 
-/// Returns the number of names that a file has.
+/// Returns the number of names (hard links) that a file has.
 #[cfg(unix)]
 fn links(file: &Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::nlink(file)
@@ -155,10 +155,10 @@ fn links(_: &Metadata) -> u64 {
     1
 }
 
-/// Size of the write buffer, bytes.
+/// Size of the write buffer of a file, bytes.
 const BUFFER_BYTES: usize = 64 << 10;
 
-/// A stored file with a buffer, as a writer.
+/// Writes to a stored file through a buffer.
 ///
 /// Flushing writes the buffer and syncs the file. Dropping discards buffered bytes.
 pub(super) struct Buffered {

@@ -22,35 +22,36 @@ pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 pub struct Trim<'a> {
     /// Spans of log time to keep, in order and without overlap. An empty list keeps everything.
     pub spans: Vec<(MonoNs, MonoNs)>,
-    /// Description of the changes, for the log's metadata.
+    /// Description of the trimming, for the metadata of the new log.
     pub words: String,
-    /// Changes the log's header.
+    /// Function that changes the log's header.
     pub header: &'a dyn Fn(&LogInfo, LogHeader) -> LogHeader,
-    /// Changes source messages.
+    /// Function that changes source messages.
     pub change: Change<'a>,
-    /// Whether to keep voice recordings within the spans.
+    /// Whether to keep voice recordings within the kept spans.
     pub voices: bool,
     /// Decides for a topic whether its results are kept. Used only if the whole dive is kept; otherwise no results are
     /// kept.
     pub results: &'a dyn Fn(&str) -> bool,
 }
 
-/// Result of trimming.
+/// Result of trimming a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Trimmed {
-    /// Number of messages written.
+    /// Number of messages written to the trimmed log.
     pub messages: u64,
     /// Number of messages dropped because they are outside the spans.
     pub cut: u64,
-    /// Number of result messages dropped. A trimmed dive would get other judgements, and some results name people.
+    /// Number of result messages dropped. They are dropped because a trimmed dive would get other judgements, and
+    /// because some results name people.
     pub results: u64,
     /// Number of source messages that were changed.
     pub changed: u64,
     /// Number of source messages that became empty and were dropped.
     pub emptied: u64,
-    /// Bytes of source messages before the change.
+    /// Total length of source messages before the change, bytes.
     pub bytes_before: u64,
-    /// Bytes of source messages after the change.
+    /// Total length of source messages after the change, bytes.
     pub bytes_after: u64,
     /// Number of losses of the original log.
     pub losses: u64,

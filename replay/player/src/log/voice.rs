@@ -23,7 +23,7 @@ use super::reader::MessageKind;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotKept {
-    /// The medium fails, or the recorder has ended.
+    /// The medium fails, or the recorder has already ended.
     #[error("the voice note isn't recorded: nothing is being recorded at present")]
     Failing,
     /// The queue of recordings is full.
@@ -35,10 +35,10 @@ pub enum NotKept {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoiceMessageError {
-    /// The message is shorter than its fields state.
+    /// The message is shorter than the fields at its beginning.
     #[error("a voice message of {0} bytes is cut off in its head")]
     Short(usize),
-    /// The recording is invalid.
+    /// The recording in the message is invalid.
     #[error(transparent)]
     Voice(#[from] VoiceError),
 }
@@ -147,7 +147,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_decode_to_a_valid_voice_recording_or_an_error(bytes: Vec<u8>) {
+        fn arbitrary_bytes_decode_to_a_valid_voice_recording_or_an_error(bytes: Vec<u8>) {
             if let Ok(voice) = decode(&bytes) {
                 prop_assert_eq!(voice.checked().map(|voice| encode(&voice).len()), Ok(bytes.len()));
             }

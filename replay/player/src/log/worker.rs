@@ -18,19 +18,19 @@ use super::writer::{Lane, LogHeader, Summary};
 ///
 /// A power cut may cost a second. The interval is half of that, because closing and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// Interval between statements about packets that lines dropped.
+/// Minimum interval at which the log records how many packets the connections to devices dropped.
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
-/// Maximum number of entries written in one step.
+/// Maximum number of queue entries written in one step.
 const BATCH: usize = 256;
 
-/// A derived message.
+/// A message derived from results, such as one for viewers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
     /// Number of the result channel for the message. The message is ignored if the log has no such channel.
     pub channel: u16,
-    /// Log time of the message.
+    /// Log time of the derived message.
     pub at: MonoNs,
-    /// Content of the message.
+    /// Content of the derived message.
     pub bytes: Vec<u8>,
 }
 
@@ -53,11 +53,12 @@ pub struct RecorderWorker {
     space: Space,
     echoes: Echoes,
     beside: Beside,
-    /// Number of packets in skipped ticks.
+    /// Number of packets in the ticks that were skipped.
     skipped: u64,
     /// Ids of the sources.
     ids: Vec<String>,
-    /// Packets dropped by lines since the last statement, by source. After it, the time of that statement.
+    /// Packets dropped by the connections to devices and not recorded in the log yet, by source. The next field is
+    /// the time of the last record.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
     /// Log time of the last entry. A voice recording has no log time of its own, so it gets this one.
@@ -121,7 +122,7 @@ impl RecorderWorker {
         }
     }
 
-    /// Returns a port for line traffic that doesn't pass through the loop.
+    /// Returns a port that records traffic with devices that doesn't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
@@ -200,7 +201,7 @@ impl RecorderWorker {
         summary
     }
 
-    /// Writes statements of skipped ticks to the log.
+    /// Records skipped ticks in the log.
     fn state_gaps(&mut self) {
         while let Some(Gap { span: (from, to), packets }) = self.state.gaps.pop() {
             self.skipped += packets;
@@ -209,9 +210,9 @@ impl RecorderWorker {
         }
     }
 
-    /// Writes statements of packets that lines dropped, every few seconds and at the end.
+    /// Records in the log which packets the connections to devices dropped, every few seconds and at the end.
     ///
-    /// The interval limits the number of statements if packets are dropped for hours.
+    /// The interval limits the number of records if packets are dropped for hours.
     fn state_dropped(&mut self, now: Duration, at_end: bool) {
         let dropped = core::iter::from_fn(|| self.state.dropped.pop());
         for Dropped { source, span: (from, to), packets } in dropped {

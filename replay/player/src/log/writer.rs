@@ -25,13 +25,13 @@ use super::space::LeftOut;
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Span of dive time at which a chunk is closed.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
-/// Length of the summary for each chunk, and for each channel in a chunk, bytes.
+/// Bytes that each chunk adds to the summary, and bytes that each channel in a chunk adds.
 ///
 /// Source: MCAP format specification, "Chunk Index".
 const CHUNK_INDEX_BYTES: u64 = 80;
 const CHUNK_INDEX_CHANNEL_BYTES: u64 = 10;
 
-/// A log's header.
+/// The header of a log to be written.
 #[derive(Debug, Clone, Default)]
 pub struct LogHeader {
     /// Text of the vehicle file; empty if there is none.
@@ -72,24 +72,24 @@ impl LogHeader {
 pub struct SourceInfo {
     /// Id of the source, which is also part of its topics.
     pub id: String,
-    /// Kind of device; empty if unknown.
+    /// Plugin that handles the device; empty if unknown.
     pub plugin: String,
     /// Connection of the device; empty if unknown.
     pub connect: String,
 }
 
-/// A channel of results.
+/// A channel for results of the loop.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ResultChannel {
-    /// Topic, which begins with `/result/`.
+    /// Topic of the channel, which begins with `/result/`.
     pub topic: String,
-    /// Name of the schema, such as `foxglove.PoseInFrame`.
+    /// Name of the channel's schema, such as `foxglove.PoseInFrame`.
     pub schema_name: String,
-    /// Encoding of the schema, such as `jsonschema`.
+    /// Encoding of the channel's schema, such as `jsonschema`.
     pub schema_encoding: String,
-    /// Text of the schema.
+    /// Text of the channel's schema.
     pub schema: String,
-    /// Encoding of the messages, such as `json`.
+    /// Encoding of the channel's messages, such as `json`.
     pub message_encoding: String,
     /// Whether the messages are dropped together with echoes when the disk fills.
     ///
@@ -100,15 +100,15 @@ pub struct ResultChannel {
 /// Totals of a written log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Summary {
-    /// Number of messages of all channels.
+    /// Number of messages of all channels in the log.
     pub messages: u64,
     /// Length of these messages, uncompressed and without framing, bytes.
     pub message_bytes: u64,
     /// Number of chunks, including the one with the channel definitions.
     pub chunks: u32,
-    /// Length of the file, bytes.
+    /// Length of the log file, bytes.
     pub bytes: u64,
-    /// Number of messages from sources.
+    /// Number of messages received from sources.
     pub raw_messages: u64,
     /// Faults while the log was recorded.
     pub faults: Vec<RecordingFault>,
@@ -129,7 +129,7 @@ pub struct Summary {
 pub struct PartSummary {
     /// Path of the part's file.
     pub path: PathBuf,
-    /// Number of messages from sources.
+    /// Number of messages received from sources in this part.
     pub raw_messages: u64,
 }
 
@@ -173,13 +173,13 @@ pub struct LogWriter<W: Write> {
     raw_messages: u64,
     chunks: u64,
     last_tick: Option<u64>,
-    /// Totals of the earlier parts.
+    /// Totals of all earlier parts of the recording.
     before: Progress,
-    /// Number of losses stated so far.
+    /// Number of losses stated in the log so far.
     losses: u64,
     /// Log time of the open chunk's first message.
     chunk_began: Option<MonoNs>,
-    /// Whether the last message was a voice recording.
+    /// Whether the last message was a voice recording, which has a chunk of its own.
     is_alone: bool,
 }
 
@@ -260,7 +260,7 @@ impl<W: Write> LogWriter<W> {
         Ok(log)
     }
 
-    /// Continues the message numbers of the earlier parts.
+    /// Continues the channels' message numbers from the earlier parts.
     fn count_on(&mut self, header: &LogHeader) {
         let before = core::mem::take(&mut self.before);
         for (topic, channel) in self.channels(header) {
@@ -342,7 +342,7 @@ impl<W: Write> LogWriter<W> {
         self.message(Lane::Result(channel), time, time, bytes)
     }
 
-    /// Writes one message.
+    /// Writes one message to the log.
     pub(super) fn message(
         &mut self,
         lane: Lane,
@@ -391,7 +391,7 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// Writes a statement of a loss between `from` and `to`; `None` if a time is unknown. Closes the chunk.
+    /// Records a loss between `from` and `to` in the log; `None` if a time is unknown. Closes the chunk.
     ///
     /// Errors: an error of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {
@@ -444,7 +444,7 @@ fn write_metadata<W: Write>(
     Ok(())
 }
 
-/// Number of bytes passed to the medium, and whether more may be passed.
+/// Number of bytes passed to the medium so far, and whether more may be passed.
 #[derive(Default)]
 struct Medium {
     bytes: AtomicU64,

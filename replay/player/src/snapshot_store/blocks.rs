@@ -29,7 +29,7 @@ const fn gear() -> [u64; 256] {
     table
 }
 
-/// Returns the blocks in order. Their concatenation is `bytes`.
+/// Cuts bytes into blocks, in order. The blocks' concatenation is `bytes`.
 pub(super) fn blocks(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = bytes;
     core::iter::from_fn(move || {
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn insertion_changes_only_the_blocks_around_it() {
+    fn insertion_of_bytes_changes_only_the_blocks_around_it() {
         let bytes = noise(4 << 20, 2);
         let mut longer = bytes.clone();
         longer.splice(1_000_000..1_000_000, noise(777, 3));

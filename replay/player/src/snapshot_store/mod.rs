@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-/// Snapshots by time, within a limited amount of memory.
+/// Snapshots of a replay by time, within a limited amount of memory.
 #[derive(Debug)]
 pub struct SnapshotStore {
     snapshots: BTreeMap<MonoNs, Vec<Arc<[u8]>>>,
@@ -93,7 +93,7 @@ impl SnapshotStore {
             is_kept = !is_kept;
             is_kept
         });
-        // The set itself holds one reference to each block.
+        // The set itself holds one reference to each block, so a count of one means unused.
         self.blocks.retain(|block| Arc::strong_count(block) > 1);
         let blocks: usize = self.blocks.iter().map(|block| block_bytes(block)).sum();
         let references: usize = self.snapshots.values().map(Vec::len).sum();

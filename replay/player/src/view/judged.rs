@@ -4,38 +4,25 @@ use std::collections::BTreeMap;
 
 use headrace_coverage::{Cause, Judgement, RunChange, Verdict, back_to_m};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::pilot_text::{CauseFigures, Missed as MissedText, cause_text, cleared_text, flag_text};
+use headrace_monitor::pilot_text::{Missed as MissedText, cause_text, cleared_text, flag_text};
+use headrace_monitor::section_judgement::SectionJudgement;
 
 use super::messages::{Level, Log, Missed, Section, Stretch, rounded};
 use super::site::Site;
 
-/// Minimum interval between lists of missed stretches.
+/// Minimum interval between two published lists of missed stretches.
 const EVERY: DurNs = DurNs(2_000_000_000);
 /// Maximum number of stretches in a list; the last ones along the tunnel are kept.
 ///
 /// The log stays small even if a dive misses everything.
 const MOST_STRETCHES: usize = 40;
 
-/// A judgement of a section, as published.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Judged {
-    pub(super) at: MonoNs,
-    pub(super) section: i64,
-    pub(super) change: u64,
-    pub(super) verdict: Verdict,
-    pub(super) hole_m: f64,
-    pub(super) hole_sd_m: f64,
-    pub(super) hole_x_m: f64,
-    pub(super) hole_arc_m: f64,
-    pub(super) cause: Option<CauseFigures>,
-}
-
 /// Judgements of all sections so far.
 #[derive(Debug, Default)]
 pub(super) struct Sections {
-    /// Flagged sections, each with its cause and the diameter of its hole, m.
+    /// Flagged sections by number, each with its cause and the diameter of its hole, m.
     flagged: BTreeMap<i64, (Cause, f64)>,
-    /// First and last section of each missed run.
+    /// First and last section of each missed run, by the run's number.
     runs: BTreeMap<u64, (i64, i64)>,
     /// Runs that have changed, each with its change.
     ///
@@ -46,7 +33,7 @@ pub(super) struct Sections {
 }
 
 impl Sections {
-    /// Notes the change of a run.
+    /// Stores the change of a run, until the next judgement.
     pub(super) fn run(&mut self, id: u64, change: u64) {
         self.changed_runs.push((id, change));
     }
@@ -54,12 +41,17 @@ impl Sections {
     /// Processes the judgement of a section. Returns the section for display, and the alerts to the pilot.
     ///
     /// `v_max_mps` is the advised speed.
-    pub(super) fn judge(&mut self, judged: &Judged, site: &Site, v_max_mps: f64) -> (Section, Vec<Log>) {
-        let index = judged.section;
+    pub(super) fn judge(
+        &mut self,
+        judged: &SectionJudgement,
+        site: &Site,
+        v_max_mps: f64,
+    ) -> (Section, Vec<Log>) {
+        let index = judged.index;
         let flagged = match judged.change {
-            change if change == Judgement::Raised as u64 => true,
-            change if change == Judgement::Cleared as u64 => false,
-            _ => self.flagged.contains_key(&index),
+            Judgement::Raised => true,
+            Judgement::Cleared => false,
+            Judgement::Updated => self.flagged.contains_key(&index),
         };
         let before = self.flagged.get(&index).copied();
         let now = judged.cause.filter(|_| flagged).map(|figures| (figures.cause(), judged.hole_m));
@@ -75,8 +67,15 @@ impl Sections {
     }
 
     /// Creates the alert to the pilot about a changed run.
-    fn say(&mut self, id: u64, change: u64, judged: &Judged, site: &Site, v_max_mps: f64) -> Option<Log> {
-        let index = judged.section;
+    fn say(
+        &mut self,
+        id: u64,
+        change: u64,
+        judged: &SectionJudgement,
+        site: &Site,
+        v_max_mps: f64,
+    ) -> Option<Log> {
+        let index = judged.index;
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
@@ -100,7 +99,7 @@ impl Sections {
         })
     }
 
-    /// Makes the next list due at once.
+    /// Makes the next list of missed stretches due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }
@@ -143,8 +142,8 @@ fn bounds_m(index: i64, site: &Site) -> (f64, f64) {
     (end(index), end(index + 1))
 }
 
-fn shown(judged: &Judged, flagged: bool, site: &Site) -> Section {
-    let (start_m, end_m) = bounds_m(judged.section, site);
+fn shown(judged: &SectionJudgement, flagged: bool, site: &Site) -> Section {
+    let (start_m, end_m) = bounds_m(judged.index, site);
     let cause = judged.cause.filter(|_| flagged || judged.verdict == Verdict::Fail);
     Section {
         timestamp: judged.at.into(),

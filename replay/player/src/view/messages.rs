@@ -43,7 +43,7 @@ pub(super) struct Turn {
 }
 
 impl Turn {
-    /// The identity, for frames that coincide.
+    /// The identity rotation, for frames whose axes coincide.
     pub(super) const NONE: Self = Self { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
 
     /// Creates a quaternion, rounded to a microradian.
@@ -80,7 +80,7 @@ pub(super) struct PoseInFrame {
     pub(super) pose: Pose,
 }
 
-/// A field of a packed element. The type is a number of Foxglove's `NumericType`.
+/// A field of an element in packed binary data. The type is a number of Foxglove's `NumericType`.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Field {
     name: &'static str,
@@ -90,12 +90,12 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// A u8.
+    /// Creates a field of type u8 at this offset in the element.
     pub(super) const fn byte(name: &'static str, offset: u32) -> Self {
         Self { name, offset, kind: 1 }
     }
 
-    /// An f32, little-endian.
+    /// Creates a field of type f32, little-endian, at this offset in the element.
     pub(super) const fn float(name: &'static str, offset: u32) -> Self {
         Self { name, offset, kind: 7 }
     }
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn times_and_numbers_are_serialised_briefly() {
+    fn times_and_numbers_are_serialised_compactly() {
         let json = |value: &dyn erased::Json| value.json();
         assert_eq!(json(&Time::from(MonoNs(12_000_000_034))), r#"{"sec":12,"nsec":34}"#);
         assert_eq!(json(&Xyz::new([1.0 / 3.0, -0.000_01, f64::NAN])), r#"{"x":0.3333,"y":0.0,"z":0.0}"#);

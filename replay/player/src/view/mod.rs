@@ -29,17 +29,18 @@ mod wall;
 #[cfg(test)]
 mod tests;
 
-use headrace_coverage::{Again, Cause, Causes, Failing, Verdict};
 use headrace_fusion::NoFix;
 use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::pilot_text::{AdviceFigures, CauseFigures, advice_text, recorded_observation_text};
+use headrace_geometry::tunnel::WallPoint;
+use headrace_monitor::alert_list::Occurrence;
+use headrace_monitor::pilot_text::{AdviceFigures, advice_text, recorded_observation_text};
 use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
+use headrace_monitor::section_judgement::SectionJudgement;
 use headrace_sampling::advice::{Reason, Remedy};
-use headrace_sampling::head::HeadSet;
 use serde::Serialize;
 
-use self::judged::{Judged, Sections};
+use self::judged::Sections;
 use self::messages::{
     Advice, Deviations, FrameTransform, FrameTransforms, Known, Level, Log, Pose, PoseInFrame, Turn, Vehicle,
     Xyz, rounded,
@@ -111,7 +112,10 @@ impl View {
             RecordKind::Pose => self.pose(&mut words, made),
             RecordKind::NoPose => self.no_pose(&mut words, made),
             RecordKind::Sample => self.sample(&mut words, made),
-            RecordKind::Section => self.section(&mut words, made),
+            RecordKind::Section => {
+                self.section(&SectionJudgement::read(record.words)?, made);
+                Some(())
+            }
             RecordKind::Run => {
                 self.sections.run(words.integer()?, words.integer()?);
                 Some(())
@@ -182,7 +186,7 @@ impl View {
         Some(())
     }
 
-    /// Publishes the messages that are due from time to time.
+    /// Publishes the messages for viewers that are due at regular intervals.
     fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
         self.at = at;
         made.push_some(Topic::Points, self.points.close_before(at).as_ref());
@@ -197,46 +201,18 @@ impl View {
         let [x_m, y_m, z_m, arc_m] = words.numbers()?;
         let head = self.site.heads.iter().position(|head| *head == source);
         let head = head.and_then(|head| u8::try_from(head).ok()).unwrap_or(u8::MAX);
-        self.wall.sample(x_m, arc_m);
+        self.wall.sample(WallPoint { x_m, arc_m });
         made.push_some(Topic::Points, self.points.add(at, head, [x_m, y_m, z_m]).as_ref());
         Some(())
     }
 
-    fn section(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
-        let at = MonoNs(words.integer()?);
-        let section = words.integer()?.cast_signed();
-        let change = words.integer()?;
-        let verdict = words.one_of(&Verdict::ALL, |verdict| verdict as u64)?;
-        let [hole_m, hole_sd_m] = words.numbers()?;
-        let cause = words.one_of(&Cause::ALL, |cause| cause as u64);
-        let [hole_x_m, hole_arc_m] = words.numbers()?;
-        let figures = words.numbers().zip(cause);
-        let silent = words.integer().and_then(|bits| u8::try_from(bits).ok()).map(HeadSet::from_bits);
-        let causes = words.integer().and_then(|bits| u16::try_from(bits).ok()).map(Causes::from_bits);
-        let again_mps = words.number().unwrap_or(0.0);
-        let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
-            let silent_heads = silent.unwrap_or_default();
-            let causes = causes.unwrap_or(Causes::of(cause));
-            let again = Again::of(&Failing { causes, again_mps });
-            CauseFigures {
-                causes,
-                speed_mps,
-                t_y_m,
-                middle_t_y_m,
-                missing_share,
-                again,
-                swing_m,
-                silent_heads,
-            }
-        });
-        let judged = Judged { at, section, change, verdict, hole_m, hole_sd_m, hole_x_m, hole_arc_m, cause };
-        self.wall.judge(section, verdict);
-        let (shown, said) = self.sections.judge(&judged, &self.site, self.v_max_mps);
+    fn section(&mut self, judged: &SectionJudgement, made: &mut Outbox<'_>) {
+        self.wall.judge(judged.index, judged.verdict);
+        let (shown, said) = self.sections.judge(judged, &self.site, self.v_max_mps);
         made.push(Topic::Sections, &shown);
         for line in &said {
             made.push(Topic::Alerts, line);
         }
-        Some(())
     }
 
     fn advice(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
@@ -296,7 +272,7 @@ impl View {
         let [x_m, off_m] = words.numbers()?;
         let head = words.integer().and_then(|source| self.site.heads.iter().position(|head| *head == source));
         let head = head.map_or_else(String::new, |head| format!("head {}", head + 1));
-        let text = recorded_observation_text(kind, &head, x_m, off_m)?;
+        let text = recorded_observation_text(kind, &head, Occurrence { x_m, off_m })?;
         made.push(Topic::Alerts, &Log::new(at, Level::Error, text));
         Some(())
     }
@@ -312,7 +288,7 @@ impl DerivedChannels for View {
         let mut rest = words.as_slice();
         while let Some((record, after)) = first_record(rest) {
             rest = after;
-            // Records in the format of another version are skipped.
+            // Records of results in the format of another version are skipped.
             let _ = self.record(record, &mut made);
         }
         self.at = at;
@@ -322,7 +298,7 @@ impl DerivedChannels for View {
         let at = self.at;
         let mut made = Outbox { at, made };
         made.push_some(Topic::Points, self.points.close().as_ref());
-        // The last update is always published.
+        // The last state of the wall and of the missed stretches is always published, even if it isn't due yet.
         self.wall.hurry();
         self.sections.hurry();
         if let Some((x_m, _)) = self.last {
@@ -332,7 +308,7 @@ impl DerivedChannels for View {
     }
 }
 
-/// Collects messages for the log.
+/// Collects messages for viewers, to be written to the log.
 struct Outbox<'a> {
     /// Log time of the messages. It is that of the results they come from, so that log times don't go back.
     at: MonoNs,
@@ -353,7 +329,7 @@ impl Outbox<'_> {
     }
 }
 
-/// Words of a record, read in order.
+/// Words of a stored result record, read in order.
 struct Words<'a>(&'a [u64]);
 
 impl Words<'_> {
@@ -373,7 +349,7 @@ impl Words<'_> {
         Some(first.map(f64::from_bits))
     }
 
-    /// Returns the element of `all` whose number is the next word.
+    /// Returns the element of `all` whose index is the next word of the record.
     fn one_of<T: Copy>(&mut self, all: &[T], number: impl Fn(T) -> u64) -> Option<T> {
         let word = self.integer()?;
         all.iter().copied().find(|kind| number(*kind) == word)

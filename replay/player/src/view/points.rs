@@ -5,15 +5,16 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use super::messages::{Field, PointCloud, Pose, Turn, Xyz, base64, rounded};
 use super::site::TUNNEL;
 
-/// Maximum time span of a cloud.
+/// Maximum time span of a point cloud.
 const SPAN: DurNs = DurNs(500_000_000);
-/// Maximum number of points in a cloud.
+/// Maximum number of points in a point cloud.
 const MOST_POINTS: usize = 4096;
 /// Length of a point, bytes: three floats.
 ///
-/// The least significant byte of x holds the head number; rounding has made that byte zero. A viewer that reads it as
-/// part of x is wrong by some micrometres. A fourth field would make the stride no multiple of three, which
-/// compresses a seventh worse in base64.
+/// Rounding makes the least significant byte of x zero, so that byte holds the head number. A viewer that reads it as
+/// part of x shows x wrong by some micrometres. The head number in a byte of its own would make the stride 13 bytes.
+/// Base64 encodes groups of three bytes, so points would no longer align with groups, and the compressed text would be
+/// a seventh longer.
 const STRIDE: usize = 12;
 const FIELDS: [Field; 4] =
     [Field::float("x", 0), Field::float("y", 4), Field::float("z", 8), Field::byte("head", 0)];
@@ -25,7 +26,7 @@ const PARTS_PER_M: f64 = 256.0;
 /// dropped.
 const FARTHEST_M: f64 = 128.0;
 
-/// Points of the current cloud.
+/// Points of the current point cloud.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     began: Option<MonoNs>,
@@ -58,7 +59,7 @@ impl Points {
         if (0..SPAN.0).contains(&age) { None } else { self.close() }
     }
 
-    /// Returns the current cloud, and begins another.
+    /// Returns the current point cloud, and begins another.
     pub(super) fn close(&mut self) -> Option<PointCloud> {
         let began = self.began.take()?;
         let data = base64(&self.data);

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::log::ResultChannel;
 use crate::log::format::VIEW_PREFIX;
 
-/// The topics, in the order of their channels.
+/// The topics of a view, in the order of their channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Topic {
     Transforms,
@@ -25,7 +25,7 @@ pub(super) enum Topic {
 }
 
 impl Topic {
-    /// All topics, in the order of their channels.
+    /// All topics of a view, in the order of their channels.
     pub(super) const ALL: [Self; 9] = [
         Self::Transforms,
         Self::Pose,

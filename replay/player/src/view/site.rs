@@ -3,7 +3,7 @@
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::head_descriptions::HeadDescriptions;
 
-/// Names of the frames.
+/// Names of the coordinate frames.
 pub(super) const TUNNEL: &str = "tunnel";
 pub(super) const VEHICLE: &str = "vehicle";
 pub(super) const WALL: &str = "wall";
@@ -13,9 +13,9 @@ pub(super) const WALL: &str = "wall";
 pub struct Site {
     /// Design profile of the tunnel.
     pub profile: Profile,
-    /// Target T, m.
+    /// Target T, the largest diameter that a hole in the samples may have, m.
     pub target_m: f64,
-    /// Length of a section, m.
+    /// Length of a judged section along the tunnel, m.
     pub section_m: f64,
     /// Distance before a missed stretch at which the vehicle turns round, m.
     pub run_up_m: f64,

@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use headrace_coverage::{Judgement, RunChange};
+use headrace_coverage::{Cause, Judgement, RunChange, Verdict};
 use headrace_geometry::tunnel::shapes;
 use headrace_monitor::head_descriptions::HeadDescriptions;
 use serde_json::Value;
@@ -57,7 +57,7 @@ fn sample(at: u64, source: u64, place: [f64; 4]) -> Vec<u64> {
     record(RecordKind::Sample, &[&[at, source, 0], bits(place).as_slice()].concat())
 }
 
-/// Returns a section's judgement with a cause.
+/// Returns a record of a section's judgement with a cause.
 fn section(at: u64, index: i64, change: Judgement, verdict: Verdict) -> Vec<u64> {
     let head = [at, index.cast_unsigned(), change as u64, verdict as u64];
     let tail = bits([10.1, 9.4, 0.3, 0.2, 0.2, 0.0, 0.0]);
@@ -123,7 +123,7 @@ fn wall_grid_covers_samples_and_verdicts_near_the_vehicle() {
 }
 
 #[test]
-fn raised_and_cleared_runs_give_one_alert_each() {
+fn raised_and_cleared_missed_runs_give_one_alert_each() {
     let mut view = view();
     let run = |change: RunChange| record(RecordKind::Run, &[0, change as u64]);
     let raised = [run(RunChange::Raised), section(1, 40, Judgement::Raised, Verdict::Fail)];

@@ -5,17 +5,18 @@ use std::collections::BTreeMap;
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::WallPoint;
 
 use super::messages::{Field, Grid, Pose, Turn, Xy, Xyz, base64, rounded};
 use super::site::{Site, WALL};
 
-/// Approximate size of a cell along the perimeter, m.
+/// Approximate size of a grid cell along the tunnel's perimeter, m.
 const CELL_M: f64 = 0.25;
 /// Length of wall displayed ahead of the vehicle, and behind it, m.
 const REACH_M: f64 = 8.0;
 /// Length of wall kept beyond either end of the tunnel, m, because heads may be there.
 const BEYOND_M: f64 = 25.0;
-/// Minimum interval between grids.
+/// Minimum interval between two published grids of the wall.
 const EVERY: DurNs = DurNs(2_000_000_000);
 const FIELDS: [Field; 6] = [
     Field::byte("red", 0),
@@ -25,7 +26,7 @@ const FIELDS: [Field; 6] = [
     Field::byte("samples", 4),
     Field::byte("verdict", 5),
 ];
-/// Maximum sample count of a cell. Exact counts would take most of the message.
+/// Maximum sample count of a cell. Exact counts would take up most of the message's length.
 const MOST_SAMPLES: u8 = 3;
 
 /// Samples and verdicts of the wall's cells. Columns are allocated only where the vehicle has passed.
@@ -62,8 +63,8 @@ impl Wall {
         }
     }
 
-    /// Counts a sample in its cell.
-    pub(super) fn sample(&mut self, x_m: f64, arc_m: f64) {
+    /// Counts a sample in its grid cell of the wall.
+    pub(super) fn sample(&mut self, WallPoint { x_m, arc_m }: WallPoint) {
         let row = usize::try_from(math::floor_to_i64(arc_m / self.cell_m)).unwrap_or(0).min(self.cells - 1);
         let column = self.column(math::floor_to_i64(x_m / self.section_m));
         if let Some(count) = column.and_then(|column| column.samples.get_mut(row))
@@ -90,7 +91,7 @@ impl Wall {
         self.indices.contains(&index).then(|| self.columns.entry(index).or_insert_with(new))
     }
 
-    /// Makes the next grid due at once.
+    /// Makes the next grid of the wall due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }

@@ -38,7 +38,7 @@ const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
 /// Strength at the beam's edge relative to the axis. The edge is at half power, since beam widths are measured between
 /// half-power points.
 const EDGE: f64 = 0.5;
-/// Width of an echosounder's beam, degrees.
+/// Full width of an echosounder's beam, degrees.
 const ECHOSOUNDER_DEG: f64 = 30.0;
 /// Width of a range bin of an echosounder's profile, m.
 const ECHOSOUNDER_BIN_M: f64 = 0.15;
@@ -58,7 +58,7 @@ const FORMS: [(&str, Form); 3] = [("first", Form::First), ("mean", Form::Mean), 
 struct Parameters {
     rays: usize,
     width_deg: Option<f64>,
-    /// Applies to heads only.
+    /// Frequency that determines the width of a head's beam, kHz; only for heads.
     frequency_khz: Option<f64>,
     form: Form,
     bin_m: Option<f64>,
@@ -74,7 +74,7 @@ pub struct Cone {
 struct ConeRay {
     /// Components of the direction along the beam's axis, along the tunnel, and perpendicular to both.
     parts: [f64; 3],
-    /// Strength of the ray relative to the axis.
+    /// Strength of the ray relative to the beam's axis.
     strength: f64,
 }
 
@@ -83,7 +83,7 @@ struct BeamCone {
     cone: Cone,
     form: Form,
     bins: Bins,
-    /// Hits of the current ping's rays.
+    /// Hits of the rays within the cone of the current ping.
     hits: Vec<Option<Hit>>,
 }
 

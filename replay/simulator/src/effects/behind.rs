@@ -1,4 +1,4 @@
-//! Heads that lag behind their commands.
+//! Offset of heads that lag behind their commanded angles.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sensor::measurement::Sounding;
@@ -14,8 +14,8 @@ pub(super) struct Behind {
 impl Behind {
     /// Applies the head's offset to a ping.
     ///
-    /// `made` is false if the head missed the step to this ping. `told` is true if the reported angle includes the
-    /// offset.
+    /// `made` is false if the head missed the step to this ping. `told` is true if the head reports its true angle,
+    /// which includes the offset.
     pub(super) fn step(&mut self, sounding: &mut Sounding, made: bool, told: bool) {
         let commanded_rad = sounding.angle_rad;
         let step_rad =

@@ -1,4 +1,4 @@
-//! Bit errors, lost bytes and inserted bytes on a line.
+//! Bit errors, lost bytes and inserted bytes on a device's line.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -29,7 +29,8 @@ struct Parameters {
     inserted: f64,
 }
 
-/// Selects the affected bytes. All bytes have the same probability, so the gaps between affected bytes are drawn.
+/// Selects the affected bytes. All bytes have the same probability. One random number therefore gives the number of
+/// bytes to the next affected one.
 struct Hits {
     stream: Stream,
     kind: u64,
@@ -44,7 +45,7 @@ struct ByteErrors {
     flipped: Hits,
     dropped: Hits,
     inserted: Hits,
-    /// Number of bytes on the line so far.
+    /// Number of bytes that have crossed the line so far.
     seen: u64,
     rest: Line,
 }
@@ -224,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_rates_are_refused() {
+    fn time_slice_length_changes_nothing_and_zero_rates_are_refused() {
         let keys = "[effects.byte_errors]\ndropped_per_million = 9000\nflipped_per_million = 9000\n\
                     inserted_per_million = 9000\n";
         same_in_any_slices(&Bench::turning(keys));

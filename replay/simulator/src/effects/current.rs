@@ -1,4 +1,4 @@
-//! A current along the tunnel.
+//! A current of the water along the tunnel.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
@@ -13,7 +13,7 @@ use crate::stretch::Stretch;
 use crate::trajectory::{Flow, Ground, Knots, Trajectory};
 
 const NAME: &str = "current";
-/// Number of drawn speeds per correlation time of the gusts.
+/// Number of random speeds per correlation time of the gusts.
 const STEPS: f64 = 8.0;
 /// Largest distance by which a current may carry the vehicle out of the tunnel, m. Trajectories have the same limit.
 const OUTSIDE_M: f64 = 20.0;
@@ -93,7 +93,7 @@ impl Effect for Current {
 }
 
 impl Current {
-    /// Displacement of the vehicle by gusts since the start.
+    /// Displacement of the vehicle by gusts since the dive's start.
     fn carried(&self, stream: Stream, duration_s: f64) -> Knots {
         let [start_m, ..] = self.carried_from(0.0, stream, duration_s).at(0.0);
         self.carried_from(-start_m, stream, duration_s)
@@ -189,7 +189,7 @@ mod tests {
         assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
         let correlation = lagged / speeds;
         assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
-        // Each drawn speed lasts for one step. The expected variance is therefore computed for the sum of a discrete
+        // Each random speed lasts for one step. The expected variance is therefore computed for the sum of a discrete
         // process.
         let kept = math::exp(-1.0 / STEPS);
         let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn current_that_carries_the_vehicle_off_or_has_no_effect_is_refused() {
+    fn current_that_carries_the_vehicle_out_or_has_no_effect_is_refused() {
         let why = |trajectory: &str, keys: &str| {
             Bench::on(trajectory, &format!("[effects.current]\n{keys}")).refusal()
         };

@@ -41,7 +41,7 @@ struct DepthNoise {
     parameters: Parameters,
     stream: Stream,
     offset_pa: f64,
-    /// Current value of the drift, in standard deviations. `before` is its time.
+    /// Latest value of the drift, in standard deviations. The next field is the time of that value.
     drift: f64,
     before: Option<MonoNs>,
 }
@@ -91,7 +91,7 @@ fn disturb(mut sensors: Query<'_, '_, (&mut Samples<Pressure>, &mut DepthNoise)>
 }
 
 impl DepthNoise {
-    /// Error of a step's sample, Pa. Must be called once per step, in order.
+    /// Error of one pressure sample, Pa. Must be called once per step, in order.
     fn error_pa(&mut self, step: u64, at: MonoNs) -> f64 {
         let Parameters { noise_pa, drift_pa, tau_s, .. } = self.parameters;
         let [white, wander] = self.stream.at(step).normal();

@@ -1,4 +1,4 @@
-//! Quantisation of depth.
+//! Quantisation of reported depths.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn sensors_of_other_kinds_are_refused() {
+    fn depth_quantisation_of_other_sensors_is_refused() {
         assert!(refusal("[effects.depth_steps]\nsensors = [\"imu\"]\n").contains("can act on: depth"));
     }
 }

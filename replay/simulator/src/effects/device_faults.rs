@@ -41,7 +41,7 @@ enum Fault {
     Babble,
 }
 
-/// A span of time. Its end is excluded.
+/// Time span of a fault. Its end is excluded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Span {
     from: MonoNs,
@@ -201,7 +201,7 @@ fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &mut Stuck<M>
     }
 }
 
-/// Adds a constant error to a sensor's values.
+/// Adds a constant error to the values of a sensor.
 #[derive(Component)]
 struct Jumped {
     size: f64,
@@ -212,7 +212,7 @@ fn jump_soundings(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Jumped, Op
     for (mut samples, Jumped { size, span }, echosounder) in &mut sonars {
         for sounding in samples.list.iter_mut().filter(|sounding| span.holds(sounding.at)) {
             if echosounder.is_some() {
-                // A range is never negative.
+                // A range with an error is never negative.
                 sounding.range_m = sounding.range_m.map(|range_m| (range_m + size).max(0.0));
             } else {
                 sounding.reported_rad += size.to_radians();
@@ -263,7 +263,7 @@ struct BrokenLine {
     span: Span,
     /// Source of the random bytes; `None` for a silent line.
     stream: Option<Stream>,
-    /// Number of random bytes sent so far.
+    /// Number of random bytes sent so far by a babbling device.
     said: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Interface of effects.
+//! Interface that every effect implements.
 
 use headrace_config::{ConfigError, Section};
 
@@ -11,16 +11,17 @@ pub trait EffectKind: Sync {
     /// Name of the effect: `[effects.NAME]`.
     fn name(&self) -> &'static str;
 
-    /// Summary of the effect on one line.
+    /// One-line summary of the effect.
     fn summary(&self) -> &'static str;
 
-    /// Reads the effect's tables. There are several tables if `[[effects.NAME]]` differs by sensor.
+    /// Reads the effect's tables. A scene has several `[[effects.NAME]]` tables if the keys differ by sensor or
+    /// stretch.
     ///
     /// Errors: a key is missing, unknown or out of range; a named sensor doesn't exist.
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError>;
 }
 
-/// An effect with its parameters.
+/// An effect with the parameters that a scene gives.
 pub trait Effect: Send + Sync {
     /// Changes the heads' programs before the heads are switched on.
     fn begin(&self, programs: &mut Programs<'_>) {

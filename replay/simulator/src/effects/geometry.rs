@@ -6,7 +6,7 @@ use headrace_geometry::math;
 /// A beam counts as along the tunnel if the component of its direction along the tunnel exceeds this value.
 const ALONG: f64 = 0.9;
 
-/// Scalar product.
+/// Scalar product of two vectors.
 pub(super) fn dot(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
     a.0.dot(&b.0)
 }

@@ -1,4 +1,4 @@
-//! Heads that stall for a while.
+//! Heads that stall for a while and ping at one angle.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -24,9 +24,9 @@ const STEP: DurNs = DurNs(100_000_000);
 /// From time to time a head stalls and pings repeatedly at one angle. It then continues from that angle, so it remains
 /// offset from its commands.
 ///
-/// Stalls begin `per_hour` times per hour, with equal probability at any tenth of a second. The duration is drawn evenly
-/// from `seconds = [least, most]`, by default 2 to 20. A stall that begins during another one may extend it. If `told` is
-/// true, as by default, the head reports its true angle; otherwise it reports the commanded angle.
+/// Stalls begin `per_hour` times per hour, with equal probability at any tenth of a second. The duration is uniformly
+/// distributed over `seconds = [least, most]`, by default 2 to 20. A stall that begins during another one may extend
+/// it. If `told` is true, as by default, the head reports its true angle; otherwise it reports the commanded angle.
 pub(super) struct HeadStallsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +43,7 @@ struct HeadStalls {
     behind: Behind,
 }
 
-/// Times of stalls.
+/// Draws the times at which a head stalls.
 struct Stalls {
     stream: Stream,
     chance: f64,
@@ -138,7 +138,7 @@ mod tests {
         }
         let free = math::exp(-6.0 / 60.0);
         let share = f64::from(still) / f64::from(count);
-        // The tolerance allows for 12,000 stalls.
+        // The tolerance is that of a mean over 12,000 stalls of varying length.
         assert!((share - (1.0 - free)).abs() < 5.0 * 0.095 / math::sqrt(12_000.0) * 1.5, "{share}");
         let wanted = f64::from(hours) * 60.0 * free;
         assert!((f64::from(begun) - wanted).abs() < 5.0 * math::sqrt(wanted), "{begun} {wanted}");
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::sectors("[effects.head_stalls]\nper_hour = 600\nseconds = [0.5, 3]\n"));
         assert!(refusal("[effects.head_stalls]\n").contains("must not be zero"));
         assert!(refusal("[effects.head_stalls]\nper_hour = 1\nseconds = [3, 2]\n").contains("[least, most]"));

@@ -1,4 +1,4 @@
-//! Biases of inertial units.
+//! Biases of inertial units: turn rate, force and attitude.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -58,13 +58,13 @@ struct ImuBias {
     parameters: Parameters,
     stream: Stream,
     constant: [f64; 6],
-    /// Current varying biases of turn rates, then of forces, in standard deviations.
+    /// Latest varying biases of turn rates, then of forces, in standard deviations.
     wandering: [f64; 6],
-    /// Current tilt in roll and pitch, in standard deviations.
+    /// Latest tilt of the attitude in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Last sample interval, with two factors for biases and for tilt: the correlation over the interval, and the
-    /// weight of a new draw.
+    /// Last sample interval, and two factors each for biases and for tilt: the correlation over the interval, and the
+    /// weight of a new random number.
     ///
     /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),
@@ -225,8 +225,8 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Compares, over many seeds, the variance at the first sample and much later, and the correlation between the two
-    /// with exp(-t / tau).
+    /// Over many seeds, the variance at the first sample and much later is as given, and the correlation between the
+    /// two samples is exp(-t / tau).
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_bias_is_refused() {
+    fn time_slice_length_changes_nothing_and_zero_bias_is_refused() {
         same_in_any_slices(&Bench::turning(
             "[effects.imu_bias]\ngyro_degps = 0.2\naccel_mps2 = 0.01\ntau_s = 5\n",
         ));

@@ -18,15 +18,15 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Length of a time span, s. A span contains at most one bump.
+/// Length of the time spans into which a dive is divided, s. Each contains at most one bump.
 const SPAN_S: f64 = 1.0;
 
 /// From time to time the vehicle bumps into the wall, a rock or its own cable. It is pushed one way and swings back.
 ///
 /// Keys, with defaults in brackets:
 /// - `per_hour`, up to 1,800 (required).
-/// - `speed_mps = [least, most]`, the speed that a bump gives the vehicle ([0.02, 0.1]). Speed and direction are drawn
-///   evenly.
+/// - `speed_mps = [least, most]`, the speed that a bump gives the vehicle ([0.02, 0.1]). Speed and direction are
+///   uniformly distributed.
 /// - `seconds`, from the first touch until the vehicle is at rest again, 0.01 to 1 (0.2).
 ///
 /// The force is one period of a sine, so the speed is gained and lost again. The vehicle moves by some millimetres,
@@ -147,7 +147,7 @@ mod tests {
             force.chunk_by(|a, b| felt(a) == felt(b)).filter(|run| felt(&run[0])).collect();
         let (spans, chance) = (640.0, 400.0 / 3600.0);
         let n = bumps.len() as f64;
-        // Two overlapping bumps are found as a single bump.
+        // Two overlapping bumps are counted as a single bump.
         assert!((n - spans * chance).abs() < 5.0 * math::sqrt(spans * chance), "{n}");
         let mut single = 0;
         for bump in &bumps {
@@ -168,15 +168,15 @@ mod tests {
         assert!(single * 4 > bumps.len() * 3);
     }
 
-    /// Velocities of a seed's bumps in `spans` time spans.
+    /// Velocities gained in the bumps of `spans` time spans.
     fn bumps(spans: u64) -> Vec<Vec3<Sensor>> {
         let parameters = Parameters { chance: 0.5, speed_mps: [0.05, 0.2], seconds: 0.3 };
         let bumps = ImuBumps { parameters, stream: Stream::new(5, "imu_bumps", "vehicle") };
         (0..spans).filter_map(|span| bumps.drawn(span)).map(|(_, speed)| speed).collect()
     }
 
-    /// Directions are evenly distributed on a sphere: each component has mean 0 and mean square 1/3. Sizes are evenly
-    /// distributed from least to most, as mean and variance show.
+    /// Directions are uniformly distributed on a sphere: each component has mean 0 and mean square 1/3. Sizes are
+    /// uniformly distributed from least to most, as mean and variance show.
     #[test]
     fn bump_directions_and_sizes_are_uniformly_distributed() {
         let bumps = bumps(20_000);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn units_on_one_vehicle_feel_the_same_bumps() {
+    fn inertial_units_on_one_vehicle_feel_the_same_bumps() {
         let felt = |unit: &'static str| {
             let force = |keys: &str| {
                 let samples = Bench::turning(keys).with_unit(unit).run::<Inertia>(unit);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_bumps]\n").contains("per_hour: must not be zero"));
         assert!(refusal("[effects.imu_bumps]\nper_hour = 9\nspeed_mps = 1\n").contains("must be"));

@@ -1,4 +1,4 @@
-//! Noise of inertial units.
+//! White noise of inertial units.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -17,7 +17,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Blocks of random numbers. Each vector takes two blocks.
+/// Numbers of the first block of random numbers for each quantity. Each vector takes two blocks.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;
@@ -119,7 +119,7 @@ mod tests {
 
     /// White noise with density N has an Allan deviation of N / sqrt(t) for means over any time t.
     #[test]
-    fn rate_and_force_noise_have_the_given_densities_over_any_time() {
+    fn rate_and_force_noise_have_the_given_densities_for_any_averaging_time() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let period_s = plain[0].period.as_secs_f64();
         let parts = |f: fn(&Inertia) -> [f64; 3]| -> Vec<[f64; 3]> {
@@ -140,7 +140,8 @@ mod tests {
                     let n = (means.len() - 1) as f64;
                     let variance = squares / n / 2.0;
                     let wanted = density * density / (period_s * length as f64);
-                    // Neighbouring differences share a mean, so the estimate's variance is 3/n of its square.
+                    // Neighbouring differences share a mean. The variance of the estimate, relative to its square, is
+                    // therefore 3/n.
                     let off = variance / wanted - 1.0;
                     assert!(off.abs() < 5.0 * math::sqrt(3.0 / n), "{length} {axis}: {off}");
                 }
@@ -149,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn attitudes_scatter_about_each_axis() {
+    fn attitude_noise_has_the_given_strength_about_each_axis() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let mut squares = [0.0; 3];
         for (plain, noisy) in plain.iter().zip(&noisy) {
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_noise_is_refused() {
+    fn time_slice_length_changes_nothing_and_zero_noise_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_noise]\n").contains("or accel_mps2_rthz or attitude_deg must not be"));
     }

@@ -54,7 +54,7 @@ const APART_M: f64 = 70.0;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
-    /// Heads with the same number share a frequency.
+    /// Number of the group of heads. Heads with the same number share a frequency.
     frequency: usize,
     share: f64,
     margin_rad: Option<f64>,
@@ -166,14 +166,14 @@ struct Ear<'a> {
     ray: &'a Ray,
     stopped: bool,
     step: u64,
-    /// Range limits between which a sound is taken as the echo, m.
+    /// Least and largest range at which the head takes a sound as its echo, m.
     within_m: [f64; 2],
-    /// Whether another head's ping has been heard.
+    /// Whether this head has taken another head's ping as its echo.
     heard: bool,
 }
 
 impl Ear<'_> {
-    /// Listens for another head's pings.
+    /// Listens for the pings of another head.
     fn hear(&mut self, other: u64, sounds: &Hears) {
         let apart_m = (sounds.spec.mount.position + -self.hears.spec.mount.position).norm();
         if apart_m <= sounds.spec.body.radius_m.max(self.hears.spec.body.radius_m) {
@@ -225,7 +225,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this range arrives before all other sounds, and not below the least range.
+    /// Whether a sound at this range arrives before all other sounds, and the range is at least the least range.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }

@@ -1,4 +1,4 @@
-//! Keys that several effects share.
+//! Reads keys that the tables of several effects have.
 
 use std::ops::RangeInclusive;
 
@@ -41,7 +41,7 @@ pub(super) fn or_zero(
     Ok(table.number(key, allowed)?.unwrap_or(0.0))
 }
 
-/// Checks that an effect changes something.
+/// Checks that at least one of an effect's keys isn't zero, so that the effect changes something.
 ///
 /// Errors: all of these keys are zero or absent.
 pub(super) fn some_not_zero(table: &Section<'_>, values: &[(&'static str, f64)]) -> Result<(), ConfigError> {

@@ -1,4 +1,4 @@
-//! Delay of messages.
+//! Delay of messages from devices.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// The quantities that sensors measure.
+/// Quantities whose sensors may have delayed messages.
 pub(super) const SENSES: [Sense; 6] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
 
@@ -131,7 +131,7 @@ mod tests {
     /// Messages are far apart, so that none delays the next one. Mean and variance of the delay are then those of an
     /// exponential distribution.
     #[test]
-    fn jitter_is_exponential() {
+    fn message_delay_jitter_is_exponentially_distributed() {
         let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };
         let stream = Stream::new(4, "line_delay", "head");
         let mut delay = LineDelay { parameters, stream, received: 0, last: MonoNs(0) };
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_delay_is_refused() {
+    fn time_slice_length_changes_nothing_and_zero_delay_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.line_delay]\n").contains("or jitter_ms must not be zero"));
     }

@@ -18,15 +18,16 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of a tunnel stretch, m. A stretch contains at most one random disturbance.
+/// Length of the stretches into which the tunnel is divided, m. Each contains at most one random disturbance.
 const CELL_M: f64 = 1.0;
 
 /// Steel turns the attitude of an inertial unit about the vertical.
 ///
 /// The turn is a raised cosine of the vehicle's chainage, largest in the middle of the disturbance. `places` are tables
 /// of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds disturbances at random
-/// places, each `length_m` long (5 by default). Their angles are drawn evenly, up to `up_to_deg` (10 by default) either
-/// way. Disturbances belong to the tunnel: all units see the same disturbances. Overlapping disturbances add up.
+/// places, each `length_m` long (5 by default). Their angles are uniformly distributed, up to `up_to_deg` (10 by
+/// default) either way. Disturbances belong to the tunnel: all units see the same disturbances. Overlapping
+/// disturbances add up.
 pub(super) struct MagneticDisturbanceKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -217,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_and_incomplete_places_are_refused() {
+    fn disturbances_with_missing_or_incomplete_places_are_refused() {
         let why = |keys: &str| refusal(&format!("[effects.magnetic_disturbance]\n{keys}"));
         assert!(why("up_to_deg = 5").contains("or places must not be zero"));
         assert!(why("places = [{ chainage_m = 3, deg = 2 }]").contains("places[0].length_m: is missing"));

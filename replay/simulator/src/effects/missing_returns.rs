@@ -25,7 +25,7 @@ use crate::stages::Stage;
 /// The three parts are independent of each other, and at least one is required. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which returns are lost.
 /// - `share`, the share of pings lost at random, from 0 to 0.95 (0). `mean_run`, the mean number of consecutive lost
-///   pings, to 10,000. It is at least 1 and at least share / (1 - share). The default 1 / (1 - share) makes pings
+///   pings, up to 10,000. It is at least 1 and at least share / (1 - share). The default 1 / (1 - share) makes pings
 ///   independent.
 /// - `grazing_from_deg` and `grazing_to_deg`, the incidence above which some pings are lost, and the incidence from
 ///   which all are lost; from 0, perpendicular to the wall, to 90.
@@ -54,7 +54,7 @@ struct Ramp {
 struct MissingReturns {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the last ping was lost in a run; `None` before the first ping.
+    /// Whether the last ping was lost as part of a run; `None` before the first ping.
     in_run: Option<bool>,
 }
 
@@ -134,7 +134,7 @@ impl Parameters {
     }
 }
 
-/// The echo of a ping before this effect.
+/// The echo of a ping before this effect removes any.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
     range_m: Option<f64>,
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn share_of_independent_losses_is_as_given() {
+    fn share_of_independently_lost_returns_is_as_configured() {
         let dive = Dive { seconds: 500.0, ..Dive::with_head() };
         let lost = lost(&dive, "share = 0.3");
         assert_share(lost.iter().filter(|lost| **lost).count(), lost.len(), 0.3);
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_length_ramp_loses_far_walls_sharply() {
+    fn loss_ramp_of_zero_length_is_a_sharp_edge() {
         let dive = Dive::with_head();
         let base = dive.dive("").ranges_m(0);
         let lost = lost(&dive, "far_from_m = 3\nfar_to_m = 3");
@@ -237,12 +237,12 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.missing_returns]\nshare = 0.3\nmean_run = 20");
     }
 
     #[test]
-    fn impossible_losses_are_refused() {
+    fn impossible_parameters_of_lost_returns_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.missing_returns]\n{keys}"));
         assert!(refusal("").contains("must be above zero, or"));
         assert!(refusal("share = 0.99").contains("from 0 to 0.95"));

@@ -61,24 +61,24 @@ pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order in the scene.
 pub const KINDS: [&dyn EffectKind; 38] = [
-    // Differences of the vehicle from its file.
+    // Effects that make the vehicle differ from its file.
     &mount_error::MountErrorKind,
-    // Turning of heads, and the pose from which heads look.
+    // Effects on the turning of heads, and on the pose from which heads look.
     &start_phase_error::StartPhaseErrorKind,
     &sector_end_slowing::SectorEndSlowingKind,
     &skipped_steps::SkippedStepsKind,
     &head_stalls::HeadStallsKind,
     &motion_within_turn::MotionWithinTurnKind,
-    // Objects that a beam meets: wall and obstacles.
+    // Effects on the objects that a beam meets: wall and obstacles.
     &beam_cone::BeamConeKind,
     &occlusion::OcclusionKind,
-    // Paths of sound.
+    // Effects on the paths of sound.
     &echo_strength::EchoStrengthKind,
     &multipath::MultipathKind,
     &side_lobes::SideLobesKind,
     &interference::InterferenceKind,
     &near_returns::NearReturnsKind,
-    // Processing in the sonar.
+    // Effects of the processing in the sonar.
     &missing_returns::MissingReturnsKind,
     &outliers::OutliersKind,
     &stuck_range::StuckRangeKind,
@@ -86,10 +86,10 @@ pub const KINDS: [&dyn EffectKind; 38] = [
     &sound_speed_profile::SoundSpeedProfileKind,
     &range_noise::RangeNoiseKind,
     &range_quantisation::RangeQuantisationKind,
-    // The vehicle's trajectory.
+    // Effects on the vehicle's trajectory.
     &current::CurrentKind,
     &pilot_drift::PilotDriftKind,
-    // Depth and motion.
+    // Effects on depth sensors and inertial units.
     &depth_noise::DepthNoiseKind,
     &depth_steps::DepthStepsKind,
     &imu_noise::ImuNoiseKind,
@@ -97,15 +97,15 @@ pub const KINDS: [&dyn EffectKind; 38] = [
     &imu_vibration::ImuVibrationKind,
     &imu_bumps::ImuBumpsKind,
     &magnetic_disturbance::MagneticDisturbanceKind,
-    // Cable.
+    // Effects on the cable counter.
     &tether_slack::TetherSlackKind,
     &tether_scale::TetherScaleKind,
     &tether_slip::TetherSlipKind,
     &tether_lag::TetherLagKind,
     &tether_quantum::TetherQuantumKind,
-    // Faults of devices.
+    // Effects that are faults of devices.
     &device_faults::DeviceFaultsKind,
-    // Clocks and lines.
+    // Effects on the clocks of devices and on the lines to them.
     &clock_drift::ClockDriftKind,
     &line_delay::LineDelayKind,
     &byte_errors::ByteErrorsKind,
@@ -137,12 +137,12 @@ pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named
 }
 
 impl Named {
-    /// Whether the effect of this name is among the effects.
+    /// Whether the list contains the effect of this name.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.0.iter().any(|(kind, _)| kind.name() == name)
     }
 
-    /// Adds the effects of a text of tables. None of these effects may be present already.
+    /// Adds the effects of the `[effects]` tables in a TOML text. None of these effects may be present already.
     ///
     /// Errors: see [`EffectKind::read`].
     pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {

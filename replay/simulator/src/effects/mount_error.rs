@@ -15,8 +15,8 @@ use crate::sensing::Mounted;
 /// A sensor's true mount differs from the mount in the vehicle file. The loop uses the vehicle file.
 ///
 /// `position_m` and `angles_deg` (roll, pitch and yaw, applied before the file's angles) are added to the mounts of all
-/// named sensors. `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of additional errors,
-/// which are drawn for each axis and sensor. When a head occludes others, its position is that of the file.
+/// named sensors. `position_sd_m`, up to 1, and `angles_sd_deg`, up to 30, are the standard deviations of additional
+/// errors, which are drawn for each axis and sensor. When a head occludes others, its position is that of the file.
 pub(super) struct MountErrorKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -138,8 +138,8 @@ mod tests {
         assert!(pairs.abs() < 5e-4 / math::sqrt(n / 2.0), "{pairs}");
     }
 
-    /// Roll turns a beam that is perpendicular to the head's axis within its plane. Pitch and yaw turn it out of the
-    /// plane.
+    /// A beam is perpendicular to the head's axis. Roll turns the beam within its plane of turning; pitch and yaw turn
+    /// it out of this plane.
     #[test]
     fn mount_angle_errors_have_the_given_spread_about_each_axis() {
         let sd_rad = f64::to_radians(0.5);
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_zero_error_is_refused() {
+    fn time_slice_length_changes_nothing_and_zero_error_is_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.mount_error]\nangles_sd_deg = 2");
         let refusal = Dive::with_head().refusal("[effects.mount_error]");
         assert!(refusal.contains("or angles_sd_deg must not be zero"), "{refusal}");

@@ -26,8 +26,9 @@ use crate::stages::Stage;
 ///
 /// Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
-/// - `square_share` (0) and `share` (0.1), the shares of returns for a beam perpendicular to the wall and for a beam
-///   along the wall, both from 0 to 1. In between, the share grows with 1 minus the cosine of incidence.
+/// - `square_share` (0) and `share` (0.1), the shares of returns that arrive by this path, for a beam perpendicular to
+///   the wall and for a beam along the wall. Both are from 0 to 1. In between, the share grows with 1 minus the cosine
+///   of incidence.
 ///
 /// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see that wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
@@ -132,7 +133,7 @@ mod tests {
     /// If the room is mirrored at each wall that the beam meets, the reflected beam becomes a straight line through
     /// mirrored rooms.
     #[test]
-    fn second_path_in_a_rectangle_matches_its_mirror_image() {
+    fn double_reflection_in_a_rectangle_matches_mirrored_rooms() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
         let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
@@ -146,7 +147,7 @@ mod tests {
                 [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
             crossings.sort_by(f64::total_cmp);
             let along_m = crossings[1];
-            // The second point of reflection, folded back into the room.
+            // The second point at which the wall reflects the beam, folded back into the room.
             let fold = |at: f64, period: f64| {
                 let at = math::wrap(at, 2.0 * period);
                 if at > period { 2.0 * period - at } else { at }
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn second_path_in_a_circle_is_a_chord_with_equal_incidence() {
+    fn double_reflection_in_a_circle_is_a_chord_with_equal_incidence() {
         let (radius_m, out_m) = (4.0, 1.5);
         let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
         // The circle rests on the floor, so its centre is a radius above the floor.
@@ -172,8 +173,8 @@ mod tests {
             let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
             let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
             let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();
-            // The path from the second point back to the sonar follows from the law of cosines, with twice the
-            // incidence between beam and chord.
+            // The path from the second point back to the sonar follows from the law of cosines. The angle between beam
+            // and chord is twice the incidence.
             let cosine = math::cos(2.0 * incidence_rad);
             let back_m = math::sqrt(first_m * first_m + chord_m * chord_m - 2.0 * first_m * chord_m * cosine);
             let found_m = double_bounce_m(&pipe, &ray, 100.0).unwrap();
@@ -206,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.multipath]\nshare = 0.5");
     }
 

@@ -23,7 +23,8 @@ use crate::stages::Stage;
 /// - `from_m` and `to_m` of the stretch in which this happens.
 /// - `share`, the share of pings that hit a cluster, from 0 (excluded) to 0.95. `mean_run`, the mean number of
 ///   consecutive pings that hit a cluster, as in missing_returns.
-/// - `near_m` (0.6) and `far_m` (3), the ranges between which a cluster lies, drawn evenly, from 0 to 200 m.
+/// - `near_m` (0.6) and `far_m` (3), the least and the largest range of a cluster, each from 0 to 200 m. Ranges of
+///   clusters are uniformly distributed.
 /// - `spread_m` (0.1), the standard deviation of the returns about the cluster's range.
 ///
 /// A cluster beyond the wall gives no return. Source: docs/why/field.md, "murk": 5 % near returns. Runs: see
@@ -140,7 +141,7 @@ mod tests {
 
     /// The pings of a run share one range, with the given spread. The next run has another range.
     #[test]
-    fn clusters_have_the_given_share_run_length_and_spread() {
+    fn near_return_clusters_have_the_given_share_run_length_and_spread() {
         let (share, mean) = (0.1, 6.0);
         let near = near("share = 0.1\nmean_run = 6\nnear_m = 0.8\nfar_m = 2\nspread_m = 0.05");
         let runs: Vec<Vec<f64>> = near
@@ -156,8 +157,8 @@ mod tests {
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         assert!((pings / whole - share).abs() < 5.0 * math::sqrt(variance), "{}", pings / whole);
 
-        // Within a run, the variance is the square of the spread. The means of the runs vary slightly more than evenly
-        // distributed ranges.
+        // Within a run, the variance is the square of the spread. The means of the runs vary slightly more than
+        // uniformly distributed ranges.
         let long: Vec<&Vec<f64>> = runs.iter().filter(|run| run.len() > 1).collect();
         let (mut within, mut freedom, mut means) = (0.0, 0.0, Vec::new());
         for run in &long {
@@ -185,7 +186,7 @@ mod tests {
         assert!(with.iter().all(|range_m| range_m.unwrap() <= wall_m));
         let nearer = with.iter().filter(|range_m| range_m.unwrap() < wall_m).count();
         // The pings of a run hit the same cluster. A run has 1 / (1 - share) pings on average, which increases the
-        // spread.
+        // standard deviation of the count.
         let share = 0.4 * (wall_m - 2.0) / 2.0;
         let sd = math::sqrt(share * (1.0 - share) / base.len() as f64 * 2.0 / (1.0 - 0.4));
         assert!((nearer as f64 / base.len() as f64 - share).abs() < 5.0 * sd, "{nearer} of {}", base.len());
@@ -225,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.near_returns]\n{keys}"));
         assert!(refusal("").contains("share: must be above zero"));

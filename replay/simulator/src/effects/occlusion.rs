@@ -47,7 +47,7 @@ struct Occlusion {
 pub(super) struct Stopped(Vec<bool>);
 
 impl Stopped {
-    /// Whether a sample's beam is stopped; false for a sonar without this effect.
+    /// Whether a part of the vehicle stops the beam of a sample; false for a sonar without this effect.
     pub(super) fn has(stopped: Option<&Self>, sample: usize) -> bool {
         stopped.and_then(|stopped| stopped.0.get(sample)).copied().unwrap_or(false)
     }
@@ -122,7 +122,7 @@ impl Parameters {
 }
 
 impl Occlusion {
-    /// Range of the first obstacle on a beam, m.
+    /// Range of the first obstacle that a beam meets, m.
     fn range_m(&self, mount: &Mount, direction: Vec3<Body>) -> Option<f64> {
         let entered =
             self.obstacles.iter().filter_map(|obstacle| obstacle.enters_m(mount.position, direction));
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbour_hides_twice_the_arcsine_of_radius_over_distance() {
+    fn neighbour_occludes_an_angle_of_two_asin_radius_over_distance() {
         let dive = side_by_side();
         let scene = dive.scene("").unwrap();
         let radius_m = scene.facts.sensors[1].head.unwrap().body.radius_m;
@@ -171,7 +171,7 @@ mod tests {
             // The neighbour is to the right of the head, at 270 degrees.
             let off_rad = math::wrap_signed(angle_rad - 1.5 * math::PI, math::TAU);
             if off_rad.abs() < half_rad {
-                // Nearest point on a circle of this radius, whose centre is 0.3 m away.
+                // Range at which the beam meets a circle of this radius, whose centre is 0.3 m away.
                 let across_m = 0.3 * math::sin(off_rad);
                 let depth_m = math::sqrt(radius_m * radius_m - across_m * across_m);
                 let near_m = 0.3 * math::cos(off_rad) - depth_m;
@@ -186,13 +186,13 @@ mod tests {
     }
 
     #[test]
-    fn heads_in_one_place_hide_nothing() {
+    fn heads_in_one_place_do_not_occlude_each_other() {
         let dive = Dive::with_heads(&[[0.0; 3], [0.0; 3]]);
         assert_eq!(dive.dive("").messages, dive.dive("[effects.occlusion]").messages);
     }
 
     #[test]
-    fn hull_and_tether_hide_only_if_enabled() {
+    fn hull_and_tether_occlude_only_if_enabled() {
         let below = Dive {
             vehicle: "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]",
             ..Dive::with_head()
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         side_by_side().assert_slices_dont_matter("[effects.occlusion]");
     }
 

@@ -1,4 +1,4 @@
-//! Returns that are unrelated to the wall.
+//! Outliers: returns that are unrelated to the wall.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -27,7 +27,7 @@ use crate::stages::Stage;
 /// scan.
 pub(super) struct OutliersKind;
 
-/// The farthest range of an echosounder, m.
+/// Farthest range of an echosounder's outliers by default, m.
 const ECHOSOUNDER_FAR_M: f64 = 30.0;
 
 #[derive(Debug, Clone, Copy)]
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_sounder().assert_slices_dont_matter("[effects.outliers]");
     }
 

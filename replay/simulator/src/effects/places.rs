@@ -1,4 +1,4 @@
-//! The stretches of tunnel in which an effect acts.
+//! The stretches of the tunnel in which an effect acts on each sensor.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -75,12 +75,12 @@ impl<P> Places<P> {
         self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)).map(|(_, parameters)| parameters)
     }
 
-    /// Returns the same stretches with converted parameters.
+    /// Returns the same stretches, with the effect's parameters converted by `how`.
     pub(super) fn map<Q>(&self, mut how: impl FnMut(&P) -> Q) -> Places<Q> {
         Places(self.0.iter().map(|(stretch, parameters)| (*stretch, how(parameters))).collect())
     }
 
-    /// All parameters, in the order of the scene.
+    /// Parameters of the effect in all stretches and for all sensors, in the order of the scene.
     pub(super) fn all(&self) -> impl Iterator<Item = &P> {
         self.0.iter().map(|(_, parameters)| parameters)
     }
@@ -133,9 +133,9 @@ mod tests {
         }
     }
 
-    /// A step draws the same random numbers in a stretch as in the whole tunnel.
+    /// At each step, an effect uses the same random numbers in a stretch as in the whole tunnel.
     #[test]
-    fn stretches_that_cover_the_tunnel_equal_the_whole_tunnel() {
+    fn effect_in_adjacent_stretches_equals_the_effect_in_the_whole_tunnel() {
         let dive = Dive { seconds: 40.0, ..Dive::with_head() };
         for effect in
             ["outliers]]\nshare = 0.4\n", "range_noise]]\nsd_m = 0.1\n", "missing_returns]]\nshare = 0.2\n"]

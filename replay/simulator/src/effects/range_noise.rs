@@ -1,4 +1,4 @@
-//! Noise of ranges.
+//! Noise of measured ranges.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -74,7 +74,7 @@ fn scatter(
             let Some(Parameters { sd_m, sd_share }) = noise.places.here(&scenery, ray) else { continue };
             if let Some(range_m) = &mut sounding.range_m {
                 let [by, _] = noise.stream.at(step).normal();
-                // A range is never negative.
+                // A range with noise is never negative.
                 *range_m = (*range_m + by * (sd_m + sd_share * *range_m)).max(0.0);
             }
         }

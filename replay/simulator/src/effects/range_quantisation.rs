@@ -1,4 +1,4 @@
-//! Quantisation of ranges.
+//! Quantisation of measured ranges.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -77,7 +77,7 @@ impl Effect for PerSensor<Step> {
 }
 
 impl Step {
-    /// The step, converted to metres of water.
+    /// Step to which ranges are rounded, converted from the device's metres to metres of water.
     fn in_water_m(self, head: Option<&Head>, sound_speed_mps: f64) -> f64 {
         let water_per_device = head.map_or(1.0, |Head(spec)| sound_speed_mps / spec.sound_speed_mps);
         let quantum_m = match self {
@@ -129,19 +129,19 @@ mod tests {
     }
 
     #[test]
-    fn echosounder_steps_are_metres_of_water() {
+    fn echosounder_steps_are_in_metres_of_water() {
         let mut dive = Dive::with_sounder();
         dive.trajectory = "place_m = [0.123, 2]";
         assert_lattice(&dive, "[effects.range_quantisation]\nquantum_m = 0.15", 0.15);
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.range_quantisation]");
     }
 
     #[test]
-    fn missing_and_conflicting_steps_are_refused() {
+    fn missing_and_conflicting_quantisation_steps_are_refused() {
         let refusal =
             |dive: &Dive, keys: &str| dive.refusal(&format!("[effects.range_quantisation]\n{keys}"));
         assert!(refusal(&Dive::with_sounder(), "").contains("no range setting"));

@@ -1,4 +1,4 @@
-//! Selects pings, either singly or in runs.
+//! Selects random pings, either singly or in runs of consecutive pings.
 
 use headrace_config::{ConfigError, Section};
 
@@ -11,7 +11,7 @@ const LONGEST_RUN: f64 = 10_000.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Runs {
     share: f64,
-    /// Probability that a run begins with the next ping.
+    /// Probability that a run begins with the next ping, if the last ping is in no run.
     begin: f64,
     /// Probability that a run continues with the next ping.
     go_on: f64,
@@ -44,7 +44,7 @@ impl Runs {
         Ok(Some(Self::new(share, mean.unwrap_or(1.0 / (1.0 - share)))))
     }
 
-    /// State of the next ping, from the state of the last ping and a random number between 0 and 1.
+    /// Whether the next ping is in a run, from the same state of the last ping and a random number between 0 and 1.
     ///
     /// The probability that the first ping is in a run equals the share.
     pub(super) fn next(&self, before: Option<bool>, chance: f64) -> bool {
@@ -56,7 +56,7 @@ impl Runs {
         chance < in_run
     }
 
-    /// Correlation between the states of consecutive pings.
+    /// Correlation of being in a run between consecutive pings.
     #[cfg(test)]
     pub(super) fn correlation(&self) -> f64 {
         self.go_on - self.begin

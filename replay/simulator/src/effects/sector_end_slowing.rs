@@ -33,7 +33,7 @@ struct Parameters {
 struct SectorEndSlowing {
     lag_s: f64,
     commanded: Option<(MonoNs, f64)>,
-    /// Lag of the head behind its command, radians.
+    /// Current lag of the head behind its command, radians.
     behind_rad: f64,
 }
 
@@ -127,10 +127,10 @@ mod tests {
         }
     }
 
-    /// Long after the previous reversal, the head moves at w (2 exp(-t / T) - 1) after a reversal of the command. The
-    /// head itself therefore reverses T ln 2 later.
+    /// The command reverses at time 0, long after its previous reversal. The head then moves at w (2 exp(-t / T) - 1),
+    /// and reverses at T ln 2.
     #[test]
-    fn steps_are_short_at_reversals_and_whole_between() {
+    fn head_steps_are_short_at_reversals_and_full_elsewhere() {
         let (plain, slowed) = (pings(""), pings(KEYS));
         let step_rad = turned(&plain[0], &plain[1]).abs();
         let period_s = between_s(&plain[0], &plain[1]);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_heads_without_a_sector_are_refused() {
+    fn time_slice_length_changes_nothing_and_heads_without_a_sector_are_refused() {
         same_in_any_slices(&Bench::sectors(KEYS));
         let why = refusal("[effects.sector_end_slowing]\n");
         assert!(why.contains("none of its heads turns in a sector"), "{why}");

@@ -33,7 +33,7 @@ use crate::stages::Stage;
 /// the beam itself away.
 pub(super) struct SideLobesKind;
 
-/// Angle from the beam's axis to the first side lobe, in full widths of the beam.
+/// Angle from the beam's axis to the first side lobe, as a multiple of the beam's full width.
 const LOBE_WIDTHS: f64 = 5.136 / 1.616 / 2.0;
 /// Full width of an echosounder's beam, degrees; see the effect beam_cone.
 const ECHOSOUNDER_DEG: f64 = 30.0;
@@ -133,7 +133,7 @@ mod tests {
     use crate::testing::{Dive, assert_share};
 
     #[test]
-    fn inner_lobe_of_oblique_beam_is_heard() {
+    fn inner_side_lobe_of_oblique_beam_is_heard() {
         let dive = Dive::with_head();
         let effects = "[effects.side_lobes]\nangle_deg = 8\nshare = 1";
         let lobe_rad = f64::to_radians(8.0);
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.side_lobes]\nshare = 0.5");
     }
 

@@ -1,4 +1,4 @@
-//! Error of the configured speed of sound.
+//! Difference of the true speed of sound from the configured one.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -22,7 +22,7 @@ pub(super) struct SoundSpeedErrorKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
-    /// Ratio of reported range to true range.
+    /// Ratio of a reported range to the true range.
     scale: f64,
 }
 
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_error]\nshare = 0.01");
     }
 

@@ -1,4 +1,4 @@
-//! Speed of sound that changes with height.
+//! Speed of sound that changes with height in the tunnel.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -28,14 +28,14 @@ use crate::stages::Stage;
 /// in a constant gradient).
 pub(super) struct SoundSpeedProfileKind;
 
-/// Relative differences of speed below this count as zero.
+/// Relative differences between speeds of sound below this count as zero.
 const SAME: f64 = 1e-9;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
     floor_mps: f64,
     per_metre_mps: f64,
-    /// The vehicle file's speed of sound, m/s.
+    /// Speed of sound in the vehicle file, m/s.
     assumed_mps: f64,
 }
 
@@ -81,7 +81,8 @@ impl Effect for PerSensor<Places<Parameters>> {
 impl Parameters {
     /// Ratio of reported to true range for an echo from one height to another.
     fn scale(&self, from_z_m: f64, to_z_m: f64) -> f64 {
-        // The speed is never less than a third of the speed at the floor, however deep a hollow is.
+        // Far above or below the floor, the linear speed could fall to zero. It is kept above a third of the speed at
+        // the floor.
         let at_mps = |z_m: f64| (self.floor_mps + self.per_metre_mps * z_m).max(self.floor_mps / 3.0);
         let [from_mps, to_mps] = [from_z_m, to_z_m].map(at_mps);
         let faster = to_mps / from_mps - 1.0;
@@ -149,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
         assert!(refusal.contains("or per_metre_mps is needed"), "{refusal}");

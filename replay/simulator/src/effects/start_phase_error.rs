@@ -1,4 +1,4 @@
-//! Errors of the heads' start phases.
+//! Errors of the phases at which heads start to turn.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
@@ -13,13 +13,13 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
 
-/// Each head starts off its program's phase and reports its true angle.
+/// Each head starts at a phase other than its program's, and reports its true angle.
 ///
 /// A head that turns continuously starts at another angle. A head in a sector keeps its sector and starts at another
-/// point of its sweep. With `max_deg`, the angle is drawn evenly up to this value either way. With `sd_deg`, it is
-/// drawn normally. `offsets_deg` gives the angles, one for each head of the table, in order. Without any of these keys,
-/// `max_deg` is 180. In a sector the angle is a fraction of the sweep: 360 degrees are one sweep there and back.
-/// Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
+/// point of its sweep. With `max_deg`, the angle is uniformly distributed up to this value either way. With `sd_deg`,
+/// it is normally distributed. `offsets_deg` gives the angles, one for each head of the table, in order. Without any of
+/// these keys, `max_deg` is 180. In a sector the angle is a fraction of the sweep: 360 degrees are one sweep there and
+/// back. Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
 pub(super) struct StartPhaseErrorKind;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -93,7 +93,7 @@ fn begun_off(program: HeadProgram, off_rad: f64) -> HeadProgram {
         return HeadProgram { start_rad: program.start_rad + off_rad, ..program };
     };
     let above_rad = program.start_rad - least_rad;
-    // Position in the sweep: up to `size_rad` the head moves upwards, and then back.
+    // Position in the sweep there and back: the head's angle grows up to `size_rad`, and then falls.
     let along_rad = if program.growing { above_rad } else { 2.0 * size_rad - above_rad };
     let along_rad = math::wrap(along_rad + off_rad / TAU * 2.0 * size_rad, 2.0 * size_rad);
     let growing = along_rad < size_rad;
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn sector_is_kept_and_starts_elsewhere() {
+    fn phase_error_shifts_the_start_within_an_unchanged_sector() {
         let program = HeadProgram { start_rad: 1.0, growing: true, sector: Some((1.0, 2.0)) };
         let begun = |off_deg: f64| {
             let HeadProgram { start_rad, growing, sector } = begun_off(program, off_deg.to_radians());
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn drawn_angles_follow_their_distribution() {
+    fn random_start_angles_follow_their_distribution() {
         let count = 20_000_u64;
         let angles = |offset: Offset| {
             let draw = |seed| offset.rad(0, Stream::new(seed, "start_phase_error", "head"));

@@ -85,7 +85,7 @@ mod tests {
     use crate::testing::Dive;
 
     #[test]
-    fn stuck_range_is_constant_within_its_times_and_true_otherwise() {
+    fn stuck_range_is_constant_from_start_to_end_and_true_otherwise() {
         let dive = Dive { seconds: 30.0, ..Dive::with_head() };
         let effect = "[effects.stuck_range]\nrange_m = 0.7\nfrom_s = 10\nto_s = 20";
         let (base, dived) = (dive.dive(""), dive.dive(effect));
@@ -97,12 +97,12 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_does_not_change_results() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.stuck_range]\nfrom_s = 2");
     }
 
     #[test]
-    fn invalid_times_are_refused() {
+    fn stuck_range_that_ends_before_its_start_is_refused() {
         let refusal = Dive::with_head().refusal("[effects.stuck_range]\nfrom_s = 5\nto_s = 4");
         assert!(refusal.contains("must be above from_s"));
     }

@@ -1,4 +1,4 @@
-//! Combinations of effects.
+//! Tests of combinations of effects.
 
 mod motion;
 mod sonar;

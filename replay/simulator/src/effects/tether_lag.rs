@@ -30,14 +30,14 @@ struct Parameters {
 #[derive(Component)]
 struct TetherLag {
     parameters: Parameters,
-    /// Time and value of the last count.
+    /// Time and value of the cable counter's last reading.
     counted: Option<(MonoNs, f64)>,
     winding: bool,
 }
 
 impl EffectKind for TetherLagKind {
     fn name(&self) -> &'static str {
-        // Key in scenes and name of the random stream.
+        // This name is the effect's key in scenes and the name of its random stream.
         "late_winding"
     }
 
@@ -102,9 +102,10 @@ mod tests {
         TetherLag { parameters, counted: None, winding: false }
     }
 
-    /// At a steady speed v, a standstill of h / v is followed by a burst of h / (w - v). The mean lag is half of h.
+    /// With hold distance h, vehicle speed v and drum speed w, the drum stands still for h / v, and then winds for h
+    /// / (w - v). The mean lag is half of h.
     #[test]
-    fn count_is_a_sawtooth_at_steady_speed() {
+    fn cable_count_lags_in_a_sawtooth_at_steady_vehicle_speed() {
         let (mut winding, period_s) = (winding(), 0.01);
         let counts: Vec<f64> = (0..100_000)
             .map(|k| {
@@ -115,7 +116,7 @@ mod tests {
         let lag = |k: usize| 0.2 * k as f64 * period_s - counts[k];
         assert!((0..counts.len()).all(|k| (-1e-9..=0.502 + 1e-9).contains(&lag(k))));
         let moving = counts.windows(2).filter(|w| w[1] > w[0]).count() as f64 / counts.len() as f64;
-        // The drum winds for a share v / w of the time.
+        // The drum winds for a share v / w of the time: the vehicle's speed divided by the drum's.
         assert!((moving - 0.2 / 0.6).abs() < 0.01, "{moving}");
         let mean_m = (0..counts.len()).map(lag).sum::<f64>() / counts.len() as f64;
         assert!((mean_m - 0.25).abs() < 0.01, "{mean_m}");
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn count_is_constant_within_the_threshold_and_lags_equally_in_both_directions() {
+    fn cable_count_is_constant_within_the_threshold_and_lags_equally_both_ways() {
         let mut winding = winding();
         for k in 0..1000 {
             let travelled_m = 3.0 + 0.49 * math::sin(f64::from(k) * 0.05);
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.late_winding]\nhold_m = 0.2\n"));
         assert!(refusal("[effects.late_winding]\nspeed_mps = 0\n").contains("from 0.01 to 5"));
     }

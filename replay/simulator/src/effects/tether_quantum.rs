@@ -1,4 +1,4 @@
-//! Quantisation of the cable counter.
+//! Quantisation of the cable counter's readings.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -69,7 +69,7 @@ mod tests {
     use crate::testing_motion::Bench;
 
     #[test]
-    fn counter_readings_are_whole_steps_with_uniform_rounding_errors() {
+    fn cable_counter_readings_are_whole_steps_with_uniform_rounding_errors() {
         let plain: Vec<Payout> = Bench::long("").run("tether");
         let stepped: Vec<Payout> = Bench::long("[effects.tether_quantum]\nquantum_m = 0.05\n").run("tether");
         let mut squares = 0.0;

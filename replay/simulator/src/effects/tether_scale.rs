@@ -29,7 +29,7 @@ pub(super) struct TetherScaleKind;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Parameters {
     share: f64,
-    /// Strain per metre of cable out, 1/m.
+    /// Mean strain of the cable per metre of cable out, 1/m.
     strain_pm: f64,
 }
 
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn too_small_wheel_counts_too_much() {
+    fn cable_counter_with_too_small_a_wheel_counts_too_much() {
         let (plain, off) = (counts(""), counts("[effects.tether_scale]\nshare = 0.005\n"));
         assert!(plain.len() > 100);
         assert!(plain.iter().zip(&off).all(|(is, counted)| (counted / is - 1.005).abs() < 1e-12));
@@ -113,7 +113,8 @@ mod tests {
             let rod_m = counted_m / f64::from(rods);
             let mut reach_m = 0.0;
             for rod in 0..rods {
-                // The middle of this rod carries the drag on all rods nearer to the wheel.
+                // The middle of this rod bears the drag on all rods nearer to the wheel, so it sets the rod's mean
+                // tension.
                 let tension_n = drag_npm * (f64::from(rod) + 0.5) * rod_m;
                 reach_m += rod_m * (1.0 + tension_n / stiffness_n);
             }
@@ -128,7 +129,7 @@ mod tests {
 
     /// If the scene gives no drag, the drag is 0.05 N/m. The mean tension is half of the total drag.
     #[test]
-    fn stiffness_and_drag_keys_set_the_stretch() {
+    fn stiffness_and_drag_keys_set_the_cable_strain() {
         let plain = counts("");
         for (keys, strain_pm) in
             [("stiffness_n = 2000\n", 1.25e-5), ("stiffness_n = 2000\ndrag_npm = 0.4\n", 1e-4)]
@@ -141,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_scale]\nshare = -0.01\nstiffness_n = 5e4\n"));
         assert!(refusal("[effects.tether_scale]\n").contains("share: or stiffness_n must not be zero"));
         assert!(refusal("[effects.tether_scale]\ndrag_npm = 1\n").contains("only with stiffness_n"));

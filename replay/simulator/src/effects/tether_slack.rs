@@ -1,4 +1,4 @@
-//! Slack of the cable that varies.
+//! Slack of the cable that varies during the dive.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -18,10 +18,10 @@ use crate::trajectory::{Knots, wandering};
 
 /// The length of cable out differs from the vehicle's travel by a slack that varies smoothly.
 ///
-/// Slack is relative to its mean, which zeroing the counter removes. The slack can therefore have either sign, although
-/// no cable is shorter than the distance. `reach_m` (0.15 by default) is the largest value either way; the standard
-/// deviation is 0.4 of the reach. `period_s` (30 by default) is the period of the variation. The control points of a
-/// cubic B-spline are half a period apart.
+/// Slack is given relative to its mean, because zeroing the counter removes the mean. The slack can therefore have
+/// either sign, although no cable is shorter than the distance. `reach_m` (0.15 by default) is the largest value either
+/// way; the standard deviation is 0.4 of the reach. `period_s` (30 by default) is the period of the variation. The
+/// control points of a cubic B-spline are half a period apart.
 ///
 /// `swings` are tables of `reach_m` and `period_s`. With each, the cable swings as a sine of full reach and random
 /// phase, even while the vehicle is stationary. If there are swings, the slack varies additionally only if `reach_m` is
@@ -30,7 +30,7 @@ pub(super) struct TetherSlackKind;
 
 #[derive(Debug, Clone)]
 struct Parameters {
-    /// Largest slack, m; 0 if the slack doesn't vary.
+    /// Largest slack of the cable, m; 0 if the slack doesn't vary.
     reach_m: f64,
     period_s: f64,
     swings: Vec<Swing>,
@@ -48,7 +48,7 @@ const PHASES: u64 = u64::MAX;
 #[derive(Component)]
 struct TetherSlack {
     slack: Knots,
-    /// Swings with their phases, radians.
+    /// Swings of the cable with their phases, radians.
     swings: Vec<(Swing, f64)>,
 }
 
@@ -88,7 +88,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Reads a swing.
+/// Reads one of the tables `swings`.
 fn swing(table: Section<'_>) -> Result<Swing, ConfigError> {
     let needed = |key, allowed| table.number(key, allowed).and_then(|number| table.required(key, number));
     let swing =
@@ -129,7 +129,7 @@ mod tests {
         };
         assert_eq!(plain[25].at.since(plain[0].at).0, 500_000_000);
         let variance = product(0);
-        // The tolerance allows for some 600 independent stretches.
+        // The tolerance is that of a standard deviation from some 600 independent values.
         assert!((math::sqrt(variance) / (0.15 * 0.3997) - 1.0).abs() < 0.1, "{variance}");
         // Source: the autocorrelation of the cubic B-spline, 2416 : 1191 : 120 : 1 at 0, 1, 2, 3 spacings.
         for (spacings, wanted) in [(1, 1191.0), (2, 120.0), (3, 1.0), (4, 0.0)] {
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_other_sensors_are_refused() {
+    fn time_slice_length_changes_nothing_and_other_sensors_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_slack]\n"));
         same_in_any_slices(&Bench::turning(
             "[effects.tether_slack]\nreach_m = 0.1\nswings = [{ reach_m = 0.1, period_s = 7 }]\n",

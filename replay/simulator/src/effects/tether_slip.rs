@@ -15,14 +15,14 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of a stretch of travel, m. The cable slips at most once in each stretch.
+/// Length of the stretches into which the travel is divided, m. The cable slips at most once in each stretch.
 const STRETCH_M: f64 = 1.0;
 
 /// From time to time the cable slips over the counter's wheel. A slip changes the count permanently.
 ///
-/// The cable slips `per_100m` times per hundred metres of travel, forwards or back. The size of a slip is drawn evenly
-/// from `size_m = [least, most]` (0.05 to 0.3 by default), with either sign. Travel is the distance that the vehicle
-/// moves, summed from count to count.
+/// The cable slips `per_100m` times per hundred metres of travel, forwards or back. The size of a slip is uniformly
+/// distributed over `size_m = [least, most]` (0.05 to 0.3 by default), with either sign. Travel is the distance that
+/// the vehicle moves, summed from count to count.
 pub(super) struct TetherSlipKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +38,8 @@ struct TetherSlip {
     at_m: Option<f64>,
     gone_m: f64,
     next_stretch: u64,
-    /// Slip in the current stretch that hasn't happened yet: the travel at which it happens, and its size, m.
+    /// Slip in the current stretch of travel that hasn't happened yet: the travel at which it happens, and its size,
+    /// m.
     waiting: Option<(f64, f64)>,
     slipped_m: f64,
 }
@@ -87,7 +88,7 @@ impl TetherSlip {
         Self { parameters, stream, at_m: None, gone_m: 0.0, next_stretch: 0, waiting: None, slipped_m: 0.0 }
     }
 
-    /// Error of the count once the vehicle has reached a chainage.
+    /// Error of the cable count once the vehicle has reached a chainage.
     fn come_to(&mut self, chainage_m: f64) -> f64 {
         self.gone_m += self.at_m.map_or(0.0, |before_m| (chainage_m - before_m).abs());
         self.at_m = Some(chainage_m);
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn slips_have_the_given_rate_and_size_and_are_permanent() {
+    fn cable_slips_have_the_given_rate_and_size_and_are_permanent() {
         let slips = slips((0..4_000_000).map(|k| f64::from(k) * 0.025));
         let n = slips.len() as f64;
         assert!((n - 5000.0).abs() < 5.0 * math::sqrt(5000.0 * 0.95), "{n}");
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn travel_back_counts_like_travel_forward() {
+    fn cable_slips_equally_on_the_way_forward_and_back() {
         let ahead = slips((0..40_000).map(|k| f64::from(k) * 0.125));
         let back_and_forth = slips(
             (0..40_000).map(|k| f64::from(if k / 800 % 2 == 0 { k % 800 } else { 800 - k % 800 }) * 0.125),
@@ -164,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_slip]\nper_100m = 60\n"));
         assert!(refusal("[effects.tether_slip]\n").contains("must not be zero"));
         assert!(refusal("[effects.tether_slip]\nper_100m = 1\nsize_m = [1]\n").contains("[least, most]"));

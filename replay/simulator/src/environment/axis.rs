@@ -21,14 +21,14 @@ pub struct Axis {
     pieces: Vec<Piece>,
 }
 
-/// A straight piece or an arc.
+/// A straight piece or an arc of the tunnel's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
-    /// Chainage of the start of the piece.
+    /// Chainage of the start of the piece, m.
     pub(super) from_m: f64,
-    /// Chainage of the end of the piece.
+    /// Chainage of the end of the piece, m.
     pub(super) to_m: f64,
-    /// Chainage of the point `at`: an end of a straight piece, or the middle of an arc.
+    /// Chainage of the point `at`, m: an end of a straight piece, or the middle of an arc.
     anchor_m: f64,
     at: Yz,
     heading_rad: f64,
@@ -37,10 +37,10 @@ pub(super) struct Piece {
     curvature_pm: f64,
 }
 
-/// A point of the axis, with the plane through it at a right angle to the axis.
+/// A point of the axis. It defines the plane through the point, perpendicular to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Station {
-    /// Point of the axis.
+    /// The point of the axis, in plan view, m.
     pub(super) at: Yz,
     /// Direction of the axis at the point, a unit vector.
     pub(super) tangent: Yz,
@@ -74,7 +74,7 @@ impl Axis {
         Ok(axis)
     }
 
-    /// Appends a piece, after which the axis continues straight.
+    /// Appends a piece to the axis, which then continues straight.
     fn append(&mut self, length_m: f64, curvature_pm: f64) {
         let Some(last) = self.pieces.pop() else { return };
         let (at, heading_rad) = (last.at, last.heading_rad);
@@ -90,7 +90,7 @@ impl Axis {
         self.pieces.push(Piece::new(end_m, end, heading_rad, f64::INFINITY, 0.0));
     }
 
-    /// Whether the axis has no bend.
+    /// Whether the tunnel's axis has no bend.
     pub fn is_straight(&self) -> bool {
         self.pieces.len() == 1 || self.pieces.iter().all(|piece| piece.curvature_pm == 0.0)
     }
@@ -133,12 +133,12 @@ impl Axis {
         nearest
     }
 
-    /// The pieces in order of chainage.
+    /// The pieces of the axis in order of chainage.
     pub(super) fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
-    /// Number of the piece at `chainage_m`, and the piece.
+    /// Number of the axis piece at `chainage_m`, and the piece.
     pub(super) fn piece_at(&self, chainage_m: f64) -> (usize, &Piece) {
         let after = self.pieces.partition_point(|piece| piece.from_m <= chainage_m).max(1);
         let number = after.min(self.pieces.len()) - 1;
@@ -150,7 +150,7 @@ impl Axis {
         self.piece_at(chainage_m).1.station(chainage_m)
     }
 
-    /// Absolute curvature of the tightest bend, 1/m.
+    /// Absolute curvature of the axis in its tightest bend, 1/m.
     pub(super) fn largest_curvature_pm(&self) -> f64 {
         self.pieces.iter().map(|piece| piece.curvature_pm.abs()).fold(0.0, f64::max)
     }
@@ -178,7 +178,7 @@ impl Piece {
         Self { anchor_m, at, heading_rad, tangent, ..start }
     }
 
-    /// Curvature, positive to the left, 1/m.
+    /// Curvature of the piece, positive to the left, 1/m.
     pub(super) fn curvature_pm(&self) -> f64 {
         self.curvature_pm
     }

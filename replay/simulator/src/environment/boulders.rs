@@ -2,6 +2,7 @@
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::WallPoint;
 
 use super::heaps::Heap;
 use super::keys;
@@ -11,29 +12,29 @@ use super::shapes::Solid;
 use super::vector::Frame;
 use super::widths::floor_m;
 
-/// Allowed sizes of a boulder, m.
+/// Allowed diameters of a boulder, m.
 const SIZE_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 /// Default share of a boulder's thickness that lies below the wall.
 const SUNK: f64 = 0.3;
 /// Minimum ratio of width to length, and of thickness to width, of a scattered boulder.
 const FLATTEST: f64 = 0.5;
 
-/// An ellipsoid on the wall.
+/// A boulder: an ellipsoid on the wall.
 struct Boulder {
     chainage_m: f64,
     arc_m: f64,
-    /// Full diameters, m: along the tunnel, along the wall, and across the wall.
+    /// Full diameters of the boulder, m: along the tunnel, along the wall, and across the wall.
     size_m: [f64; 3],
-    /// Rotation about the wall's normal.
+    /// Rotation of the boulder about the wall's normal, radians.
     yaw_rad: f64,
     sunk: f64,
 }
 
-/// Common parameters of many boulders.
+/// Parameters of a field of random boulders.
 struct Field {
     from_m: f64,
     to_m: f64,
-    /// Extent along the wall, centred on the floor's centre, m.
+    /// Extent of the field along the wall, centred on the floor's centre, m.
     width_m: f64,
     count: i64,
     size_m: [f64; 2],
@@ -113,10 +114,10 @@ pub(super) fn pieces(
 impl Boulder {
     fn placed(&self, ground: Ground<'_>, feature: u16) -> Placed<Solid> {
         let half = self.size_m.map(|diameter| diameter / 2.0);
-        let (wall, [ny, nz]) = ground.tube.wall_place(self.chainage_m, self.arc_m);
+        let (wall, [ny, nz]) = ground.tube.wall_place(WallPoint { x_m: self.chainage_m, arc_m: self.arc_m });
         let above_m = half[2] * (1.0 - 2.0 * self.sunk);
         let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
-        // The boulder's axes: across the wall, along the wall, and along the tunnel, before the rotation.
+        // Axes of the boulder before its rotation: across the wall, along the wall, and along the tunnel.
         let normal = section.outwards([0.0, ny, nz]);
         let (sin, cos) = math::sin_cos(self.yaw_rad);
         let length = section.outwards([cos, -sin * nz, sin * ny]);
@@ -167,7 +168,7 @@ fn power(base: f64, exponent: f64) -> f64 {
     result
 }
 
-/// Reads `size_m`, one diameter or three.
+/// Reads `size_m` of one boulder: one diameter or three.
 fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     let wanted = format!(
         "must be a diameter from {} to {}, or three: along the tunnel, along the wall, across the wall",
@@ -182,7 +183,7 @@ fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     }
 }
 
-/// Reads `size_m`, the smallest and the largest size.
+/// Reads `size_m` of many boulders: the smallest and the largest diameter.
 fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
     match table.numbers("size_m", SIZE_M)?.as_deref() {
         None => Ok(None),

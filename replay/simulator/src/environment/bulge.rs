@@ -1,6 +1,7 @@
 //! Wall displaced from the profile, towards the reference point or away from it.
 
 use headrace_geometry::math::{self, PI};
+use headrace_geometry::tunnel::WallPoint;
 
 /// A displaced patch of wall, with the shape of a raised cosine along the tunnel and along the wall.
 ///
@@ -10,15 +11,15 @@ use headrace_geometry::math::{self, PI};
 pub(super) struct Bulge {
     /// Number of the feature that the patch belongs to.
     pub(super) feature: u16,
-    /// Chainage of the middle, m.
+    /// Chainage of the patch's middle, m.
     pub(super) chainage_m: f64,
-    /// Half the extent along the tunnel, m.
+    /// Half the patch's extent along the tunnel, m.
     pub(super) half_length_m: f64,
-    /// Arc length of the middle on the unscaled profile, m.
+    /// Arc length of the patch's middle on the unscaled profile, m.
     pub(super) arc_m: f64,
-    /// Half the extent along the wall of the unscaled profile, m.
+    /// Half the patch's extent along the wall of the unscaled profile, m.
     pub(super) half_width_m: f64,
-    /// Displacement in the middle, inwards positive, m.
+    /// Displacement of the wall in the patch's middle, inwards positive, m.
     pub(super) depth_m: f64,
 }
 
@@ -33,25 +34,25 @@ impl Bulge {
         self.chainage_m + self.half_length_m
     }
 
-    /// Displacement of the wall at a chainage and arc length of a profile with this perimeter, inwards positive, m.
-    pub(super) fn displacement_m(&self, chainage_m: f64, arc_m: f64, perimeter_m: f64) -> f64 {
-        let along = (chainage_m - self.chainage_m) / self.half_length_m;
+    /// Displacement of the wall by the patch at a point on a profile with this perimeter, inwards positive, m.
+    pub(super) fn displacement_m(&self, at: WallPoint, perimeter_m: f64) -> f64 {
+        let along = (at.x_m - self.chainage_m) / self.half_length_m;
         if along.abs() >= 1.0 {
             return 0.0;
         }
-        let across = self.off_middle_m(arc_m, perimeter_m) / self.half_width_m;
+        let across = self.off_middle_m(at.arc_m, perimeter_m) / self.half_width_m;
         if across >= 1.0 {
             return 0.0;
         }
         self.depth_m * raised_cosine(along) * raised_cosine(across)
     }
 
-    /// Steepest slope along the tunnel.
+    /// Steepest slope of the displaced patch along the tunnel.
     pub(super) fn steepest_along(&self) -> f64 {
         self.depth_m.abs() * PI / 2.0 / self.half_length_m
     }
 
-    /// Steepest slope along the wall.
+    /// Steepest slope of the displaced patch along the wall.
     pub(super) fn steepest_across(&self) -> f64 {
         self.depth_m.abs() * PI / 2.0 / self.half_width_m
     }
@@ -61,7 +62,7 @@ impl Bulge {
         self.off_middle_m(arc_m, perimeter_m) < self.half_width_m + margin_m
     }
 
-    /// Whether the patch overlaps another.
+    /// Whether the displaced patch overlaps another.
     pub(super) fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
         self.begin_m() < other.end_m()
             && other.begin_m() < self.end_m()

@@ -1,4 +1,4 @@
-//! The `[[tunnel.features]]` tables of a scene.
+//! Reads the `[[tunnel.features]]` tables of a scene.
 
 use headrace_config::{ConfigError, Section};
 
@@ -9,7 +9,7 @@ use super::shapes::{Hollow, Solid};
 use super::tube::Tube;
 use super::{boulders, openings};
 
-/// All features except displaced wall.
+/// All features of a tunnel except displaced wall.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Features {
     pub(super) names: Vec<String>,
@@ -74,7 +74,9 @@ impl Features {
     }
 }
 
-/// Checks that the hollow opens from the tube's wall and not from a mesh, and returns it.
+/// Returns the hollow if it opens from the tube's wall.
+///
+/// Errors: it opens from a mesh.
 fn opening(
     ground: Ground<'_>,
     table: &Section<'_>,

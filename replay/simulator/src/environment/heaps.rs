@@ -10,9 +10,11 @@ use super::keys::{self, Kind};
 use super::placing::Site;
 use super::widths::floor_m;
 
-/// Largest displacement towards the reference point, as a share of the distance from that point to the wall.
+/// Largest displacement of the wall towards the profile's reference point, as a share of the wall's distance from
+/// that point.
 const DEEPEST_SHARE: f64 = 0.8;
-/// Largest ratio of the depth of a patch to its length and width. It limits the steepness of the wall to 57.5 degrees.
+/// Largest ratio of the depth of a displaced patch to its length and width. It limits the steepness of the wall to
+/// 57.5 degrees.
 const DEEPEST_ASPECT: f64 = 1.0;
 /// Ratio of the volume of fallen rock to the volume of its cavity.
 const LOOSENING: f64 = 1.5;
@@ -21,16 +23,16 @@ const SPREADING: f64 = 1.5;
 /// Number of points along a patch at which the distance to the wall is evaluated.
 const PLACES: u32 = 64;
 
-/// Area over which the pieces of a heap are scattered.
+/// Area over which the boulders of a heap are scattered.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Heap {
-    /// Number of the feature.
+    /// Number of the feature that the heap belongs to.
     pub(super) feature: u16,
-    /// Chainage of the middle, m.
+    /// Chainage of the heap's middle, m.
     pub(super) chainage_m: f64,
-    /// Extent along the tunnel, m.
+    /// Extent of the heap along the tunnel, m.
     pub(super) length_m: f64,
-    /// Extent along the floor, m.
+    /// Extent of the heap along the floor, m.
     pub(super) width_m: f64,
 }
 
@@ -169,7 +171,7 @@ fn add(
     Ok(())
 }
 
-/// Minimum distance from the reference point to the wall of a patch, m.
+/// Minimum distance from the profile's reference point to the wall of a patch, m.
 fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     let [ry, rz] = site.profile.reference();
     let distance_m = |k: u32| {
@@ -181,7 +183,7 @@ fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     least_m * site.scales.smallest(bulge.begin_m(), bulge.end_m())
 }
 
-/// Arc length of the wall vertically above the reference point, m.
+/// Arc length of the wall vertically above the profile's reference point, m.
 fn crown_m(profile: &Profile) -> f64 {
     let [y, z] = profile.reference();
     profile.arc_of([y, z + 1.0])

@@ -1,15 +1,15 @@
-//! Index of objects by chainage.
+//! Index of objects in the tunnel by chainage.
 
 use headrace_geometry::math;
 
-/// Objects in buckets of chainage. An object is listed in each bucket that it extends into.
+/// Index of objects by buckets of chainage. An object is listed in each bucket that it extends into.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Index {
     first_m: f64,
     bucket_m: f64,
     /// Start of each bucket's list in `numbers`, then the end of the last list. Empty if there are no objects.
     starts: Vec<usize>,
-    /// Numbers of objects, bucket by bucket.
+    /// Numbers of the indexed objects, bucket by bucket.
     numbers: Vec<u32>,
 }
 
@@ -45,7 +45,7 @@ impl Index {
         index
     }
 
-    /// Numbers of all objects that extend into `[from_m, to_m]`. May repeat numbers and include objects nearby.
+    /// Numbers of all objects that extend into `[from_m, to_m]`. Numbers may be repeated, and objects nearby included.
     pub(super) fn near(&self, from_m: f64, to_m: f64) -> &[u32] {
         let Some(count) = self.starts.len().checked_sub(1) else { return &[] };
         if to_m < self.first_m {

@@ -2,7 +2,7 @@
 
 use headrace_config::{ConfigError, Section};
 
-/// Kind of a feature.
+/// Kind of a feature in the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Boulder,

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use super::vector::{Face, Frame, Ray, V3};
 use crate::mesh::Mesh;
 
-/// Distance by which points close to the end plane of a wall are moved into the wall, m. The mesh is open in the plane
-/// itself.
+/// Least distance from a mesh wall's end planes, m. A point nearer to a plane is moved to this distance, since the mesh
+/// is open in the plane itself.
 const INTO_M: f64 = 1e-7;
 
-/// A closed mesh in the water.
+/// A closed mesh that is a body in the water.
 #[derive(Debug, Clone)]
 pub(super) struct MeshBody {
     pub(super) frame: Frame,
@@ -22,14 +22,14 @@ pub(super) struct MeshWall {
     pub(super) feature: u16,
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// The same span along the x-axis of the mesh.
+    /// Start and end of the wall on the x-axis of the mesh, m.
     pub(super) x_m: (f64, f64),
     pub(super) frame: Frame,
     pub(super) mesh: Arc<Mesh>,
 }
 
 impl MeshBody {
-    /// First hit of the ray: the range, or 0 if the ray starts inside, and the outward normal.
+    /// First hit of a ray on the body: the range, or 0 if the ray starts inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let local = self.frame.local_ray(ray);
         let hit = self.mesh.cast(local.origin, local.direction, f64::MAX)?;
@@ -37,19 +37,19 @@ impl MeshBody {
         Some((range_m, self.frame.outwards(hit.normal)))
     }
 
-    /// Whether `point` is inside.
+    /// Whether `point` is inside the body.
     pub(super) fn contains(&self, point: V3) -> bool {
         self.mesh.contains(self.frame.local(point))
     }
 }
 
 impl MeshWall {
-    /// Number of the feature.
+    /// Number of the feature with this mesh.
     pub(super) fn feature(&self) -> u16 {
         self.feature
     }
 
-    /// Chainages between which the mesh is the wall, m.
+    /// Chainages between which the mesh is the tunnel's wall, m.
     pub(super) fn span_m(&self) -> (f64, f64) {
         (self.from_m, self.to_m)
     }
@@ -59,7 +59,7 @@ impl MeshWall {
         self.mesh.contains(self.between_ends(self.frame.local(point)))
     }
 
-    /// First hit of the ray on the mesh between `t_m` and `until_m`, at which the ray passes an end plane.
+    /// First hit of the ray on the mesh, searched from `t_m` to `until_m`. The ray passes an end plane at `until_m`.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, until_m: f64) -> Option<(f64, Face)> {
         let local = self.frame.local_ray(ray);
         // A ray from a point enclosed by the mesh leaves the mesh only through the ends.

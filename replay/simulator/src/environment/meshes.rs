@@ -19,12 +19,12 @@ use crate::mesh::{self, Mesh, Role};
 
 /// Allowed chainage of the origin of a mesh, m. The origin of a survey may be far away.
 const CHAINAGE_M: core::ops::RangeInclusive<f64> = -1.0e5..=1.0e5;
-/// Allowed position of the origin across the tunnel, m.
+/// Allowed position of the origin of a mesh across the tunnel, m.
 const ACROSS_M: core::ops::RangeInclusive<f64> = -1000.0..=1000.0;
-/// Minimum length of a wall, m.
+/// Minimum length of a mesh that is a stretch of wall, m.
 const SHORTEST_M: f64 = 0.01;
 
-/// Position of the origin of a mesh.
+/// Position of the origin of a mesh in the tunnel.
 struct Place {
     chainage_m: f64,
     across_m: Yz,
@@ -82,7 +82,8 @@ fn parse_body(
         let why = format!("reaches out of the tunnel, which goes from 0 to {} m", site.length_m);
         return Err(misplaced(table, (from_m, to_m), &why));
     }
-    // In a bend, a point off the axis may lie anywhere ahead of the origin or behind it.
+    // In a bend, a corner's x doesn't give its chainage. The corner's distance from the origin is used instead, both
+    // ahead and behind.
     let reach_m = corners.iter().map(|(x, y)| math::hypot(*x, *y)).fold(0.0, f64::max);
     let reach_m = if site.axis.is_straight() { [back_m, ahead_m] } else { [-reach_m, reach_m] };
     let span_m = span_m(site.axis, chainage_m, reach_m);
@@ -172,7 +173,7 @@ impl Place {
     }
 }
 
-/// Loads the mesh in the `file` of a table.
+/// Loads the mesh from the file that the key `file` of a table names.
 fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, ConfigError> {
     let name = table.required("file", table.text("file")?)?;
     let refuse = |why: &str| table.invalid("file", why);
@@ -184,7 +185,7 @@ fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, C
     Mesh::new(triangles, role).map_err(|error| refuse(&error.to_string()))
 }
 
-/// An error about the position of a mesh.
+/// Creates an error about the position of a mesh.
 fn misplaced(table: &Section<'_>, (from_m, to_m): (f64, f64), why: &str) -> ConfigError {
     let key = if table.keys().contains(&"chainage_m") { "chainage_m" } else { "file" };
     table.invalid(key, &format!("the mesh, from {from_m:.3} to {to_m:.3} m, {why}"))

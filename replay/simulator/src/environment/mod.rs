@@ -59,7 +59,7 @@ const PROGRESS_M: f64 = 1e-9;
 /// Maximum number of hollows and stretches of tube that a ray passes through.
 const MOST_PASSAGES: usize = 1_000;
 
-/// The environment of a scene.
+/// The environment of a scene: the tunnel with its contents and openings.
 #[derive(Debug, Clone)]
 pub struct Environment {
     /// Profile in the vehicle file. Arc lengths of wall points are measured on this profile.
@@ -75,14 +75,14 @@ pub struct Environment {
     names: Vec<String>,
 }
 
-/// End of a ray.
+/// End of a ray at the wall or at an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Range, m. On a rough wall, the range includes the roughness.
+    /// Range from the ray's origin, m. On a rough wall, the range includes the roughness.
     pub range_m: f64,
-    /// Position. On a rough wall, the position lies on the smooth wall underneath.
+    /// Position of the hit. On a rough wall, the position lies on the smooth wall underneath.
     pub point: Point3<Tunnel>,
-    /// Unit normal at the position, towards the water.
+    /// Unit normal of the surface at the hit, towards the water.
     pub normal: Vec3<Tunnel>,
     /// Object that the ray hit.
     pub what: What,
@@ -91,9 +91,9 @@ pub struct Hit {
 /// Object that a ray hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
-    /// The tunnel's wall.
+    /// The ray hits the tunnel's wall.
     Wall,
-    /// A feature, by its number in the scene; see [`Environment::feature_name`].
+    /// The ray hits a feature, given by its number in the scene; see [`Environment::feature_name`].
     Feature(u16),
 }
 
@@ -124,7 +124,7 @@ struct Reach {
 }
 
 impl Environment {
-    /// A straight, empty tunnel of the design profile.
+    /// Creates a straight, empty tunnel of the design profile.
     pub fn straight(profile: Profile) -> Self {
         let tube = Tube::new(Axis::straight(), profile.clone(), Scales::default(), Vec::new(), Vec::new());
         Self::new(profile, tube, Roughness::default(), true, Features::default())
@@ -248,7 +248,7 @@ impl Environment {
 
     /// Replaces the range to the smooth wall by the range to the rough wall.
     ///
-    /// The point stays on the smooth wall, so the side of the wall with the water stays certain.
+    /// The point stays on the smooth wall, so it remains certain which side of the wall is water.
     fn roughened(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
         let cosine = -direction.dot(&hit.normal);
         let deeper_m = self.rough.deeper_m(hit.point, (hit.range_m, cosine), chainage_m);
@@ -288,7 +288,7 @@ impl Environment {
         if length_m > 0.0 { self.cast(from, between.scaled(1.0 / length_m), length_m) } else { None }
     }
 
-    /// The tunnel's axis.
+    /// The axis of the tunnel.
     pub fn axis(&self) -> &Axis {
         self.tube.axis()
     }
@@ -346,7 +346,7 @@ impl Environment {
         Some(Reach { t_m: 0.0, stop: Some(Stop::Wall(None)), from_m: hollow.span_m.0, to_m: hollow.span_m.1 })
     }
 
-    /// Extends a ray from the end of the tube through the hollows there, and through tube beyond the hollows.
+    /// Extends a ray from the end of the tube through the hollows there, and through any tube beyond the hollows.
     fn go_on_through_hollows(&self, ray: &Ray, far_m: f64, reach: &mut Reach) {
         for _ in 0..MOST_PASSAGES {
             let before_m = reach.t_m;
@@ -375,8 +375,8 @@ impl Environment {
         }
     }
 
-    /// The hollow at the end of the ray that extends farthest: range of the hollow's end, the normal there, and the
-    /// hollow.
+    /// Among the hollows at the end of the ray, the one that extends farthest: the range of its end, the normal there,
+    /// and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
         // The index lists hollows by the chainage of their openings. Deeper in the rock, a hollow may meet any other
@@ -395,7 +395,7 @@ impl Environment {
             .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Number of the feature whose solid contains a point.
+    /// Number of the feature that contains a point in a solid.
     fn solid_around(&self, point: V3) -> Option<u16> {
         let [chainage_m, ..] = self.axis().chart(to_point(point));
         let near = self.solids_by_chainage.near(chainage_m, chainage_m).iter();

@@ -14,7 +14,7 @@ const BULKHEAD_SHARE: f64 = 0.6;
 const SLANT_DEG: f64 = 60.0;
 /// Distance from the upper edges of a rock trap at which the height of the floor is measured, m.
 const INSIDE_M: f64 = 1e-6;
-/// Step at which the length of a hollow is sampled, m.
+/// Step along a hollow at which the hollow's length is sampled, m.
 const STEP_M: f64 = 0.5;
 
 /// Reads a ditch across the floor: an upright box.

@@ -19,14 +19,14 @@ pub(super) struct Placed<S> {
     pub(super) span_m: (f64, f64),
 }
 
-/// The tunnel before its wall is displaced.
+/// Properties of the tunnel before its wall is displaced.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
     pub(super) profile: &'a Profile,
     pub(super) scales: &'a Scales,
     pub(super) axis: &'a Axis,
     pub(super) length_m: f64,
-    /// Largest distance of the section's wall to either side of the axis, m.
+    /// Largest distance of the tunnel's wall to either side of the axis, m.
     pub(super) half_width_m: f64,
 }
 
@@ -36,7 +36,7 @@ pub(super) fn span_m(axis: &Axis, chainage_m: f64, reach_m: [f64; 2]) -> (f64, f
     (chainage_m + back_m, chainage_m + ahead_m)
 }
 
-/// The tunnel that features are placed in.
+/// The tunnel in which features are placed.
 #[derive(Clone, Copy)]
 pub(super) struct Ground<'a> {
     pub(super) tube: &'a Tube,

@@ -11,17 +11,18 @@ use super::keys;
 use super::scatter::Scatter;
 use crate::stretch::Stretch;
 
-/// Least cosine of incidence for the effect of a height on the range. At more grazing incidence the bumps hide the
-/// hollows between them.
+/// Lower limit of the cosine of incidence when a height is converted to a change of range. At more grazing incidence
+/// the bumps hide the hollows between them.
 const LEAST_COSINE: f64 = 0.25;
 /// Standard deviation of the sum of four 16-bit random numbers, in units of their range: the square root of 4 / 12.
 const SUM_SD: f64 = 0.577_350_269_189_625_8;
 
-/// Rough stretches of the tunnel.
+/// Rough stretches of the tunnel, each with the heights of its wall.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Roughness(Vec<(Stretch, Heights)>);
 
-/// Heights of a stretch: random numbers at the nodes of a cubic lattice, interpolated between the nodes.
+/// Heights of a stretch of rough wall: random numbers at the nodes of a cubic lattice, interpolated between the
+/// nodes.
 #[derive(Debug, Clone, Copy)]
 struct Heights {
     sd_m: f64,
@@ -68,7 +69,7 @@ impl Roughness {
         let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else {
             return 0.0;
         };
-        // A bump reaches at most halfway to the sonar.
+        // A bump of the rough wall reaches at most halfway to the sonar.
         (heights.at_m(point) / cosine.max(LEAST_COSINE)).max(-range_m / 2.0)
     }
 }
@@ -97,7 +98,7 @@ impl Heights {
         self.sd_m * sum / math::sqrt(squares)
     }
 
-    /// Random number of a node, with mean zero and standard deviation one.
+    /// Random number of a lattice node, with mean zero and standard deviation one.
     fn number(&self, nodes: [i64; 3]) -> f64 {
         let mut hash = self.seed;
         for node in nodes {
@@ -145,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn different_seeds_are_independent() {
+    fn rough_walls_of_different_seeds_are_independent() {
         let other = Heights { seed: 8, ..HEIGHTS };
         let product = mean((0..50_000).map(|k| {
             let at = Point3::new(f64::from(k) * 0.371, 0.2, 0.9);

@@ -17,14 +17,14 @@ use super::vector::{Ray, V3, along, dot, unit};
 /// no wall between tube and hollow.
 pub(super) const SKIN_M: f64 = 1e-6;
 
-/// A body that stops a ray.
+/// A solid body that stops a ray.
 #[derive(Debug, Clone)]
 pub(super) enum Solid {
     /// An ellipsoid with these half diameters along the axes of the frame, m.
     Ellipsoid(Frame, V3),
     /// A box with these half lengths along the axes of the frame, m.
     Block(Frame, V3),
-    /// A body enclosed by triangles.
+    /// A body enclosed by the triangles of a mesh.
     #[cfg(feature = "mesh")]
     Mesh(MeshBody),
 }
@@ -34,7 +34,7 @@ pub(super) enum Solid {
 pub(super) enum Hollow {
     /// A box with these half lengths along the axes of the frame, m.
     Block(Frame, V3),
-    /// A slot around the whole tunnel.
+    /// A slot around the whole tunnel, as for a gate.
     Ring(Ring),
 }
 
@@ -43,13 +43,13 @@ pub(super) enum Hollow {
 pub(super) struct Ring {
     /// Frame with its origin on the axis at z = 0, and axes along the tunnel, left and up.
     pub(super) frame: Frame,
-    /// Half the extent along the tunnel, m.
+    /// Half the slot's extent along the tunnel, m.
     pub(super) half_width_m: f64,
-    /// The profile before scaling.
+    /// The tunnel's profile before scaling.
     pub(super) profile: Profile,
     /// Point (y, z) of the section about which the profile is scaled: the profile's reference point.
     pub(super) reference: Yz,
-    /// Scale of the profile.
+    /// Factor by which the slot's profile is larger than the tunnel's.
     pub(super) scale: f64,
 }
 
@@ -60,7 +60,7 @@ struct Chord {
 }
 
 impl Solid {
-    /// First hit of the ray: the range, or 0 if the ray starts inside, and the outward normal.
+    /// First hit of a ray on the body: the range, or 0 if the ray starts inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let chord = match self {
             Self::Ellipsoid(frame, half) => ellipsoid_chord(frame, *half, ray)?,
@@ -72,7 +72,7 @@ impl Solid {
         (chord.leave.0 > 0.0).then_some((enter_m.max(0.0), normal))
     }
 
-    /// Whether `point` is inside.
+    /// Whether `point` is inside the body.
     pub(super) fn contains(&self, point: V3) -> bool {
         match self {
             Self::Ellipsoid(frame, half) => {
@@ -101,7 +101,7 @@ impl Hollow {
         }
     }
 
-    /// Whether `point` is inside.
+    /// Whether `point` is inside the hollow.
     pub(super) fn contains(&self, point: V3) -> bool {
         match self {
             Self::Block(frame, half) => block_contains(frame, half, point),

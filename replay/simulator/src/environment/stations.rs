@@ -1,4 +1,4 @@
-//! Scale of the profile along the tunnel.
+//! Scale of the tunnel's profile along the tunnel.
 
 use headrace_config::{ConfigError, Section};
 
@@ -48,12 +48,12 @@ impl Scales {
         Ok(Self { stations })
     }
 
-    /// Chainages at which the slope of the scale changes, m.
+    /// Chainages at which the slope of the profile's scale changes, m.
     pub(super) fn breaks(&self) -> impl Iterator<Item = f64> + '_ {
         self.stations.iter().map(|station| station.0)
     }
 
-    /// Scale at `chainage_m`.
+    /// Scale of the profile at `chainage_m`.
     pub(super) fn at(&self, chainage_m: f64) -> f64 {
         let after = self.stations.partition_point(|station| station.0 <= chainage_m);
         match (after.checked_sub(1).and_then(|before| self.stations.get(before)), self.stations.get(after)) {
@@ -65,7 +65,7 @@ impl Scales {
         }
     }
 
-    /// Slope of the scale between two chainages, 1/m. No station may lie between them.
+    /// Slope of the profile's scale between two chainages, 1/m. No station may lie between them.
     pub(super) fn slope_pm(&self, from_m: f64, to_m: f64) -> f64 {
         if from_m.is_finite() && to_m.is_finite() {
             (self.at(to_m) - self.at(from_m)) / (to_m - from_m)
@@ -74,18 +74,18 @@ impl Scales {
         }
     }
 
-    /// Whether the scale is 1 everywhere.
+    /// Whether the profile's scale is 1 everywhere.
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     pub(super) fn is_one(&self) -> bool {
         self.stations.iter().all(|station| station.1 == 1.0)
     }
 
-    /// The largest scale.
+    /// The largest scale of the profile at any chainage.
     pub(super) fn largest(&self) -> f64 {
         self.stations.iter().map(|station| station.1).reduce(f64::max).unwrap_or(1.0)
     }
 
-    /// The smallest scale between two chainages.
+    /// The smallest scale of the profile between two chainages.
     pub(super) fn smallest(&self, from_m: f64, to_m: f64) -> f64 {
         let within = self.stations.iter().filter(|station| (from_m..=to_m).contains(&station.0));
         within.map(|station| station.1).fold(self.at(from_m).min(self.at(to_m)), f64::min)

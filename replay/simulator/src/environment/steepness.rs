@@ -1,14 +1,14 @@
-//! Upper bound on the slope of the gauge, which determines the length of steps along rays. See [`super::tube`] for the
-//! gauge.
+//! Upper bound on the slope of the gauge, which determines the length of steps along rays. The gauge of a point is
+//! its distance from the reference point, relative to the wall's distance in the same direction; see [`super::tube`].
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
 
 use super::bulge::Bulge;
 
-/// Number of directions in which a profile is sampled.
+/// Number of directions in which a profile's wall is sampled.
 const DIRECTIONS: u32 = 2_000;
-/// Factor on the slope, for directions between the samples.
+/// Safety factor on the slope of the gauge, for directions between the samples.
 const MARGIN: f64 = 1.05;
 /// Largest ratio of change of chainage to distance travelled. It occurs at the inner wall of the tightest allowed bend,
 /// which has a radius of twice the tunnel's half-width.
@@ -23,18 +23,18 @@ pub(super) struct Steepness {
     farthest_m: f64,
 }
 
-/// The wall in one direction.
+/// The profile's wall, seen from the reference point in one direction.
 #[derive(Debug, Clone, Copy)]
 struct View {
     arc_m: f64,
-    /// Distance from the reference point to the wall, m.
+    /// Distance from the reference point to the wall in this direction, m.
     radius_m: f64,
     /// Distance from the reference point to the wall's tangent, m.
     tangent_m: f64,
 }
 
 impl Steepness {
-    /// Samples a profile.
+    /// Samples the wall of a profile.
     ///
     /// Allocates: startup only.
     pub(super) fn new(profile: &Profile) -> Self {
@@ -74,9 +74,9 @@ impl Steepness {
                 .fold(0.0, f64::max)
     }
 
-    /// Slopes of the gauge within the section and along the tunnel.
+    /// Slopes of the gauge within the cross-section and along the tunnel.
     fn at(&self, view: &View, bulges: &[Bulge], scale: f64, scale_slope_pm: f64) -> (f64, f64) {
-        // Distance along the wall over two steps of direction.
+        // Distance along the wall between two sampled directions that are two steps apart.
         let margin_m = 2.0 * TAU / f64::from(DIRECTIONS) * view.radius_m * view.radius_m / view.tangent_m;
         let (mut inwards_m, mut outwards_m, mut along, mut across) = (0.0, 0.0, 0.0, 0.0);
         for bulge in bulges.iter().filter(|b| b.covers(view.arc_m, self.perimeter_m, margin_m)) {

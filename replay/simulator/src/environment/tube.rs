@@ -12,7 +12,7 @@
 //! meets rock on the other. A ray therefore cannot escape if profile and mesh do not fit.
 
 use headrace_geometry::math;
-use headrace_geometry::tunnel::{Profile, Yz};
+use headrace_geometry::tunnel::{Profile, WallPoint, Yz};
 
 use super::axis::{Axis, Piece, Station};
 use super::bulge::Bulge;
@@ -26,12 +26,12 @@ use super::widths::half_width_m;
 const LEAST_STEP_M: f64 = 1e-4;
 /// Accuracy of the point where a ray meets the wall, m.
 const ROOT_M: f64 = 1e-11;
-/// Displacement above which the wall is attributed to the feature, m.
+/// Displacement above which a hit on the wall is attributed to the feature that displaced the wall, m.
 const FEATURE_M: f64 = 1e-3;
-/// Half the baseline of the differences that give the normal of a displaced wall, m.
+/// Half the distance between the points whose difference gives the normal of a displaced wall, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
-/// The wall along the whole tunnel.
+/// The tunnel's wall along the whole tunnel, except openings.
 #[derive(Debug, Clone)]
 pub(super) struct Tube {
     axis: Axis,
@@ -42,7 +42,7 @@ pub(super) struct Tube {
     bulges: Vec<Bulge>,
     /// Meshes that replace the wall. They overlap no bend, change of scale, bulge or other mesh.
     meshes: Vec<MeshWall>,
-    /// The stretches, without gaps, from -infinity to +infinity of chainage.
+    /// Stretches of the tunnel, without gaps, from -infinity to +infinity of chainage.
     stretches: Vec<Stretch>,
 }
 
@@ -51,29 +51,29 @@ pub(super) struct Tube {
 struct Stretch {
     from_m: f64,
     piece: Piece,
-    /// The planes at the ends; `None` for an end at infinity.
+    /// Planes across the tunnel at the stretch's ends; `None` for an end at infinity.
     ends: [Option<Station>; 2],
-    /// Scale at the start of the stretch, or of the whole stretch if the slope is zero.
+    /// Scale of the profile at the start of the stretch, or of the whole stretch if the slope is zero.
     scale: f64,
     scale_slope_pm: f64,
     /// Numbers of the bulges that extend into the stretch.
     bulges: Vec<usize>,
     /// Number of the mesh that is the wall of this stretch.
     mesh: Option<usize>,
-    /// Reciprocal of an upper bound on the gauge's slope, m.
+    /// Reciprocal of an upper bound on the slope of the gauge, m. It determines the length of steps along rays.
     step_m: f64,
 }
 
-/// Passage of a ray through the tube.
+/// Passage of a ray through the water in the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
     /// Distance along the ray at which the ray leaves the tube or reaches the given limit, m.
     pub(super) t_m: f64,
-    /// Whether the passage ends at the wall.
+    /// Whether the ray's passage ends at the wall.
     pub(super) wall: bool,
-    /// The wall at the end, if known without further computation.
+    /// Face of the wall at the end of the passage, if known without further computation.
     pub(super) face: Option<Face>,
-    /// Chainages of the start and the end, m.
+    /// Chainages of the start and the end of the passage, m.
     pub(super) chainages_m: [f64; 2],
 }
 
@@ -145,12 +145,12 @@ impl Tube {
         self.mesh_over(from_m, to_m).map(|(_, mesh)| mesh.feature())
     }
 
-    /// The tunnel's axis.
+    /// The axis of the tunnel.
     pub(super) fn axis(&self) -> &Axis {
         &self.axis
     }
 
-    /// The profile before it is scaled or displaced.
+    /// The tunnel's profile before it is scaled or displaced.
     pub(super) fn profile(&self) -> &Profile {
         &self.profile
     }
@@ -161,7 +161,7 @@ impl Tube {
         half_width_m(&self.profile) * self.scales.largest() + outwards_m
     }
 
-    /// Scale of the profile at `chainage_m`.
+    /// Scale of the tunnel's profile at `chainage_m`.
     pub(super) fn scale(&self, chainage_m: f64) -> f64 {
         self.scales.at(chainage_m)
     }
@@ -173,20 +173,20 @@ impl Tube {
         [fy + (unscaled[0] - fy) * scale, fz + (unscaled[1] - fz) * scale]
     }
 
-    /// Point (y, z) of the wall at `chainage_m` and at `arc_m` of the unscaled profile, and the profile's inward normal
-    /// there. The point includes displacements.
-    pub(super) fn wall_place(&self, chainage_m: f64, arc_m: f64) -> (Yz, Yz) {
+    /// Place (y, z) of a wall point of the unscaled profile, and the profile's inward normal there.
+    ///
+    /// The place includes displacements.
+    pub(super) fn wall_place(&self, at: WallPoint) -> (Yz, Yz) {
         let reference = self.profile.reference();
-        let [wy, wz] = self.profile.point_at(arc_m);
+        let [wy, wz] = self.profile.point_at(at.arc_m);
         let out = [wy - reference[0], wz - reference[1]];
         let normal = self.profile.cast_from_inside(reference, out).map_or([0.0, 1.0], |hit| hit.normal);
-        let radius_m = self.scale(chainage_m) * math::hypot(out[0], out[1]);
+        let radius_m = self.scale(at.x_m) * math::hypot(out[0], out[1]);
         let perimeter_m = self.profile.perimeter_m();
-        let inwards_m: f64 =
-            self.bulges.iter().map(|b| b.displacement_m(chainage_m, arc_m, perimeter_m)).sum();
+        let inwards_m: f64 = self.bulges.iter().map(|b| b.displacement_m(at, perimeter_m)).sum();
         let share = 1.0 - inwards_m / radius_m;
         let place = [reference[0] + share * out[0], reference[1] + share * out[1]];
-        (self.scaled(chainage_m, place), normal)
+        (self.scaled(at.x_m, place), normal)
     }
 
     /// Range along the unit vector `direction` (y, z) from a point of the section at `chainage_m` to the profile's
@@ -199,7 +199,7 @@ impl Tube {
         Some(hit.range_m)
     }
 
-    /// Whether `point` is in the tube.
+    /// Whether `point` is in the tube, which is bounded by the tunnel's wall.
     pub(super) fn contains(&self, point: V3) -> bool {
         let (number, _) = self.locate(point);
         self.stretches.get(number).is_some_and(|stretch| self.holds(stretch, point))
@@ -236,7 +236,7 @@ impl Tube {
         None
     }
 
-    /// The wall's face at a point of the wall.
+    /// The wall's face (normal and feature) at a point of the wall.
     pub(super) fn face(&self, point: V3) -> Face {
         let (number, chainage_m) = self.locate(point);
         let wall = Face { normal: [0.0; 3], feature: None };
@@ -251,7 +251,7 @@ impl Tube {
         }
         Face {
             normal: self.falling(stretch, point),
-            feature: self.displaced_by(stretch, chainage_m, hit.arc_m),
+            feature: self.displaced_by(stretch, WallPoint { x_m: chainage_m, arc_m: hit.arc_m }),
         }
     }
 
@@ -277,8 +277,8 @@ impl Tube {
         stretch.mesh.and_then(|number| self.meshes.get(number))
     }
 
-    /// Range between `t_m` and `until_m` at which the ray leaves the tube within the stretch, with the face if a mesh
-    /// is the wall.
+    /// Returns the range at which the ray leaves the tube, searched from `t_m` to `until_m` within the stretch. If a
+    /// mesh is the wall there, also returns the face that the ray hits.
     fn leave_stretch(
         &self,
         stretch: &Stretch,
@@ -307,7 +307,7 @@ impl Tube {
         if self.holds(to, ray.at(t_m)) {
             return None;
         }
-        // The axis is straight at a mesh.
+        // The tunnel's axis is straight at a mesh.
         let [tx, ty] =
             if to.mesh.is_some() { to.piece.station(to.from_m) } else { from.piece.station(from.from_m) }
                 .tangent;
@@ -327,7 +327,8 @@ impl Tube {
         );
         match hit {
             Some(hit) => Some(t_m + hit.range_m),
-            // There is no wall ahead only for a point on the wall itself or a ray along the axis.
+            // Two cases have no wall ahead: a point on the wall itself, which ends the ray here, and a ray along the
+            // axis.
             None => (self.gauge(stretch, at) > 1.0 - 1e-9).then_some(t_m),
         }
     }
@@ -367,12 +368,13 @@ impl Tube {
         }
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
-        let inwards_m: f64 = near.map(|bulge| bulge.displacement_m(chainage_m, hit.arc_m, perimeter_m)).sum();
+        let at = WallPoint { x_m: chainage_m, arc_m: hit.arc_m };
+        let inwards_m: f64 = near.map(|bulge| bulge.displacement_m(at, perimeter_m)).sum();
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
-    /// The profile's wall in the direction of an unscaled point from the reference point, and the distance from there
-    /// to the point, m.
+    /// The profile's wall in the direction from the reference point to an unscaled point, and the distance between
+    /// these two points, m.
     fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
         let [ry, rz] = self.profile.reference();
         let out = [unscaled[0] - ry, unscaled[1] - rz];
@@ -382,8 +384,8 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Without this return, adding and subtracting the floor's position could cost a bit. The plain case must equal
-        // the profile exactly.
+        // Without this return, adding and subtracting the floor's position could change the last bit. The plain case
+        // must equal the profile exactly.
         if scale == 1.0 {
             return section;
         }
@@ -403,11 +405,11 @@ impl Tube {
         unit(fall)
     }
 
-    /// Number of the feature that displaces the wall most.
-    fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, arc_m: f64) -> Option<u16> {
+    /// Number of the feature that displaces the wall most at a point.
+    fn displaced_by(&self, stretch: &Stretch, at: WallPoint) -> Option<u16> {
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
-        near.map(|bulge| (bulge.displacement_m(chainage_m, arc_m, perimeter_m).abs(), bulge.feature))
+        near.map(|bulge| (bulge.displacement_m(at, perimeter_m).abs(), bulge.feature))
             .filter(|(by_m, _)| *by_m > FEATURE_M)
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, feature)| feature)
@@ -415,12 +417,12 @@ impl Tube {
 }
 
 impl Stretch {
-    /// Whether all sections of the stretch are equal.
+    /// Whether all cross-sections of the stretch are equal.
     fn is_constant(&self) -> bool {
         self.scale_slope_pm == 0.0 && self.bulges.is_empty()
     }
 
-    /// Whether the stretch is a prism: straight, with equal sections.
+    /// Whether the stretch is a prism: straight, with equal cross-sections.
     fn is_plain(&self) -> bool {
         self.is_constant() && self.piece.curvature_pm() == 0.0
     }
@@ -436,7 +438,8 @@ impl Stretch {
         self.piece.chart([point[0], point[1]]).0
     }
 
-    /// Distance along the ray to the plane at the end ahead, m; infinity if the ray never passes the plane.
+    /// Distance along the ray to the plane at the end of the stretch ahead, m; infinity if the ray never passes the
+    /// plane.
     fn end_m(&self, ray: &Ray, forwards: bool) -> f64 {
         let Some(end) = self.ends[usize::from(forwards)] else { return f64::INFINITY };
         let [tx, ty] = end.tangent;
@@ -458,7 +461,8 @@ fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) ->
         }
         let t = below.0 - below.1 * (above.0 - below.0) / (above.1 - below.1);
         let value = f(t);
-        // The value at an end that is kept twice is halved. Without that, the bracket would shrink from one side only.
+        // If an end of the bracket is kept twice in a row, its value is halved. Otherwise the bracket could shrink from
+        // one side only.
         if value < 0.0 {
             below = (t, value);
             if kept == 1 {

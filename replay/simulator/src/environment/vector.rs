@@ -11,30 +11,30 @@ pub(super) type V3 = [f64; 3];
 /// A ray in the tunnel's frame. The parameter t is in metres if the direction has unit length.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
-    /// Origin.
+    /// Origin of the ray, m.
     pub(super) origin: V3,
-    /// Direction.
+    /// Direction of the ray.
     pub(super) direction: V3,
 }
 
 impl Ray {
-    /// The point `t_m` along the ray.
+    /// The point at distance `t_m` along the ray.
     pub(super) fn at(&self, t_m: f64) -> V3 {
         along(self.origin, t_m, self.direction)
     }
 }
 
-/// `from + t * direction`.
+/// Point `from + t * direction` of a straight line.
 pub(super) fn along(from: V3, t: f64, direction: V3) -> V3 {
     [from[0] + t * direction[0], from[1] + t * direction[1], from[2] + t * direction[2]]
 }
 
-/// `a - b`.
+/// Difference `a - b` of two vectors.
 pub(super) fn sub(a: V3, b: V3) -> V3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// Scalar product.
+/// Scalar product of two vectors.
 pub(super) fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -45,12 +45,12 @@ pub(super) fn unit(a: V3) -> V3 {
     if length > 0.0 { a.map(|c| c / length) } else { a }
 }
 
-/// An origin and three orthogonal unit vectors.
+/// A Cartesian frame: an origin and three orthogonal unit vectors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
-    /// Origin, in the tunnel's frame.
+    /// Origin of the frame, in the tunnel's frame.
     pub(super) origin: V3,
-    /// Axes, in the tunnel's frame.
+    /// Axes of the frame, in the tunnel's frame.
     pub(super) axes: [V3; 3],
 }
 
@@ -79,10 +79,10 @@ impl Frame {
     }
 }
 
-/// The wall at one point.
+/// The face of the wall at one point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Face {
-    /// Unit normal, towards the water.
+    /// Unit normal of the wall, towards the water.
     pub(super) normal: V3,
     /// Number of the feature that displaced the wall at the point.
     pub(super) feature: Option<u16>,

@@ -1,8 +1,8 @@
-//! Width of a profile.
+//! Width of a tunnel profile.
 
 use headrace_geometry::tunnel::Profile;
 
-/// Points at which a profile's extent is evaluated.
+/// Number of points at which a profile's extent is evaluated.
 const PLACES: u32 = 2_000;
 /// Factor on a half-width that allows for points between the samples.
 const WIDTH_MARGIN: f64 = 1.001;

@@ -1,6 +1,6 @@
 //! Calls: reasons to simulate an effect.
 
-/// An effect that a scene implies.
+/// An effect that a scene implies, with its tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Called {
     /// Name of the effect.
@@ -16,18 +16,18 @@ pub struct Called {
 /// Whether and how an implied effect is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// Simulated as implied.
+    /// The effect is simulated with its implied tables.
     Taken,
-    /// Simulated with the tables in the scene.
+    /// The effect is simulated with the tables in the scene.
     Named,
-    /// Not simulated: the scene asks only for named effects.
+    /// The effect isn't simulated: the scene asks only for the effects that it names.
     NotTaken,
-    /// Not simulated: the key `leave` lists the effect.
+    /// The effect isn't simulated: the key `leave` lists it.
     Left,
 }
 
 impl Fate {
-    /// Text for display.
+    /// Whether and how the effect is simulated, as text for display.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Taken => "taken",
@@ -38,7 +38,7 @@ impl Fate {
     }
 }
 
-/// A value of an effect's key, as TOML.
+/// A value of an effect's key, as TOML text.
 pub(super) type Value = String;
 
 /// A call: one reason to simulate an effect, with the sensors, the range of chainage and the keys that follow from it.

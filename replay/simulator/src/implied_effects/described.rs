@@ -34,7 +34,7 @@ const BESIDE_M: f64 = 1.0;
 const STEEL_END_M: f64 = 6.0;
 const STEEL_END_DEG: f64 = 10.0;
 
-/// The descriptions in a scene.
+/// The descriptions in a scene that imply effects.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Described {
     temperature_degc: Option<f64>,
@@ -46,7 +46,7 @@ pub(crate) struct Described {
     thrusters: Option<Thrusters>,
 }
 
-/// Silt in the water.
+/// Silt in the tunnel's water.
 #[derive(Debug, Clone, Copy)]
 struct Murk {
     stretch: Stretch,
@@ -59,7 +59,7 @@ struct Murk {
 struct Leak {
     chainage_m: f64,
     flow_m3ps: f64,
-    /// Whether the water comes from the portal rather than from the far end of the tunnel.
+    /// Whether the water of the leak comes from the portal rather than from the far end of the tunnel.
     from_portal: bool,
 }
 
@@ -85,7 +85,7 @@ struct Thrusters {
     accel_mps2: f64,
 }
 
-/// The tables with descriptions.
+/// The scene's tables with descriptions that imply effects.
 pub(crate) struct Tables<'a> {
     water: Option<Section<'a>>,
     stretches: Vec<Section<'a>>,
@@ -161,7 +161,7 @@ impl Described {
         water.finish()
     }
 
-    /// The effects that all descriptions imply.
+    /// The effects that all descriptions of the scene imply.
     pub(super) fn calls(&self, site: &Site, facts: &Facts, environment: &Environment) -> Vec<Call> {
         let of = |sense: Sense| {
             let sensors = facts.sensors.iter().filter(|sensor| sensor.sense == sense);
@@ -239,7 +239,7 @@ impl Described {
     }
 }
 
-/// Reads `from_m` and `to_m`, both required.
+/// Reads the required keys `from_m` and `to_m` of a stretch.
 fn within(table: &Section<'_>, length_m: f64) -> Result<Stretch, ConfigError> {
     let stretch = Stretch::read(table, length_m)?;
     for (key, end_m) in [("from_m", stretch.from_m), ("to_m", stretch.to_m)] {
@@ -248,7 +248,7 @@ fn within(table: &Section<'_>, length_m: f64) -> Result<Stretch, ConfigError> {
     Ok(stretch)
 }
 
-/// Double reflections at the corners of openings.
+/// Effects for double reflections at the corners of openings.
 fn openings(environment: &Environment, sonars: &[String], length_m: f64) -> Vec<Call> {
     let by_opening = |(name, [from_m, to_m]): (&str, [f64; 2])| {
         let place_m = [(from_m - BESIDE_M).max(0.0), (to_m + BESIDE_M).min(length_m)];

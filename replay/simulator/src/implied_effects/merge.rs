@@ -4,11 +4,11 @@
 use super::call::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
-/// Key whose value is a list. The lists of several calls are concatenated. For any other key the later call's value
-/// applies.
+/// The key of effects whose value is a list. The lists of several calls are concatenated. For any other key the later
+/// call's value applies.
 const PLACES: &str = "places";
 
-/// Effect with one table per group of sensors.
+/// Name of the effect that has one table per group of sensors.
 const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
@@ -24,7 +24,7 @@ struct Piece {
     keys: Keys,
 }
 
-/// Merges the calls for each effect.
+/// Merges the calls for each implied effect into its tables.
 pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
     let mut all = Vec::new();
     for kind in KINDS {

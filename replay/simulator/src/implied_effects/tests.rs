@@ -26,7 +26,7 @@ fn fates(effects: &str) -> Vec<(&'static str, Fate)> {
 }
 
 #[test]
-fn implied_effects_are_taken_only_if_the_scene_says_so() {
+fn implied_effects_are_simulated_only_if_the_scene_says_so() {
     let (plain, described) = (dive().dive(""), dive().dive(MURK.split("[tunnel]").next().unwrap()));
     assert!(plain.messages == described.messages);
     assert!(dive().simulation(MURK).unwrap().added().is_empty());
@@ -110,7 +110,7 @@ fn named_effects_override_implied_ones_and_the_leave_key_omits_effects() {
 }
 
 #[test]
-fn omitted_effect_acts_like_an_unnamed_one() {
+fn left_out_effect_acts_as_if_the_scene_did_not_name_it() {
     let both = "[effects]\nrange_noise = { sd_m = 0.2 }\nmissing_returns = { share = 0.2 }\n";
     let mut scene = dive().scene(both).unwrap();
     scene.leave_out(&["range_noise"]);

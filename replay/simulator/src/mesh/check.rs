@@ -13,7 +13,7 @@ use super::ply::Triangles;
 pub enum Role {
     /// The tunnel's wall over the extent of the mesh along x, open at both ends and closed in between.
     Wall,
-    /// A closed solid in the water.
+    /// A closed solid body in the water.
     Body,
 }
 
@@ -21,26 +21,27 @@ pub enum Role {
 const FAR_M: f64 = 100_000.0;
 /// Largest distance between welded vertices, as a share of the mesh's diagonal.
 const WELD: f64 = 1e-9;
-/// Largest distance of a wall's opening from an end, as a share of the wall's length. [`END_M`] applies if it is
-/// larger.
+/// Largest distance of a wall's opening from an end of the mesh, as a share of the wall's length. [`END_M`] applies
+/// if it is larger.
 const END: f64 = 0.02;
-/// Alternative to [`END`], metres. Either distance is limited to a quarter of the length, which keeps the ends apart.
+/// Largest distance of a wall's opening from an end of the mesh, metres, where it exceeds the share [`END`]. Both
+/// limits are at most a quarter of the length, which keeps the ends apart.
 const END_M: f64 = 0.5;
 
-/// A checked surface.
+/// A checked surface of triangles.
 #[derive(Debug, Clone)]
 pub(super) struct Surface {
     pub(super) vertices: Vec<[f64; 3]>,
     pub(super) faces: Vec<[u32; 3]>,
-    /// Number of each face in the input.
+    /// Number that each face has in the input.
     pub(super) given: Vec<u32>,
-    /// Caps that close the openings of a wall.
+    /// Caps of triangles that close the openings of a wall.
     pub(super) caps: Vec<Cap>,
     pub(super) low: [f64; 3],
     pub(super) high: [f64; 3],
 }
 
-/// Triangles that close an opening, and their bounding box.
+/// Triangles that close an opening of a wall, and their bounding box.
 #[derive(Debug, Clone)]
 pub(super) struct Cap {
     pub(super) triangles: Vec<[[f64; 3]; 3]>,
@@ -48,7 +49,7 @@ pub(super) struct Cap {
     pub(super) high: [f64; 3],
 }
 
-/// An opening: connected edges that belong to only one face each.
+/// A hole in the surface: connected edges that belong to only one face each.
 struct Hole {
     edges: Vec<[u32; 2]>,
     low_x: f64,
@@ -100,7 +101,7 @@ impl Surface {
     }
 }
 
-/// Checks the number of elements, the corner numbers and the coordinates.
+/// Checks the number of elements, the vertex numbers of the faces, and the coordinates.
 fn numbers(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<(), MeshError> {
     for (what, given) in [("vertices", vertices.len()), ("faces", faces.len())] {
         if u32::try_from(given).is_err() {
@@ -142,8 +143,8 @@ pub(super) fn diagonal(low: [f64; 3], high: [f64; 3]) -> f64 {
 /// For each vertex, the number of the first vertex within welding distance.
 fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     let near = (WELD * diagonal).max(f64::MIN_POSITIVE);
-    // A cell is several times as wide as the welding distance. Most vertices therefore search only one cell, and no
-    // cell holds many vertices.
+    // A cell is several times as wide as the welding distance. For most vertices only one cell is therefore searched,
+    // and no cell holds many vertices.
     let cell = 8.0 * near;
     let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let mut welded = Vec::with_capacity(vertices.len());
@@ -168,7 +169,7 @@ fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     welded
 }
 
-/// Edges that belong to only one face.
+/// Edges of the surface that belong to only one face.
 fn open_edges(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<Vec<[u32; 2]>, MeshError> {
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(faces.len() * 3);
     for &[a, b, c] in faces {
@@ -223,9 +224,9 @@ fn holes(vertices: &[[f64; 3]], open: &[[u32; 2]]) -> Vec<Hole> {
     holes.into_values().collect()
 }
 
-/// Returns an error if there is any hole.
+/// Returns an error if the surface has any hole.
 fn refuse(vertices: &[[f64; 3]], holes: &[&Hole]) -> Result<(), MeshError> {
-    // The first hole counts if several are equally large.
+    // If several holes are equally large, the first one is reported.
     let Some(largest) = holes.iter().rev().max_by_key(|hole| hole.edges.len()) else {
         return Ok(());
     };

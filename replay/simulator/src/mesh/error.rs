@@ -6,37 +6,37 @@ use core::fmt;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// The file cannot be read as PLY.
+    /// The mesh file cannot be read as PLY.
     #[error("reading PLY: {0}")]
     File(String),
-    /// No triangle is left in the mesh.
+    /// No triangle is left in the mesh after triangles with two coinciding corners are dropped.
     #[error("the mesh has no face ({given} given; those with two corners in one place don't count)")]
     NoFaces {
         /// Number of triangles in the input. Each has two coinciding corners.
         given: usize,
     },
-    /// There are more elements than 32 bits can number.
+    /// The mesh has more elements than 32 bits can number.
     #[error("the mesh has {given} {what}; at most {} can be numbered", u32::MAX)]
     TooMany {
-        /// Kind of element.
+        /// Kind of element: vertices or faces.
         what: &'static str,
-        /// Number of elements.
+        /// Number of elements of this kind in the mesh.
         given: usize,
     },
     /// A triangle refers to a vertex that does not exist.
     #[error("face {face} has vertex {vertex} as a corner, of {vertices} vertices (both counted from 0)")]
     NoSuchVertex {
-        /// Number of the face.
+        /// Number of the face that refers to a missing vertex.
         face: usize,
         /// Number of the missing vertex.
         vertex: u32,
-        /// Number of vertices.
+        /// Number of vertices in the mesh.
         vertices: usize,
     },
-    /// The coordinates of a vertex are not finite or too large.
+    /// A coordinate of a vertex is too large or not finite.
     #[error("vertex {vertex} (counted from 0) is at {}; coordinates must be finite and within 100 km of 0", At(*at))]
     FarVertex {
-        /// Number of the vertex.
+        /// Number of the vertex with the invalid coordinate.
         vertex: usize,
         /// Coordinates of the vertex, metres.
         at: [f64; 3],
@@ -48,7 +48,7 @@ pub enum MeshError {
         from: [f64; 3],
         /// The other end of the edge, metres.
         to: [f64; 3],
-        /// Number of faces at the edge.
+        /// Number of faces that meet at the edge.
         faces: usize,
     },
     /// A body is not closed, or a wall is open between its ends.
@@ -61,7 +61,7 @@ pub enum MeshError {
         /// A vertex on the rim of the largest hole, metres.
         at: [f64; 3],
     },
-    /// An end of a wall is closed.
+    /// An end of a mesh that is a wall is closed.
     #[error(
         "the wall is closed at its end at x = {x_m:.3} m; it must have an opening within {within_m:.3} m of it"
     )]
@@ -73,7 +73,7 @@ pub enum MeshError {
     },
 }
 
-/// A position as text.
+/// Formats a position as text.
 struct At([f64; 3]);
 
 impl fmt::Display for At {

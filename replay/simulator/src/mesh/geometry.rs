@@ -27,7 +27,7 @@ pub(super) enum Crossing {
 pub(super) struct Ray {
     origin: [f64; 3],
     inverse: [f64; 3],
-    /// Numbers of the axes. The axis nearest to the ray's direction is last.
+    /// Numbers of the coordinate axes. The axis nearest to the ray's direction is last.
     axes: [usize; 3],
     /// Shear that maps the ray onto the last axis: amounts subtracted from the first two coordinates per unit of the
     /// last, and the scale of the last coordinate.
@@ -76,7 +76,8 @@ impl Ray {
                 far = last;
             }
         }
-        // The bound is below any hit in the box, even at range 0. An equal hit in another box is therefore found too.
+        // The bound is less than the range of any hit in the box, even at range 0. A hit at an equal range in another
+        // box is therefore found too.
         if near <= far * WIDER { near / WIDER / WIDER - f64::MIN_POSITIVE } else { f64::INFINITY }
     }
 

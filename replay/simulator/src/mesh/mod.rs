@@ -49,7 +49,7 @@ const WAYS_OUT: [[f64; 3]; 6] = [
 /// The point where a ray hits a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshHit {
-    /// Distance from the ray's origin, metres.
+    /// Distance from the ray's origin to the hit, metres.
     pub range_m: f64,
     /// Unit normal of the face, on the side from which the ray comes.
     pub normal: [f64; 3],
@@ -68,8 +68,8 @@ impl Mesh {
     /// Checks triangles and builds the tree for casting rays.
     ///
     /// Vertices closer than 1e-9 of the mesh's size are welded, and triangles with two corners in one place are
-    /// dropped. Openings of a wall lie within 2 % of its length or 0.5 m of an end. The larger distance applies, but at
-    /// most a quarter of the length.
+    /// dropped. Each opening of a wall must lie near an end: within 2 % of the wall's length or 0.5 m, whichever is
+    /// larger, but at most within a quarter of the length.
     ///
     /// Errors: a coordinate is out of range, a corner does not exist, there is no face, an edge has more than two
     /// faces, a body or a wall between its ends has a hole, or an end of a wall is closed. Allocates: about 190 bytes
@@ -97,7 +97,8 @@ impl Mesh {
     /// if there is no hit, or if a number other than `far_m` is not finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // Kept in addition to the tree's own best hit. Among equal ranges, the tree returns the first hit visited.
+        // Range and face of the best hit. The smallest face number wins at equal ranges, while the tree itself would
+        // return the hit that it visits first.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,
@@ -123,7 +124,7 @@ impl Mesh {
     /// parts counts as outside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
-        // The negated comparison places NaN outside.
+        // The negated comparison counts a point with NaN as outside.
         if !(0..3).all(|k| point[k] >= low[k] && point[k] <= high[k]) {
             return false;
         }

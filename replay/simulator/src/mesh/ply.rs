@@ -13,7 +13,7 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// Maximum length of an error text. An error quotes a line of the file, which may have any length.
 const MAX_ERROR_CHARS: usize = 300;
 
-/// Triangles as in the file.
+/// Triangles as read from the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Triangles {
     /// Coordinates of the corners, in the file's units, which are taken as metres.

@@ -1,4 +1,4 @@
-//! Rays, inside tests and checks of generated meshes.
+//! Tests with generated meshes: rays, inside tests and checks.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A number in [-1, 1).
+    /// The next pseudo-random number in [-1, 1).
     fn signed(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
@@ -233,7 +233,7 @@ fn no_ray_slips_between_triangles() {
             let (direction, distance) = toward(origin, target);
             let hit = mesh.cast(origin, direction, f64::INFINITY);
             let range = hit.unwrap_or_else(|| panic!("out by {target:?} from {origin:?}")).range_m;
-            // The centre of the rough body may be hidden from a point off its centre.
+            // From a point off the centre of the rough body, another face may hide the target.
             assert!(
                 range < distance + 1e-9 && (i % 2 == 1 || range > distance - 1e-9),
                 "{range}, not {distance}"
@@ -256,8 +256,8 @@ fn no_ray_from_the_axis_of_a_tube_slips_through_its_wall() {
 }
 
 #[test]
-fn degenerate_triangles_leak_no_rays_and_keep_ranges_right() {
-    // Points on an edge of the box's upper face split off a corner, so the face contains triangles without area.
+fn degenerate_triangles_leak_no_rays_and_keep_ranges_exact() {
+    // A third vertex on an edge splits a triangle of the box's upper face. One of the three pieces has no area.
     let mut t = cuboid([1.0, 1.0, 1.0]);
     let old =
         t.faces.iter().position(|face| face.contains(&4) && face.contains(&5) && face.contains(&7)).unwrap();
@@ -278,12 +278,12 @@ fn degenerate_triangles_leak_no_rays_and_keep_ranges_right() {
 }
 
 #[test]
-fn first_face_wins_at_equal_ranges() {
+fn lowest_face_number_wins_at_equal_ranges() {
     let triangles = cuboid([1.0, 2.0, 3.0]);
     let hit = |t: &Triangles, direction| {
         Mesh::new(t.clone(), Role::Body).unwrap().cast([0.0; 3], direction, 9.0).unwrap()
     };
-    // The diagonals of the faces cross in the middle.
+    // The faces' diagonals, which are edges of triangles, cross in the middle.
     let along_x = hit(&triangles, [1.0, 0.0, 0.0]);
     assert_eq!(along_x, MeshHit { range_m: 1.0, normal: [-1.0, 0.0, 0.0], face: 2 });
     assert_eq!(hit(&triangles, [0.0, 0.0, -1.0]).face, 8);
@@ -295,7 +295,7 @@ fn first_face_wins_at_equal_ranges() {
 }
 
 #[test]
-fn ranges_are_bit_identical_for_any_order_of_faces() {
+fn ranges_are_bit_identical_whatever_the_order_of_faces() {
     let triangles = rough_body();
     let mut shuffled = triangles.clone();
     let mut random = Random(8);
@@ -324,7 +324,7 @@ fn non_finite_rays_hit_nothing() {
 }
 
 #[test]
-fn points_before_the_first_hit_from_within_are_inside() {
+fn points_between_an_inner_point_and_its_first_hit_are_inside() {
     for (triangles, role) in [(rough_body(), Role::Body), (rough_tube(), Role::Wall)] {
         let mut turned = triangles.clone();
         turned.faces.iter_mut().step_by(2).for_each(|face| face.swap(0, 1));

@@ -8,7 +8,7 @@ fn refused(triangles: &Triangles, role: Role) -> String {
 }
 
 #[test]
-fn numbers_out_of_range_are_refused() {
+fn corner_numbers_and_coordinates_out_of_range_are_refused() {
     let cube = cuboid([1.0; 3]);
     let mut t = cube.clone();
     t.faces[5][1] = 8;
@@ -91,7 +91,7 @@ fn body_with_holes_is_refused() {
 }
 
 #[test]
-fn wall_is_open_only_at_its_ends() {
+fn mesh_wall_may_be_open_only_at_its_ends() {
     let whole = tube(100, 8, 100.0, || 2.0);
     assert!(Mesh::new(whole.clone(), Role::Wall).is_ok());
 

@@ -82,7 +82,7 @@ fn triangles_are_read_back_in_every_encoding() {
 }
 
 #[test]
-fn polygons_are_split_into_triangles_and_text_keeps_its_digits() {
+fn polygons_are_split_into_triangles_and_text_files_keep_all_digits() {
     let ply = "ply\r\nformat ascii 1.0\r\nelement vertex 5\r\nproperty float x\r\nproperty int y\r\nproperty float \
                z\r\nelement face 1\r\nproperty list uchar uint vertex_index\r\nend_header\r\n0 0 0\r\n0.1 0 0\r\n1 1 0\r\n0 \
                1 0\r\n-1 0.5 12345.678\r\n5 0 1 2 3 4\r\n\r\n";
@@ -99,7 +99,7 @@ fn refused(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn text_file_faults_are_described() {
+fn faults_in_text_ply_files_are_described() {
     let good = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement \
                 face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     assert!(read(good.as_bytes()).is_ok());
@@ -137,7 +137,7 @@ fn text_file_faults_are_described() {
 }
 
 #[test]
-fn binary_file_faults_are_described() {
+fn faults_in_binary_ply_files_are_described() {
     let binary = ply(&sample(), "binary_big_endian");
     let faces = binary.len() - 80 * 17;
     let words = refused(&binary[..faces + 3]);
@@ -156,7 +156,7 @@ fn binary_file_faults_are_described() {
 }
 
 #[test]
-fn wrong_counts_allocate_no_memory() {
+fn wrong_element_counts_in_ply_files_allocate_no_memory() {
     let file = |vertices: u64, list: &str| {
         format!(
             "ply\nformat binary_little_endian 1.0\nelement nothing {vertices}\nelement vertex {vertices}\nproperty float \
@@ -173,7 +173,7 @@ fn wrong_counts_allocate_no_memory() {
     long_list.extend([0xFF; 4]);
     let words = refused(&long_list);
     assert!(words.contains("end of file") && words.contains("'face'"), "{words}");
-    // A truncated file in text encoding.
+    // A file in text encoding that is cut off.
     let text = file(u64::MAX, "uint").replace("binary_little_endian", "ascii");
     assert!(refused(text.as_bytes()).contains("end of file"));
 }
@@ -181,7 +181,7 @@ fn wrong_counts_allocate_no_memory() {
 proptest! {
     /// Arbitrary bytes give a mesh or an error, and never a panic.
     #[test]
-    fn any_bytes_give_a_mesh_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
+    fn arbitrary_bytes_give_mesh_or_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
         let starts = ["", "ply\nformat ascii 1.0\n", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float "];
         let bytes = [starts[start].as_bytes(), &bytes].concat();
         if let Ok(t) = read(&bytes) {

@@ -9,17 +9,17 @@ use super::place::Place;
 use crate::clock::START;
 use crate::random::Stream;
 
-/// Time between two decisions, s.
+/// Time between two decisions of the pilot, s.
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// A position depends on the knots up to this many after its time.
+/// Number of knots after a time on which the position at that time depends.
 const KNOTS_AHEAD: i64 = 3;
-/// Speed at which the pilot goes back, m/s.
+/// Speed at which the pilot goes back to a missed stretch, m/s.
 const BACK_MPS: f64 = 0.2;
-/// Distance behind the vehicle, m, at which a missed stretch makes the pilot go back. After it, the run-up before the
-/// second pass, m.
+/// Least distance of a missed stretch behind the vehicle at which the pilot goes back, m.
 const BEHIND_M: f64 = 3.0;
+/// Run-up before the second pass over a missed stretch, m.
 const RUN_UP_M: f64 = 2.5;
 /// Period over which the ratio of driven to advised speed varies, s.
 const HOLD_S: f64 = 20.0;
@@ -28,10 +28,10 @@ const MOST_STOOD_S: f64 = 120.0;
 /// Time that the pilot waits for further advice at the end, s.
 const WAITS_S: f64 = 10.0;
 
-/// The advice at one time.
+/// The monitor's advice to the pilot at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PilotAdvice {
-    /// Time of the advice.
+    /// Time at which the advice is given.
     pub at: MonoNs,
     /// Largest speed that meets the sampling target, m/s; zero if no speed does, `None` if unknown.
     pub v_max_mps: Option<f64>,
@@ -49,17 +49,17 @@ pub(super) struct Hurry {
     pub(super) speed_mps: f64,
 }
 
-/// Parameters of a pilot.
+/// Parameters of a pilot who follows advice.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heeding {
-    /// Chainage of the start and the end, m. The end has the larger chainage.
+    /// Chainages of the dive's start and end, m. The end has the larger chainage.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
     /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
-    /// Maximum speed, m/s.
+    /// Maximum speed of the vehicle, m/s.
     pub(super) speed_mps: f64,
-    /// Delay between advice and action, at least 3 s.
+    /// Delay between advice and the pilot's action, at least 3 s.
     pub(super) lag_s: f64,
     /// Largest relative shortfall of the driven speed below the advised speed.
     pub(super) within: f64,
@@ -68,7 +68,7 @@ pub(super) struct Heeding {
     /// Whether the pilot stops when advised to, and waits for the first advice before setting out. The monitor advises
     /// stops to estimate gyro biases, or if it has no position.
     pub(super) stands: bool,
-    /// Time that the pilot waits before setting out, s.
+    /// Time that the pilot waits at the dive's start before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
     /// Maximum duration of the dive, s.
@@ -86,7 +86,7 @@ enum Doing {
     Done,
 }
 
-/// The pilot and the motion decided so far.
+/// The advised pilot, and the trajectory decided so far.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Advised {
     pilot: Heeding,
@@ -101,7 +101,7 @@ pub(super) struct Advised {
     farthest_m: f64,
     /// Missed stretches that the pilot has gone back for.
     tried_m: Vec<[f64; 2]>,
-    /// Number of the next knot to decide.
+    /// Number of the next knot of the trajectory to decide.
     next: i64,
     ended_s: Option<f64>,
     /// Total time that the pilot has kept the vehicle stationary because of advice, s.
@@ -147,7 +147,7 @@ impl Advised {
         place
     }
 
-    /// Lets a current carry the vehicle.
+    /// Lets the water's flow carry the vehicle.
     pub(super) fn carry(&mut self, flow: &Flow) {
         self.flow = flow.clone();
     }

@@ -7,7 +7,7 @@ use super::legs::{Leg, Legs};
 use super::pilot::Piloted;
 use super::place::Place;
 
-/// A trajectory from the dive's start to its end.
+/// A trajectory of the vehicle from the dive's start to its end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     base: Base,
@@ -30,12 +30,12 @@ impl Trajectory {
         Self { duration_s: legs.duration_s(), base: Base::Legs(legs), sways: Vec::new() }
     }
 
-    /// Creates a smooth trajectory along knots for `duration_s`.
+    /// Creates a smooth trajectory through knots, with duration `duration_s`.
     pub fn of_knots(knots: Knots, duration_s: f64) -> Self {
         Self { base: Base::Knots(knots), sways: Vec::new(), duration_s }
     }
 
-    /// Creates a pilot's trajectory.
+    /// Creates the trajectory of a pilot who gets no advice.
     pub(super) fn piloted(piloted: Piloted) -> Self {
         Self { duration_s: piloted.duration_s(), base: Base::Piloted(Box::new(piloted)), sways: Vec::new() }
     }
@@ -78,7 +78,7 @@ impl Trajectory {
         place
     }
 
-    /// Adds a further motion over the current duration.
+    /// Adds a further motion to the trajectory. The duration stays the same.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }

@@ -1,4 +1,4 @@
-//! The water's flow along the tunnel.
+//! Flow of the water along the tunnel.
 
 use crate::stretch::Stretch;
 

@@ -4,7 +4,7 @@ use headrace_geometry::math;
 
 use crate::random::Stream;
 
-/// Offsets along the axis, left and up, m; roll, pitch and yaw, radians.
+/// Offsets of the vehicle: along the axis, left and up, m; roll, pitch and yaw, radians.
 pub type Offsets = [f64; 6];
 
 /// Control points of a spline, `spacing_s` apart. The first point lies one spacing before the start.
@@ -31,8 +31,8 @@ impl Knots {
         }
     }
 
-    /// Offsets `after_s` seconds after the start. Before the first and after the last knot the motion continues
-    /// straight.
+    /// Offsets of the vehicle `after_s` seconds after the start. Before the first and after the last knot the motion
+    /// continues straight.
     pub fn at(&self, after_s: f64) -> Offsets {
         let inside = (self.points.len() as f64 - 3.0) * self.spacing_s;
         let within_s = after_s.clamp(0.0, inside.max(0.0));
@@ -90,7 +90,7 @@ impl Knots {
 /// Control points are half a period apart and uniformly distributed. The standard deviation is 0.4 of the amplitude.
 pub fn wandering(stream: Stream, duration_s: f64, period_s: f64, reach: Offsets) -> Knots {
     Knots::new(duration_s, period_s / 2.0, |k| {
-        // The number of the first knot is -1.
+        // The first control point has number -1.
         let step = (k + 1).unsigned_abs();
         let numbers = [0, 1, 2].map(|block| stream.block(step, block).uniform());
         let mut point = reach;

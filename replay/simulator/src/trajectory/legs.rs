@@ -1,19 +1,19 @@
-//! Legs at constant speed.
+//! Trajectories of legs at constant speed.
 
 use super::flow::Flow;
 use super::place::Place;
 
-/// Lowest speed of a leg, m/s.
+/// Lowest allowed speed of a leg, m/s.
 const SLOWEST_MPS: f64 = 1e-3;
 /// Minimum length of a piece of a leg that is cut at a change of the flow, m.
 const SHORTEST_M: f64 = 1e-6;
 
-/// A leg at constant speed.
+/// A leg of a trajectory, driven at constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
-    /// Distance, m, positive.
+    /// Length of the leg, m, positive.
     pub distance_m: f64,
-    /// Speed over ground, m/s; negative if backwards.
+    /// Speed on the leg over ground, m/s; negative if backwards.
     pub speed_mps: f64,
 }
 
@@ -23,7 +23,7 @@ impl Leg {
     }
 }
 
-/// Legs in sequence, level and parallel to the axis, at one position in the cross-section.
+/// Trajectory of legs in sequence, level and parallel to the axis, at one position in the cross-section.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Legs {
     across_m: [f64; 2],
@@ -66,7 +66,7 @@ impl Legs {
             let (mut at_m, mut left_m, towards) = (*begins_m, leg.distance_m, leg.speed_mps.signum());
             while left_m > 0.0 {
                 let change_m = flow.next_change_m(at_m, at_m + towards * left_m);
-                // An uncut leg keeps its exact length.
+                // A leg that no change of the flow cuts keeps its exact length.
                 let distance_m = left_m.min((change_m - at_m).abs());
                 let is_last = distance_m >= left_m - SHORTEST_M;
                 let distance_m = if is_last { left_m } else { distance_m };

@@ -1,4 +1,4 @@
-//! Reads the `[trajectory]` table.
+//! Reads the `[trajectory]` table of a scene.
 
 use std::ops::RangeInclusive;
 
@@ -23,7 +23,7 @@ const SPEED_MPS: RangeInclusive<f64> = 0.001..=5.0;
 const DEGREES: RangeInclusive<f64> = -80.0..=80.0;
 const REACH_M: RangeInclusive<f64> = 0.0..=100.0;
 const REACH_DEG: RangeInclusive<f64> = 0.0..=80.0;
-/// Name of the random streams of trajectories.
+/// Name under which trajectories draw random numbers.
 const NAME: &str = "trajectory";
 
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +43,8 @@ const KINDS: [(&str, TrajectoryKind); 5] = [
     ("recorded", TrajectoryKind::Recorded),
 ];
 
-/// Reads a trajectory in a tunnel of this design. Also returns the reference of its speeds.
+/// Reads a trajectory in a tunnel of this design. Also returns whether its speeds are relative to the water or to the
+/// tunnel.
 ///
 /// Errors: a key is missing, unknown or out of range, or the trajectory goes beyond the ends of the tunnel.
 pub(crate) fn parse(

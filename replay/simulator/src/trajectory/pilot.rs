@@ -7,22 +7,22 @@ use super::knots::{Knots, Offsets, wandering};
 use super::place::Place;
 use crate::random::Stream;
 
-/// Time between two decisions, s.
+/// Time between two decisions of the pilot, s.
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
 /// Ratio of a dive's duration to its duration without stops, above which the dive counts as endless.
 const MOST_TIMES_AS_LONG: f64 = 50.0;
 
-/// Parameters of a pilot.
+/// Parameters of a pilot who gets no advice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pilot {
-    /// Chainage of the start and the end, m.
+    /// Chainages of the dive's start and end, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
     /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
-    /// Speed while moving, m/s.
+    /// Speed while the vehicle moves, m/s.
     pub(super) speed_mps: f64,
     /// Number of stops per hour and of reversals per hour.
     pub(super) stops_per_hour: f64,
@@ -54,7 +54,7 @@ enum Doing {
 }
 
 impl Pilot {
-    /// The chainage at each step, and one step before the first.
+    /// The vehicle's chainage at each time step, and one step before the first.
     ///
     /// Errors, as text: the trajectory never ends.
     fn chainages_m(&self, stick: Stream, flow: &Flow) -> Result<Vec<f64>, String> {
@@ -131,7 +131,7 @@ impl Piloted {
         place
     }
 
-    /// Recomputes the trajectory for a current.
+    /// Recomputes the pilot's trajectory for a current.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         self.go(flow).map_err(|why| format!("carries the vehicle off: it {why}"))
     }

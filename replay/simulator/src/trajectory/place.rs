@@ -1,19 +1,19 @@
-//! Positions along the tunnel, relative to the axis.
+//! Poses of the vehicle along the tunnel, relative to the axis.
 
 use super::knots::Offsets;
 
 /// Pose of the vehicle relative to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Chainage, m.
+    /// Chainage of the vehicle, m.
     pub chainage_m: f64,
-    /// Position in the cross-section: y left, z up from the floor's centre, m.
+    /// Position of the vehicle in the cross-section: y left, z up from the floor's centre, m.
     pub across_m: [f64; 2],
-    /// Roll, pitch and yaw relative to the axis, radians.
+    /// Roll, pitch and yaw of the vehicle relative to the axis, radians.
     pub turned_rad: [f64; 3],
 }
 
-/// Reference of the speeds of a trajectory.
+/// Reference that the speeds of a trajectory are relative to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
     /// The speeds are relative to the water. A current carries the vehicle.

@@ -10,7 +10,7 @@ const SPACING_S: f64 = 0.1;
 /// Maximum duration of a recorded trajectory, s: two days.
 const MAX_S: f64 = 172_800.0;
 
-/// A pose with its time, s.
+/// A recorded pose with its time, s.
 type Timed = (f64, Offsets);
 
 /// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; returns the poses. Times count from the first

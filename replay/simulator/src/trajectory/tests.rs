@@ -75,7 +75,7 @@ const PILOT: &str = "kind = \"pilot\"\nplace_m = [0, 5]\nstart_m = 3\nspeed_mps 
                      backs_per_hour = 90\nwander_yaw_deg = 8\nwander_s = 10\n";
 
 #[test]
-fn pilot_reaches_the_end_within_bounds_both_ways() {
+fn pilot_reaches_the_end_within_bounds_in_both_directions() {
     for (from_m, to_m) in [(3.0, 60.0), (3.0, -15.0)] {
         for seed in 0..20 {
             let (trajectory, ground) = parsed(&format!("{PILOT}to_m = {to_m}\n"), seed).unwrap();
@@ -90,7 +90,7 @@ fn pilot_reaches_the_end_within_bounds_both_ways() {
                 back += usize::from(gone_m < -0.02);
             }
             for Place { chainage_m, across_m: [y, z], turned_rad: [roll, pitch, yaw] } in &steps {
-                // A pilot who goes back stops at the start.
+                // A pilot who goes back doesn't pass the dive's start by more than a metre.
                 let inside = (from_m.min(to_m) - 1.0..=from_m.max(to_m) + 1.0).contains(chainage_m);
                 assert!(inside && y.abs() <= 0.5 && (z - 5.0).abs() <= 0.3, "{seed}: {chainage_m} {y} {z}");
                 assert!(yaw.to_degrees().abs() <= 8.0 && roll.abs() + pitch.abs() == 0.0);
@@ -121,7 +121,7 @@ fn pilot_goes_back_the_given_distance() {
 }
 
 #[test]
-fn pilot_depends_only_on_the_seed() {
+fn pilot_trajectory_depends_only_on_the_seed() {
     let at = |seed| parsed(&format!("{PILOT}to_m = 60\n"), seed).unwrap().0;
     assert_eq!(at(4), at(4));
     assert_ne!(at(4), at(5));
@@ -239,8 +239,8 @@ fn random_drift_has_the_given_amplitude_and_spread() {
         products += offsets[0] * offsets[1] / f64::from(count);
     }
     for (variance, reach) in squares.into_iter().zip(reach) {
-        // The tolerance fits about 2,000 independent intervals. The variance is 151/315 of the variance of uniform
-        // random numbers.
+        // The tolerance is that of a variance from about 2,000 independent values. The variance is 151/315 of the
+        // variance of uniform random numbers.
         let wanted = reach * reach / 3.0 * 151.0 / 315.0;
         assert!((variance - wanted).abs() <= 0.1 * wanted, "{variance} {wanted}");
     }

@@ -1,4 +1,4 @@
-//! Waypoints, with one speed for each stretch between waypoints.
+//! Trajectories through waypoints, with one speed for each stretch between waypoints.
 
 use headrace_geometry::math;
 
@@ -7,14 +7,14 @@ use super::knots::{Knots, Offsets};
 /// Interval of the knots, s. Corners are rounded over four intervals.
 pub(super) const SPACING_S: f64 = 0.5;
 
-/// A waypoint.
+/// A waypoint of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Waypoint {
-    /// Position and attitude.
+    /// Position and attitude of the vehicle at the waypoint.
     pub(super) at: Offsets,
-    /// Speed from the previous waypoint, m/s.
+    /// Speed from the previous waypoint to this one, m/s.
     pub(super) speed_mps: f64,
-    /// Duration of the stop, s.
+    /// Duration of the stop at the waypoint, s.
     pub(super) stay_s: f64,
 }
 

@@ -27,7 +27,7 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// D from all candidate maxima of f, without any code of the search.
+/// Diameter D of the largest hole from all candidate maxima of f, without any code of the search under test.
 ///
 /// Candidates are the circumcentres of three samples (or of their images), and points on the section's two ends that
 /// are equidistant from two samples.
@@ -37,7 +37,7 @@ fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64)
     let mut candidates = Vec::new();
     for (i, a) in images.iter().enumerate() {
         for (j, b) in images.iter().enumerate().skip(i + 1) {
-            // |c - a| = |c - b| is the line n . c = k.
+            // The points c with |c - a| = |c - b| form the line n . c = k.
             let n = (b.0 - a.0, b.1 - a.1);
             let k = (b.0 * b.0 + b.1 * b.1 - a.0 * a.0 - a.1 * a.1) / 2.0;
             if n.1.abs() > 1e-12 {
@@ -75,9 +75,9 @@ proptest! {
         prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
     }
 
-    /// The reference for the window's search is brute force.
+    /// The reference for the nearest-sample search in a window is brute force.
     #[test]
-    fn window_finds_the_nearest_sample(
+    fn window_search_finds_the_nearest_sample(
         samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
         place in (0.0f64..1.0, -8.0f64..16.0),
         within_m in 0.05f64..3.0,
@@ -86,7 +86,7 @@ proptest! {
         let mut window = Window::default();
         window.fill((&store(PERIMETER_M, &samples), 0), 0.0, (-3.0, 4.0), cell_m);
         let expected = Some(nearest_m(PERIMETER_M, &samples, place)).filter(|d| *d <= within_m);
-        let found = window.nearest(place.0, place.1, within_m);
+        let found = window.nearest(WallPoint { x_m: place.0, arc_m: place.1 }, within_m);
         match (found, expected) {
             (Some(found), Some(expected)) => {
                 prop_assert!((math::sqrt(found.distance2) - expected).abs() < 1e-12);
@@ -98,7 +98,8 @@ proptest! {
         }
     }
 
-    /// D lies within the bounds of a tolerant search, whose distance is at most the tolerance.
+    /// The exact diameter D lies within the bounds found by a search with a tolerance. The bounds are at most
+    /// the tolerance apart.
     ///
     /// A verdict from these bounds equals the exact one, or is undecided if T lies between them.
     #[test]
@@ -119,7 +120,7 @@ proptest! {
         }
     }
 
-    /// The bounds also hold with packed samples, because they include the displacement by packing.
+    /// The bounds also hold for packed samples, because they include the displacement that packing causes.
     #[test]
     fn bounds_with_packed_samples_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -143,7 +144,8 @@ proptest! {
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
-        // Elsewhere, samples are closer together than the gap in the crowded cell.
+        // Everywhere else, samples are closer together than the gap in the crowded cell, so the largest hole
+        // is in that cell.
         let fence = (-6..=14).flat_map(|i| (0..180).map(move |k| (f64::from(i) * 0.05, f64::from(k) * 0.05)));
         samples.extend(fence.filter(|s| !(4.0..4.4).contains(&s.1)));
         let thinned = store(PERIMETER_M, &samples);
@@ -165,7 +167,7 @@ proptest! {
 
     /// In a small pipe, holes are wider than the perimeter.
     #[test]
-    fn pipe_narrower_than_its_holes_agrees_with_brute_force(
+    fn hole_wider_than_the_perimeter_agrees_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
     ) {
         let hole = largest(1.1, &samples, 0.0, 0.5);
@@ -175,7 +177,7 @@ proptest! {
 
     /// On a lattice, every local maximum is equidistant from four samples.
     #[test]
-    fn hole_of_a_lattice_is_as_wide_as_its_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
+    fn lattice_hole_is_as_wide_as_the_lattice_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
         let mut samples = Vec::new();
         for i in -12..=12 {
@@ -189,7 +191,8 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// D does not depend on the order of the samples, on the seam or on the origin of the chainage.
+    /// D depends neither on the order of the samples, nor on the seam of the unrolled wall, nor on the origin
+    /// of the chainage.
     #[test]
     fn hole_is_independent_of_sample_order_seam_and_chainage_origin(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
@@ -207,7 +210,7 @@ proptest! {
 }
 
 #[test]
-fn hole_without_a_sample_in_reach_is_unbounded() {
+fn hole_is_unbounded_if_no_sample_is_within_the_search_radius() {
     let empty = largest(PERIMETER_M, &[], 0.0, 0.25);
     assert!(!empty.bounded);
     let far = largest(PERIMETER_M, &[(35.0, 1.0)], 0.0, 0.25);
@@ -223,7 +226,7 @@ fn hole_of_a_single_sample_is_on_the_opposite_wall() {
 }
 
 #[test]
-fn hole_of_collinear_repeated_and_coincident_samples_is_right() {
+fn hole_of_collinear_repeated_and_coincident_samples_is_correct() {
     let line: Vec<_> = (0..90).map(|i| (0.1, f64::from(i) * 0.1)).collect();
     let expected = brute_force(PERIMETER_M, &line[..20], 0.0, 0.25);
     let hole = largest(PERIMETER_M, &line[..20], 0.0, 0.25);
@@ -237,7 +240,7 @@ fn hole_of_collinear_repeated_and_coincident_samples_is_right() {
 }
 
 #[test]
-fn hole_of_samples_with_nanometre_and_metre_spacings_is_right() {
+fn hole_of_samples_with_nanometre_and_metre_spacings_is_correct() {
     let mut samples: Vec<_> = (0..20).map(|i| (f64::from(i) * 1e-9, 3.0 + f64::from(i % 3) * 1e-9)).collect();
     samples.extend([(0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)]);
     let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];
@@ -247,7 +250,7 @@ fn hole_of_samples_with_nanometre_and_metre_spacings_is_right() {
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel, D is the same to within the precision of doubles at that chainage.
+/// Far along the tunnel, D is the same to within the floating-point precision at that chainage.
 #[test]
 fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =
@@ -276,7 +279,7 @@ fn hole_is_the_same_at_7_km_and_at_1000_km() {
 ///
 /// The samples are positions only, without steps.
 #[test]
-fn ideal_helices_have_the_reference_holes() {
+fn largest_holes_of_ideal_helices_match_reference_values() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();
     let perimeter_m = profile.perimeter_m();
     let modes = [
@@ -333,7 +336,7 @@ fn samples_of_visits_before_the_requested_one_are_ignored() {
 
 /// A hole that has grown, moved along or around the tunnel, or become unbounded is a different hole.
 #[test]
-fn holes_are_alike_if_size_and_position_differ_by_under_1_cm() {
+fn holes_count_as_equal_if_size_and_position_differ_by_under_1_cm() {
     let hole = Hole { diameter_m: 0.6, least_m: 0.6, most_m: 0.6, x_m: 7.0, arc_m: 3.0, bounded: true };
     let little = Hole { diameter_m: 0.609, x_m: 6.991, arc_m: 3.009, ..hole };
     assert!(hole.is_like(&little) && little.is_like(&hole));

@@ -8,7 +8,7 @@ const SECTION_M: f64 = 0.25;
 
 /// Sections of a stretch from a metre before the portal to 10 m, for a target of 0.5 m.
 fn sections() -> Sections {
-    Sections::new(SECTION_M, 0.5, -1.0, 10.0)
+    Sections::new(SECTION_M, Target::new(0.5), -1.0, 10.0)
 }
 
 #[test]
@@ -25,7 +25,7 @@ fn stretch_contains_all_existing_sections_that_it_touches() {
 ///
 /// A section that is not judged counts as open.
 #[test]
-fn each_section_counts_in_metres_once_by_its_latest_verdict() {
+fn each_section_counts_once_in_the_metres_of_its_latest_verdict() {
     let mut sections = sections();
     let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|verdict| Some(verdict as usize));
     for (before, now) in [(None, fail), (None, fail), (None, fail), (None, pass), (fail, pass), (fail, None)]
@@ -40,9 +40,9 @@ fn each_section_counts_in_metres_once_by_its_latest_verdict() {
 
 /// A section with pings has the error of its own passes.
 ///
-/// A section without pings has the largest error of the sections within T / 2, and no other.
+/// A section without pings has the largest error of the sections within half the target.
 #[test]
-fn section_without_pings_takes_the_largest_position_error_nearby() {
+fn section_without_pings_has_the_largest_position_error_nearby() {
     let error_of = |placed_in: i64, asked: i64| {
         let mut sections = sections();
         for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
@@ -75,8 +75,8 @@ fn hole(diameter_m: f64) -> Hole {
 #[test]
 fn section_without_samples_never_passes() {
     let hole = Hole { bounded: false, most_m: f64::INFINITY, ..hole(2.0 * FARTHEST_M) };
-    assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
-    assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
+    assert_eq!(verdict(&hole, 0.0, Target::new(100.0), BEHIND), Verdict::Fail);
+    assert_eq!(verdict(&hole, 0.0, Target::new(100.0), 1.0), Verdict::Open);
 }
 
 #[test]
@@ -93,23 +93,28 @@ fn verdict_requires_the_configured_number_of_standard_deviations() {
         (3.0, 1.29, Verdict::CannotSay),
         (3.0, 1.31, Verdict::Fail),
     ] {
-        assert_eq!(verdict(&hole(diameter_m), confidence_sd * 0.1, 1.0, BEHIND), expected, "{diameter_m}");
+        let target = Target { max_hole_m: 1.0, confidence_sd };
+        assert_eq!(verdict(&hole(diameter_m), 0.1, target, BEHIND), expected, "{diameter_m}");
     }
-    assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "a hole as large as the target passes");
+    assert_eq!(
+        verdict(&hole(1.0), 0.0, Target::new(1.0), BEHIND),
+        Verdict::Pass,
+        "a hole as large as the target passes"
+    );
 }
 
 #[test]
-fn verdict_stays_open_until_enough_of_the_hole_is_out_of_reach() {
-    let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
+fn verdict_stays_open_until_enough_of_the_hole_is_beyond_the_heads_reach() {
+    let at = |clear_m: f64| verdict(&hole(2.0), 0.1, Target::new(1.0), clear_m);
     assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
-    let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
+    let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, Target::new(1.0), clear_m);
     assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
 }
 
 #[test]
 fn no_verdict_is_given_if_the_hole_bounds_straddle_the_target() {
     let within = |diameter_m: f64, least_m: f64, most_m: f64| {
-        verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, 0.5, BEHIND)
+        verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, Target::new(0.5), BEHIND)
     };
     assert_eq!(within(0.51, 0.49, 0.51), Verdict::CannotSay);
     assert_eq!(within(0.51, 0.501, 0.51), Verdict::Fail);
@@ -136,7 +141,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
             errors: [PassError::default(); 2],
         };
         let around = math::round_to_i64(perimeter_m / mesh_m);
-        // The centre between two rows is the centre of the section.
+        // The centre between two rows of samples is the centre of the section.
         let rows = math::floor_to_i64(2.0 / mesh_m);
         for (i, k) in (-rows..rows).flat_map(|i| (0..around).map(move |k| (i, k))) {
             let (x_m, arc_m) = (5.125 + mesh_m * (i as f64 + 0.5), perimeter_m / around as f64 * k as f64);
@@ -170,7 +175,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
 ///
 /// The target is 0.5 m.
 #[test]
-fn hole_counts_all_visits_unless_the_newest_visit_alone_passes() {
+fn hole_uses_the_samples_of_all_visits_unless_the_newest_visit_alone_passes() {
     let fine_m = 0.2 * math::sqrt(2.0);
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");

@@ -5,6 +5,10 @@ const PERIMETER_M: f64 = 7.3;
 const LAYOUT: StoreLayout =
     StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 212.0, cell_m: 0.3, capacity: 200_000 };
 
+fn at(x_m: f64, arc_m: f64) -> WallPoint {
+    WallPoint { x_m, arc_m }
+}
+
 fn sample(x_m: f64, arc_m: f64) -> WallSample {
     WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }
 }
@@ -41,10 +45,10 @@ fn pack_the_first_40_m(store: &mut SampleStore) {
     assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all bricks must be packed");
 }
 
-/// Stored samples of the first 40 m, sorted.
+/// Samples stored in the first 40 m, sorted.
 fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
-    store.each_between(-1.0, 40.0, |x_m, arc_m, _| kept.push((x_m, arc_m)));
+    store.each_between(-1.0, 40.0, |place, _| kept.push((place.x_m, place.arc_m)));
     kept.retain(|place| place.0 < 40.0);
     kept.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     kept
@@ -78,7 +82,7 @@ fn places(most: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
 }
 
 proptest! {
-    /// The reference is brute force over every step.
+    /// The reference for the nearest pass is brute force over every step.
     #[test]
     fn nearest_pass_agrees_with_brute_force(
         places in places(60),
@@ -88,7 +92,7 @@ proptest! {
     ) {
         let samples = steps(&places, heads);
         let expected = crossings(&samples, place).into_iter().filter(|d| *d <= within_m).min_by(f64::total_cmp);
-        let found = store(&samples).nearest_pass_m(place.0, place.1, within_m);
+        let found = store(&samples).nearest_pass_m(at(place.0, place.1), within_m);
         match (found, expected) {
             (Some(found), Some(expected)) => prop_assert!((found - expected).abs() < 1e-9),
             (found, expected) => prop_assert_eq!(found, expected),
@@ -122,7 +126,7 @@ proptest! {
         }
         prop_assume!(store.usage().thinned == 0);
         pack_the_first_40_m(&mut store);
-        let found = store.nearest_pass_m(place.0, place.1, 9.0);
+        let found = store.nearest_pass_m(at(place.0, place.1), 9.0);
         match (found, expected) {
             (Some(found), Some(expected)) => prop_assert!((found - expected).abs() < 3e-5, "{found} {expected}"),
             (found, expected) => prop_assert_eq!(found, expected),
@@ -191,10 +195,10 @@ fn pass_position_is_interpolated_where_the_step_crosses_the_arc_length() {
     // The step from (1.0, 7.2) to (1.3, 0.1) crosses the seam at its centre.
     let step = WallSample { step_m: Some([0.3, 0.2]), ..sample(1.3, 0.1) };
     store.insert(step).unwrap();
-    let distance = store.nearest_pass_m(2.0, 0.0, 5.0).unwrap();
+    let distance = store.nearest_pass_m(at(2.0, 0.0), 5.0).unwrap();
     assert!((distance - 0.85).abs() < 1e-9, "{distance}");
-    assert_eq!(store.nearest_pass_m(2.0, 0.0, 0.5), None);
-    assert_eq!(store.nearest_pass_m(2.0, 1.0, 5.0), None);
+    assert_eq!(store.nearest_pass_m(at(2.0, 0.0), 0.5), None);
+    assert_eq!(store.nearest_pass_m(at(2.0, 1.0), 5.0), None);
 }
 
 #[test]
@@ -206,8 +210,8 @@ fn samples_outside_the_extent_or_above_the_capacity_are_refused() {
         assert_eq!(store.insert(WallSample { x_m, ..sample }), Err(StoreError::Outside));
     }
     assert_eq!(store.insert(WallSample { arc_m: f64::INFINITY, ..sample }), Err(StoreError::Outside));
-    assert!(store.covers(0.0, 1.0) && store.covers(1.0, 7.0) && !store.covers(1.1, 1.0));
-    assert!(!store.covers(0.5, f64::NAN) && !store.covers(f64::NAN, 1.0));
+    assert!(store.covers(at(0.0, 1.0)) && store.covers(at(1.0, 7.0)) && !store.covers(at(1.1, 1.0)));
+    assert!(!store.covers(at(0.5, f64::NAN)) && !store.covers(at(f64::NAN, 1.0)));
     assert_eq!(store.insert(sample), Ok(Kept::Stored));
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
@@ -226,13 +230,13 @@ fn full_store_keeps_all_stored_samples() {
     }
     assert!((3_000..20_000).contains(&stored), "{stored}");
     let mut seen = 0;
-    store.each_between(-1.0, 212.0, |_, _, _| seen += 1);
+    store.each_between(-1.0, 212.0, |_, _| seen += 1);
     assert_eq!(seen, stored);
 }
 
 /// Four heads at 50 pings per second spend an hour on one spot, with centimetre jitter.
 #[test]
-fn stationary_vehicle_stops_using_more_memory() {
+fn memory_stops_growing_while_the_vehicle_is_stationary() {
     let mut store = SampleStore::new(LAYOUT);
     let (mut hashed, mut after_half) = (1_u64, None);
     let mut noise_m = || {
@@ -264,7 +268,7 @@ fn stationary_vehicle_stops_using_more_memory() {
 fn step_is_dropped_only_near_a_step_in_the_same_direction() {
     let mut store = SampleStore::new(LAYOUT);
     let mut goes = |around_m: f64, k: u32| {
-        // The samples are spread over a decimetre of one cell, a millimetre apart.
+        // The test samples are spread over a decimetre of one cell, a millimetre apart.
         let off_m = 0.001 * f64::from(k % 100);
         let before = store.usage().thinned;
         store.insert(WallSample { step_m: Some([0.002, around_m]), ..sample(100.1, 3.05 + off_m) }).unwrap();
@@ -278,7 +282,7 @@ fn step_is_dropped_only_near_a_step_in_the_same_direction() {
 
 /// Memory and error do not grow while the vehicle drives back and forth over one stretch.
 #[test]
-fn hundred_passes_back_and_forth_do_not_grow_memory() {
+fn memory_does_not_grow_over_a_hundred_passes_back_and_forth() {
     let mut store = SampleStore::new(LAYOUT);
     let mut after_seventy = None;
     for round in 0..100 {
@@ -286,7 +290,7 @@ fn hundred_passes_back_and_forth_do_not_grow_memory() {
             let k = if round % 2 == 0 { k } else { 499 - k };
             // The vehicle drives 150 m back and forth, so that the beginning is packed and opened each time.
             let x_m = 0.3 * f64::from(k);
-            store.nearest_pass_m(x_m, 1.0, 12.0);
+            store.nearest_pass_m(at(x_m, 1.0), 12.0);
             let arc_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
             store.insert(sample(x_m + f64::from(round % 5) * 1e-3, arc_m)).unwrap();
         }
@@ -315,7 +319,7 @@ fn packing_keeps_the_visit_number_of_each_sample() {
     }
     let visits = |store: &SampleStore| {
         let mut visits = Vec::new();
-        store.each_between(4.0, 7.0, |x_m, _, visit| visits.push(((x_m * 100.0).round() as i64, visit)));
+        store.each_between(4.0, 7.0, |place, visit| visits.push(((place.x_m * 100.0).round() as i64, visit)));
         visits.sort_unstable();
         visits
     };
@@ -327,7 +331,7 @@ fn packing_keeps_the_visit_number_of_each_sample() {
 
 /// One stretch may hold as many samples as fit into all open bricks.
 #[test]
-fn packed_stretch_that_fills_all_open_blocks_is_read_again() {
+fn packed_stretch_that_fills_all_open_bricks_can_be_read() {
     let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
     for k in 0..4 {
         let at = f64::from(k);
@@ -340,13 +344,13 @@ fn packed_stretch_that_fills_all_open_blocks_is_read_again() {
         "it must be packed for the distant sample"
     );
     // The step from 2.2 to 2.3 m crosses the arc length at its centre.
-    let distance = store.nearest_pass_m(1.5, 2.25, 5.0).unwrap();
+    let distance = store.nearest_pass_m(at(1.5, 2.25), 5.0).unwrap();
     assert!((distance - 0.475).abs() < 3e-5, "{distance}");
 }
 
 /// Packed samples of a turning head take four bytes each, whether they are in single steps or not.
 #[test]
-fn packed_sweep_takes_one_word_per_sample() {
+fn packed_samples_of_a_sweep_take_one_word_each() {
     for is_stepped in [true, false] {
         let mut store = SampleStore::new(LAYOUT);
         let all = store.arena.free_words();
@@ -363,7 +367,7 @@ fn packed_sweep_takes_one_word_per_sample() {
 }
 
 #[test]
-fn cell_edge_is_half_the_target_within_limits() {
+fn sample_store_cell_edge_is_half_the_target_within_limits() {
     for (target_m, cell_m) in [(0.5, 0.25), (0.8, 0.4), (1.0, 0.5), (6.0, 0.5), (0.1, 0.05), (0.02, 0.05)] {
         assert!((StoreLayout::cell_for_target_m(target_m) - cell_m).abs() < 1e-12, "{target_m}");
     }
@@ -381,7 +385,7 @@ fn pass_is_found_at_its_chainage_wherever_the_wall_begins() {
         }
         for k in 0..30 {
             let x_m = from_m + 1.05 + f64::from(k);
-            let found = store.nearest_pass_m(x_m, 1.0, 0.1);
+            let found = store.nearest_pass_m(at(x_m, 1.0), 0.1);
             assert!(found.is_some_and(|m| (m - 0.05).abs() < 1e-4), "{from_m} {x_m}: {found:?}");
         }
     }
@@ -397,7 +401,7 @@ fn sample_at_the_end_of_the_wall_is_found() {
         assert_eq!(store.insert(sample), Ok(Kept::Stored), "{k}");
     }
     let mut found = Vec::new();
-    store.each_between(9.9, 10.0, |x_m, _, _| found.push(x_m));
+    store.each_between(9.9, 10.0, |place, _| found.push(place.x_m));
     assert!(found.len() == 1 && (found[0] - 10.0).abs() < 1e-4, "{found:?}");
-    assert!(store.nearest_pass_m(9.95, 1.0, 0.1).is_some_and(|m| (m - 0.05).abs() < 1e-4));
+    assert!(store.nearest_pass_m(at(9.95, 1.0), 0.1).is_some_and(|m| (m - 0.05).abs() < 1e-4));
 }

@@ -12,10 +12,10 @@ use headrace_sensor::reading::{CountRestart, EchoRange, Reading, SonarReturn, Te
 const ALL: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
 const NOT_UNIT: [usize; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
 const RANGES: [usize; 6] = [3, 4, 5, 6, 7, 8];
-/// Time at which faults begin.
+/// Time at which each simulated sensor fault begins.
 const FAULT_S: f64 = 20.0;
 
-/// Replaces the readings of some sources for `for_s` from the beginning of the faults.
+/// Replaces the readings of some sensors for `for_s` from the start of the fault.
 fn say_otherwise(
     events: &mut [Event],
     sources: &[usize],
@@ -30,7 +30,7 @@ fn say_otherwise(
     }
 }
 
-/// Makes a source repeat its last reading before the fault.
+/// Makes a sensor repeat its last reading before the fault, for `for_s`.
 fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     let before = events.to_vec();
     let last = |like: &Reading| {
@@ -41,7 +41,8 @@ fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     say_otherwise(events, &[source], for_s, |reading, _| last(reading));
 }
 
-/// Checks the filter before the fault and from `wrong_until_s` on. In between, the fault looks like real motion.
+/// Checks the filter before the fault and from `wrong_until_s` on. Between both times, the fault looks like real
+/// motion.
 fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
     let mut nav = rig.navigation();
     let parts = [0.0, FAULT_S, wrong_until_s, f64::INFINITY];
@@ -100,7 +101,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
     let rig = Rig::new(rest, 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, FAULT_S));
-    // Until a second after the fault begins, the window still contains readings.
+    // Until a second after the fault begins, the reordering window still contains earlier readings.
     let last = at(FAULT_S + 1.0);
     Rig::hear(&mut nav, &Event { received: last, valid: last, source: OTHER, reading: rig.rate(0.0) });
     let mut before = nav.running().unwrap().factors;
@@ -117,7 +118,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
         before = running.factors;
     }
     assert!(matches!(nav.fix(at(FAULT_S + 15.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
-    // The estimated position does not drift away during the fault.
+    // The filter's position estimate does not drift away during the fault.
     assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
 }
 
@@ -230,7 +231,7 @@ fn jumping_sensor_is_rejected() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // The chainage is unknown while counter and estimate differ by metres. This lasts until a second after the
+        // The chainage is unknown while counter and estimate differ by metres, which lasts until a second after the
         // jump.
         let lacking = if source == TETHER { 45 } else { 0 };
         assert!(
@@ -241,7 +242,7 @@ fn jumping_sensor_is_rejected() {
 }
 
 #[test]
-fn restarted_counter_keeps_the_chainage_only_if_no_other_sensor_was_away() {
+fn counter_restart_keeps_the_chainage_only_if_the_other_sensors_kept_sending() {
     for (away_s, are_all_away, is_lost) in [(0.0, false, true), (1.0, true, true), (1.0, false, false)] {
         let rig = Rig::new(cruise, 1);
         let mut events = rig.events(0.0, 60.0);
@@ -313,7 +314,7 @@ fn filter_recovers_from_a_frozen_sensor() {
 
 /// A head reports the echo of its own frame, or its last echo, while it keeps turning.
 ///
-/// In each turn, this range agrees with the wall for a while.
+/// In each turn of the head, this constant range agrees with the wall for a while.
 #[test]
 fn head_with_constant_range_does_not_rotate_the_estimated_attitude() {
     let (for_s, mut gated) = (40.0, 0);
@@ -334,7 +335,7 @@ fn head_with_constant_range_does_not_rotate_the_estimated_attitude() {
     assert!(gated > 500, "{gated}");
 }
 
-/// Errors stay within the limit in standard deviations, and the counter is doubted within two seconds.
+/// Errors of the estimate stay within `MOST_SDS` standard deviations, and the counter is doubted within two seconds.
 #[test]
 fn stuck_or_slipping_counter_is_doubted_and_not_followed() {
     for seed in 1..4 {
@@ -381,7 +382,7 @@ fn length_m(reading: &Reading) -> f64 {
 
 /// A counter sticks permanently while the vehicle moves on. Eventually the filter reports an unknown chainage.
 ///
-/// To gyros and accelerometers, steady motion looks like rest. But the filter does not take it for rest.
+/// To gyros and accelerometers, steady motion looks like rest. But the filter does not take steady motion for rest.
 #[test]
 fn permanently_stuck_counter_leads_to_no_fix() {
     let steady: Way = |t| Pose { position: Point3::new(3.0 + 0.2 * t, 0.4, 4.0), attitude: Rot::identity() };

@@ -1,7 +1,7 @@
-//! Extremes of time, order, attitude and scale.
+//! Tests of the filter at extremes of dive duration, reading order, attitude and noise scale.
 //!
-//! Each ends with a fix whose error is within the limit in standard deviations, or with the name of the missing
-//! part.
+//! Each test ends with a fix whose error is within the limit in standard deviations, or with the missing part of the
+//! fix.
 
 use super::super::factors::Factors;
 use super::super::inertial::{InertialSample, Leg};
@@ -19,7 +19,7 @@ use headrace_support::hard_cases::{found, found_at};
 
 const HOUR: DurNs = DurNs(3_600_000_000_000);
 
-/// Returns estimate and covariance a second after the last time of validity, when the window is empty.
+/// Returns estimate and covariance one second after the last reading's validity, when the reordering window is empty.
 fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
     let mut nav = rig.navigation();
     let last = events.iter().map(|event| event.valid).max().unwrap();
@@ -33,7 +33,7 @@ fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
 }
 
 #[test]
-fn ordinary_minute_has_consistent_innovations() {
+fn one_minute_of_ordinary_motion_has_consistent_innovations() {
     for seed in 1..5 {
         let rig = Rig::new(cruise, seed);
         let mut nav = rig.navigation();
@@ -97,7 +97,7 @@ fn covariance_stays_valid_with_noise_of_any_scale() {
 }
 
 #[test]
-fn leg_of_any_length_keeps_the_covariance_valid() {
+fn propagation_over_any_duration_keeps_the_covariance_valid() {
     let settings = Settings::default();
     let felt = InertialSample {
         rate_radps: Some(Vec3::new(0.1, 0.2, -0.1)),
@@ -116,7 +116,7 @@ fn leg_of_any_length_keeps_the_covariance_valid() {
             }
             assert!(state.is_sound() && factors.is_sound(), "{dt_s} s: {state:?}");
             for i in 0..ERRORS {
-                // Errors of the pose never shrink over time. Only errors that decay shrink.
+                // Without measurements, pose errors never shrink over time. Only sensor errors that decay shrink.
                 let least = if i < 9 { 1e-4 * (1.0 - 1e-12) } else { 0.0 };
                 assert!(factors.variance(i) > least, "{dt_s} s, error {i}: {}", factors.variance(i));
             }
@@ -133,7 +133,8 @@ fn repeated_inertial_sample_counts_once() {
     let rig = Rig::new(cruise, 1);
     let events = rig.events(0.0, 20.0);
     let right = outcome(&rig, &events);
-    // The second copy has the same times, both times a nanosecond later, or only a later receive time.
+    // The second copy of a sample has the same two times, both times a nanosecond later, or only a later receive
+    // time.
     for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
         let mut again = events.clone();
         let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));
@@ -186,7 +187,7 @@ fn readings_give_the_same_result_in_any_arrival_order() {
         mixed.sort_by_key(|event| event.received);
         assert_eq!(outcome(&rig, &mixed), right, "shift {shift}");
     }
-    // Additional readings of an unused source have no effect, however many they are.
+    // Additional readings of a sensor that navigation does not use have no effect, however many they are.
     let mut beaten = events.clone();
     beaten.extend((1..9000).map(|k| {
         let t = at(f64::from(k) / 300.0);
@@ -336,7 +337,7 @@ fn fix_survives_stopped_and_jumping_clocks() {
     assert!(nav.fix(at(60.0)).is_ok());
 }
 
-/// Same motion as `cruise`, but it begins `KM` kilometres farther into the tunnel.
+/// Pose of a vehicle that moves as in `cruise`, but begins `KM` kilometres farther into the tunnel.
 fn cruise_at<const KM: u32>(t: f64) -> Pose {
     let Pose { position: at, attitude } = cruise(t);
     Pose { position: Point3::new(at.x() + 1e3 * f64::from(KM), at.y(), at.z()), attitude }
@@ -344,9 +345,10 @@ fn cruise_at<const KM: u32>(t: f64) -> Pose {
 
 /// The relative error between passes is equally certain at any chainage.
 ///
-/// The chainage itself becomes less certain with distance because of the cable's scale, by 2 km at 1,000 km.
+/// The chainage itself becomes less certain with distance because of the cable's scale, by 2 km at a distance of
+/// 1,000 km.
 #[test]
-fn error_between_passes_is_equally_certain_at_any_chainage() {
+fn chainage_sd_between_passes_is_the_same_at_any_chainage() {
     let ways: [(f64, Way); 3] = [(3e3, cruise_at::<3>), (7e3, cruise_at::<7>), (1e6, cruise_at::<1000>)];
     let (mut moved_m, mut sd_off, mut condition) = (0.0_f64, 0.0_f64, 0.0_f64);
     for seed in 1..4 {
@@ -374,7 +376,7 @@ fn error_between_passes_is_equally_certain_at_any_chainage() {
     found_at("filter.far_sd", condition, sd_off, 1e-4);
 }
 
-/// Motion to and fro over the same 12 m, with one round a minute.
+/// Pose of a vehicle that moves to and fro over the same 12 m, one round a minute.
 fn rounds(t: f64) -> Pose {
     let phase = math::TAU * t / 60.0;
     Pose {
@@ -391,8 +393,8 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the bias is known, within the time stated at first. The advice does not
-/// return.
+/// The advice to stand still ends once the gyro bias is known, within the time that it stated at first. The advice
+/// does not return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
@@ -413,7 +415,8 @@ fn stand_still_advice_ends_once_the_bias_is_known() {
     assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
 }
 
-/// Returns the largest relative increase of the sd between passes after the tenth minute, once per round.
+/// Returns the largest relative increase of the sd between head passes after the tenth minute, sampled once per
+/// round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };
     let mut nav = rig.navigation();
@@ -434,13 +437,13 @@ fn change_over_hours(hours: u32) -> f64 {
 }
 
 #[test]
-fn sd_between_passes_does_not_grow_over_an_hour() {
+fn position_sd_between_passes_does_not_grow_over_an_hour() {
     found("filter.hour", change_over_hours(1), 0.01);
 }
 
 #[test]
 #[ignore = "takes a minute"]
-fn sd_between_passes_does_not_grow_over_10_h() {
+fn position_sd_between_passes_does_not_grow_over_10_h() {
     let change = change_over_hours(10);
     assert!(change < 0.01, "{change}");
 }

@@ -19,14 +19,15 @@ const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
 /// Step of the central differences.
 ///
-/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about
-/// 1e-16 / 1e-4 times the numbers. They reach some hundreds of metres, so it is 1e-10.
+/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about 1e-12
+/// times the values, which is the rounding of a double divided by the step. The values reach some hundreds of metres,
+/// so the rounding error is 1e-10.
 const STEP: f64 = 1e-4;
-/// Tolerance that covers both errors with a margin. A wrong sign or a missing term causes an error of at least
-/// 0.01.
+/// Tolerance that covers truncation and rounding error with a margin. A wrong sign or a missing term causes an error
+/// of at least 0.01.
 const TOLERANCE: f64 = 1e-6;
 
-/// Knuth's MMIX generator. The upper half of its state gives a number from 0 to 1.
+/// Knuth's MMIX random number generator. The upper half of its state gives a number from 0 to 1.
 pub(super) struct Draws(u64);
 
 impl Draws {
@@ -43,7 +44,7 @@ impl Draws {
         (self.0 >> 32) as f64 / 4_294_967_296.0
     }
 
-    /// Returns a uniform number in [-reach, reach).
+    /// Returns a uniformly distributed random number in [-reach, reach).
     pub(super) fn within(&mut self, reach: f64) -> f64 {
         reach * (2.0 * self.share() - 1.0)
     }
@@ -52,7 +53,7 @@ impl Draws {
         Vec3::new(self.within(reach), self.within(reach), self.within(reach))
     }
 
-    /// Returns an approximately normal number with variance 1.
+    /// Returns an approximately normal random number with variance 1.
     pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.within(0.5)).sum()
     }
@@ -98,9 +99,9 @@ fn moved(state: &State, error: usize, by: f64) -> State {
     state
 }
 
-/// Checks a row against central differences of its residual.
+/// Checks a measurement row against central differences of its residual.
 ///
-/// The expected value is the measured value less the residual.
+/// The expected value is the measured value minus the residual.
 fn check_row(
     what: &str,
     state: &State,
@@ -120,9 +121,9 @@ fn check_row(
     true
 }
 
-/// The walls of a rectangle are planes, as the row assumes.
+/// The walls of a rectangular tunnel are planes, as the measurement row assumes.
 ///
-/// A beam is skipped if its differences cross a corner, because the wall is no plane there.
+/// A beam is skipped if the finite differences cross a corner, because the wall is no plane there.
 #[test]
 fn beam_row_on_flat_walls_equals_finite_differences() {
     let profile = shapes::rectangle(7.0, 8.0).unwrap();
@@ -135,12 +136,12 @@ fn beam_row_on_flat_walls_equals_finite_differences() {
     }
 }
 
-/// The expected range of a cone equals its shortest ray. The uncertainty extends to the shortest ray of the wider
-/// cone.
+/// The expected range of a cone equals the length of its shortest ray. The uncertainty extends to the shortest ray of
+/// the wider cone.
 #[test]
-fn cone_range_equals_that_of_its_shortest_ray() {
-    // The rays lie on rings around the axis. Their minimum is too long by at most the square of half a mesh, 5e-3
-    // rad.
+fn expected_range_of_a_cone_equals_its_shortest_ray() {
+    // The rays lie on rings around the axis. Their shortest range is too long by at most the square of half the ray
+    // spacing, 5e-3 rad.
     const RINGS: u32 = 200;
     let profile = shapes::rectangle(60.0, 60.0).unwrap();
     let mut draws = Draws::new(11);
@@ -172,7 +173,8 @@ fn cone_range_equals_that_of_its_shortest_ray() {
     }
 }
 
-/// Without a cone, the row of a beam on a round wall is exact. With a cone, its error is bounded as follows.
+/// Without a cone, the measurement row of a beam on a round wall is exact. With a cone, the row's error is bounded as
+/// follows.
 ///
 /// The row assumes the tangent plane where the beam's axis meets the wall. This point moves by at most 1 m / cosine
 /// per metre, or by `range` / cosine per radian. The tangent plane then turns by 1 / radius per metre. The row
@@ -228,10 +230,10 @@ fn height_and_chainage_rows_equal_finite_differences() {
     }
 }
 
-/// The rows of an attitude are exact if measured and estimated attitude agree, as in a converged filter.
+/// The measurement rows of an attitude are exact if measured and estimated attitude agree, as in a converged filter.
 ///
-/// If they differ by an angle, the rows are wrong by half of it. So the measured attitude, deviation included, is
-/// within 1e-7 of the estimate.
+/// If both attitudes differ by an angle, the rows are wrong by half of that angle. So the measured attitude,
+/// deviation included, is within 1e-7 of the estimate.
 #[test]
 fn attitude_rows_equal_finite_differences() {
     let mut draws = Draws::new(4);
@@ -260,7 +262,7 @@ fn attitude_with_known_compass_deviation_has_no_residual() {
     }
 }
 
-/// The turn rate is an input, so that the gyro bias is not an error of the row.
+/// The turn rate is an input, so the row does not depend on the gyro bias.
 #[test]
 fn velocity_and_rest_rows_equal_finite_differences() {
     let mut draws = Draws::new(6);
@@ -299,7 +301,7 @@ fn velocity_on_a_lever_arm_equals_finite_differences_of_position() {
 
 /// The reference predicts a measurement made 0.07 s before the estimate, at the position at that time.
 ///
-/// This is exact for constant velocity.
+/// The prediction is exact for constant velocity.
 #[test]
 fn row_of_an_earlier_measurement_equals_finite_differences() {
     const LATER_S: f64 = 0.07;
@@ -327,10 +329,10 @@ fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
 
 /// The transition uses the rotation in the middle of a sample for the whole sample.
 ///
-/// Only the bias terms are wrong by this, by up to a quarter of the angle turned in a sample (0.01 rad). The
-/// largest bias terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x 0.0025. In most
-/// blocks, a wrong factor or a missing term causes a larger error. The exception is the displacement by a gyro bias
-/// through tilting, 10 m/s^2 x 0.1^3 / 6. So each block is compared with its own size.
+/// The difference affects only the bias terms, by up to a quarter of the angle turned in a sample (0.01 rad). The
+/// largest bias terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x 0.0025. In most blocks,
+/// a wrong factor or a missing term causes a larger error. The exception is the displacement by a gyro bias through
+/// tilting, 10 m/s^2 x 0.1^3 / 6. So each block of the matrix is compared relative to its own size.
 #[test]
 fn transition_matrix_equals_finite_differences_of_the_model() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
@@ -396,7 +398,7 @@ fn propagated_factors_equal_the_factors_of_the_propagated_covariance() {
         }
         let before: [Errors; ERRORS] = factors.rows(core::array::from_fn(|i| i));
         transition.carry(&mut factors);
-        // F P first, and then F (F P)^T, both by columns.
+        // The product F P is computed first, and then F (F P)^T, both by columns.
         let carried = |mut columns: [Errors; ERRORS]| {
             for column in &mut columns {
                 transition.apply(column);

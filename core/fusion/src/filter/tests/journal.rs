@@ -1,4 +1,4 @@
-//! Tests of the filter's records for smoothing.
+//! Tests of the steps that the filter records for smoothing.
 
 use super::rig::{IMU, Rig, at, cruise};
 use crate::Navigation as _;
@@ -16,12 +16,12 @@ fn steps(reader: &JournalReader) -> Vec<Placed> {
     core::iter::from_fn(|| reader.next()).map(|words| Placed::of_words(&words).unwrap()).collect()
 }
 
-/// Groups the steps by piece; returns the numbers of piece and clock with each group.
+/// Groups the steps by piece of the track; returns piece number and clock number with each group.
 fn pieces(steps: &[Placed]) -> Vec<((u32, u32), &[Placed])> {
     steps.chunk_by(|a, b| a.piece == b.piece).map(|piece| ((piece[0].piece, piece[0].clock), piece)).collect()
 }
 
-/// Whether each step begins where the previous one ends, and only the last step is an end.
+/// Whether each step begins where the previous step ends, and only the last step is an end marker.
 fn is_whole(piece: &[Placed]) -> bool {
     let is_end = |placed: &&Placed| matches!(placed.step.by, Move::End);
     piece.windows(2).all(|two| two[0].step.to == two[1].step.at)
@@ -30,7 +30,7 @@ fn is_whole(piece: &[Placed]) -> bool {
 }
 
 #[test]
-fn drive_without_estimate_records_no_steps() {
+fn drive_without_estimate_records_no_smoothing_steps() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 1.0).iter().filter(|event| event.source == IMU) {
@@ -41,9 +41,9 @@ fn drive_without_estimate_records_no_steps() {
     assert_eq!(steps(&reader).len(), 0);
 }
 
-/// A clock set back by more than 10 s ends a piece exactly once, even if no later reading follows.
+/// A clock set back by more than 10 s ends a piece of the track exactly once, even if no later reading follows.
 #[test]
-fn drive_before_a_clock_reset_is_recorded_completely_and_ends_once() {
+fn filter_steps_before_a_clock_reset_are_recorded_completely_and_end_once() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 30.0) {

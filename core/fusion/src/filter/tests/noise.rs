@@ -30,7 +30,8 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
     assert!((is - should).abs() <= share * should.abs() + 1e-18, "{what}: {is}, not {should}");
 }
 
-/// The process is two lags in series, s' = -s / T + r, r' = -r / T + w. It is integrated in steps of 1e-5 T.
+/// The slack process is two lags in series, s' = -s / T + r, r' = -r / T + w. The process is integrated in steps of
+/// 1e-5 T.
 ///
 /// Euler's method has an error of the order of the step.
 #[test]
@@ -50,7 +51,7 @@ fn slack_noise_equals_numerical_integration_of_the_slack_process() {
                 rr - 2.0 * rr * step + density * dt_s,
             );
         }
-        // If there are few steps, the error of the first ones matters more.
+        // With fewer steps, the error of the first steps matters more.
         let share = 1e-4 + 3.0 * step / lags;
         near("slack", factors.variance(SLACK), ss, share);
         near("both", factors.covariance(SLACK, SLACK_RATE), sr, share);
@@ -64,7 +65,7 @@ fn slack_noise_equals_numerical_integration_of_the_slack_process() {
 fn slack_variance_converges_to_the_declared_value() {
     let settings = Settings { slack: GaussMarkov { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
     let mut factors = Factors::independent([0.0; ERRORS]);
-    // The epochs have different lengths, because the steady state must not depend on them.
+    // The epochs have different lengths, because the steady state must not depend on the epoch length.
     for k in 0..3000 {
         let (transition, noise) = leg(&settings, 0.03 + 0.02 * f64::from(k % 5), still());
         transition.carry(&mut factors);
@@ -95,7 +96,7 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
 /// deviations. Turn rate noise also tilts the force, which the process noise of an epoch neglects. So the unit is
 /// level and only tilts about x, and only its x axis is checked: gravity has no first-order effect there.
 #[test]
-fn white_noise_equals_monte_carlo() {
+fn white_process_noise_equals_monte_carlo() {
     const DRAWS: u32 = 4000;
     let settings = Settings { rate_noise: 0.004, force_noise: 0.02, ..Settings::default() };
     let (_, factors) = leg(&settings, 0.1, still());
@@ -128,7 +129,7 @@ fn white_noise_equals_monte_carlo() {
     }
 }
 
-/// For the time without gyro and accelerometer data, the blind noise applies.
+/// While gyro and accelerometer data are missing, the noise configured for missing data applies.
 #[test]
 fn noise_for_missing_inertial_data_equals_the_configured_values() {
     let settings = Settings { blind_rate_noise: 0.03, blind_force_noise: 0.5, ..Settings::default() };
@@ -164,7 +165,7 @@ fn decaying_errors_keep_their_standard_deviation() {
     }
     near("scale", factors.variance(SCALE), settings.scale_noise * settings.scale_noise * 25e3, 1e-9);
     near("depth", factors.variance(DEPTH), settings.depth_noise * settings.depth_noise * 25e3, 1e-9);
-    // After one time constant, 1/e of the error is left.
+    // After one time constant, 1/e of the initial error is left.
     let (transition, _) = leg(&settings, settings.heading.time_s, still());
     let mut column = [1.0; ERRORS];
     transition.apply(&mut column);

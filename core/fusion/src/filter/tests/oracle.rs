@@ -10,13 +10,13 @@ use headrace_support::hard_cases::found_at;
 
 const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
 
-/// A representation of a covariance that can execute the steps of the file.
+/// A representation of a covariance that can execute the operations listed in the oracle file.
 trait Covariance<const N: usize> {
     fn start(variances: [f64; N]) -> Self;
     fn element(&self, i: usize, j: usize) -> f64;
     fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N>;
     fn add(&mut self, variance: f64, a: [f64; N]);
-    /// Transforms by F, which is unit upper triangular.
+    /// Transforms the covariance by F, which is unit upper triangular.
     fn shear(&mut self, f: &[[f64; N]; N]);
     fn scale(&mut self, i: usize, factor: f64);
     fn distance(&self, e: &[f64; N]) -> Option<f64>;
@@ -63,7 +63,7 @@ impl<const N: usize> Covariance<N> for Factors<N> {
 struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
 
 impl<const N: usize, const JOSEPH: bool> Whole<N, JOSEPH> {
-    /// Product F P F^T.
+    /// Returns the matrix product F P F^T.
     fn carried(&self, f: &[[f64; N]; N]) -> Self {
         let half: [[f64; N]; N] =
             f.map(|row| core::array::from_fn(|j| (0..N).map(|k| row[k] * self.0[k][j]).sum()));
@@ -211,7 +211,7 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
     worst
 }
 
-/// Returns the largest errors of the factors, of the textbook form and of the Joseph form.
+/// Returns the largest errors of the factored form, of the textbook form and of the Joseph form.
 fn all(case: &str, n: usize) -> [Worst; 3] {
     fn of<const N: usize>(case: &str) -> [Worst; 3] {
         [follow::<N, Factors<N>>(case), follow::<N, Whole<N, false>>(case), follow::<N, Whole<N, true>>(case)]
@@ -219,7 +219,7 @@ fn all(case: &str, n: usize) -> [Worst; 3] {
     if n == 4 { of::<4>(case) } else { of::<6>(case) }
 }
 
-/// Name and size of each case, and the tolerance of the factors: about ten times their error.
+/// Name of each oracle case, number of errors, and tolerance of the factored form: about ten times its error.
 ///
 /// The rounding error is some units in the last place, times the ratio of the largest to the smallest standard
 /// deviation in any direction. This ratio is 1e12 after ten hours.
@@ -238,11 +238,11 @@ const CASES: [(&str, usize, f64); 13] = [
     ("swinging", 4, 1e-9),
     ("swinging", 6, 1e-5),
 ];
-/// Multiple of the factors' tolerance above which the full covariance counts as failed.
+/// Multiple of the factored form's tolerance above which the full covariance form counts as failed.
 const FAILS: f64 = 30.0;
 
 #[test]
-fn factors_agree_with_100_digit_values() {
+fn covariance_factors_agree_with_100_digit_values() {
     for (case, n, tolerance) in CASES {
         let [factors, _, _] = all(case, n);
         assert!(!factors.is_sign_lost, "{case} {n}: {factors:?}");
@@ -264,7 +264,7 @@ fn full_covariance_form_fails_where_the_factored_form_is_accurate() {
             assert!(fails(plain), "{case} {n}: {plain:?}");
             assert!(fails(joseph), "{case} {n}: {joseph:?}");
         }
-        // In an easy case, both full forms are also right.
+        // In an easy case, both full covariance forms are also accurate.
         if case == "mild" {
             assert!(plain.covariance.max(joseph.covariance) < 1e-13, "{plain:?} {joseph:?}");
         }

@@ -1,4 +1,4 @@
-//! Properties of the filter's parts that hold for any input.
+//! Property tests of the filter's parts with random inputs.
 
 use proptest::prelude::*;
 
@@ -26,7 +26,7 @@ fn reading(number: f64) -> Reading {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Each reading leaves the window exactly once, in order of validity.
+    /// Each reading leaves the reordering window exactly once, in order of validity.
     ///
     /// Readings with the same time of validity leave in order of arrival.
     #[test]
@@ -52,7 +52,7 @@ proptest! {
 
     /// Inertial data cover all times without a gap.
     ///
-    /// A sample is valid for the time before it, for at most a tenth of a second.
+    /// An inertial sample is valid for the time before its timestamp, for at most a tenth of a second.
     #[test]
     fn inertial_data_cover_all_times_without_a_gap(
         samples in proptest::collection::vec((1_u64..3000, any::<bool>()), 0..60),
@@ -88,14 +88,14 @@ proptest! {
                 prop_assert!(!is_blind || next > now.0 + 100 * MS, "a sample is ignored");
             }
         }
-        // Removal of old samples does not change the data after them.
+        // Removal of old inertial samples does not change the data of later times.
         let old = MonoNs(forgotten.min(from) * MS);
         let mut younger = window.clone();
         younger.forget(old);
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// From a start half a metre away, a fit to the echoes of a position ends at this position.
+    /// From a start half a metre away, a fit to the echoes from a position ends at this position.
     ///
     /// With arbitrary ranges, the fit still ends inside the tunnel.
     #[test]
@@ -126,10 +126,9 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// If a source sends too often, its used readings are at least one period apart. No reading is skipped without
-    /// need.
+    /// If a sensor sends too often, its used readings are at least one period apart. No other reading is skipped.
     #[test]
-    fn source_is_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
+    fn readings_of_a_source_are_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
         let mut source = Source::new(Rig::sensor(TETHER));
         let (mut now, mut used) = (MonoNs(0), Vec::new());
@@ -146,7 +145,7 @@ proptest! {
 
     /// The turn rate of a head is right in both directions and across the wrap of the angle.
     ///
-    /// Used pings have a range and are at least one step apart.
+    /// Used pings have a range and are at least one angle step apart.
     #[test]
     fn returns_of_a_head_are_used_once_per_angle_step(step_deg in 0.3_f64..5.0, clockwise in any::<bool>(), start in -10.0_f64..10.0) {
         let step_rad = step_deg.to_radians() * if clockwise { 1.0 } else { -1.0 };
@@ -176,7 +175,7 @@ proptest! {
 }
 
 #[test]
-fn samples_in_one_burst_are_averaged() {
+fn inertial_samples_in_one_burst_are_averaged() {
     let mut window = Window::default();
     for (at_ns, x) in [(0, 1.0), (10 * MS, 2.0), (10 * MS, 40.0), (10 * MS + 1000, 3.0)] {
         assert!(window.take_force(MonoNs(at_ns), Vec3::new(x, 0.0, 0.0)));
@@ -189,7 +188,7 @@ fn samples_in_one_burst_are_averaged() {
 }
 
 #[test]
-fn full_window_rejects_readings_and_recovers() {
+fn full_reordering_window_rejects_readings_and_recovers() {
     let mut window = Window::default();
     let taken =
         (0..2000_u64).filter(|k| window.take(Waiting { at: MonoNs(*k), source: 0, reading: reading(0.0) }));
@@ -225,7 +224,7 @@ fn whole(transition: &Transition) -> Square {
     }))
 }
 
-/// The textbook form: the errors of each clone augment the present errors, and measurements do not correct them.
+/// An augmented filter as in textbooks: clones' errors are appended to the present errors and are not corrected.
 struct Augmented {
     now: Square,
     /// Covariance of the errors at the time of each clone, and their cross-covariance with the present errors.
@@ -251,8 +250,8 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the difference in chainage, at `arm`, between now and the clone `back` before the
-    /// newest one.
+    /// Standard deviation of the change in chainage error, at `arm`, from the clone `back` before the newest until
+    /// now.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];
@@ -267,8 +266,9 @@ impl Augmented {
 }
 
 #[test]
-fn clones_equal_an_augmented_filter() {
-    // The first case has several legs between clones. The second has enough clones to fill the ring buffer.
+fn relative_covariance_from_clones_equals_an_augmented_filter() {
+    // The first case has several propagation legs between clones. The second case has enough clones to fill the ring
+    // buffer.
     for (legs, leg_s, times) in [(8, 0.25, 12), (1, 2.0, 70)] {
         let settings = Settings::default();
         let rig = Rig::new(super::rig::cruise, 5);

@@ -1,4 +1,4 @@
-//! Effect of zero-velocity updates on the filter.
+//! Tests of the effect of zero-velocity updates on the filter.
 
 use crate::filter::eskf::Eskf;
 use crate::filter::factors::Factors;
@@ -32,7 +32,7 @@ fn zero_velocity_update_is_skipped_for_motion_in_any_direction() {
         assert_eq!(moves.state, before, "{axis} {side}: a moving vehicle must not be corrected");
         let mut stands = moving(axis, side * 0.105);
         stands.rest(Some(turn));
-        // Estimate and measurement have the same uncertainty, so the result is the mean of both.
+        // Estimated velocity and zero-velocity update have the same uncertainty, so the result is the mean of both.
         let half = stands.state.velocity_mps.scaled(2.0) + -before.velocity_mps.scaled(0.105 / 0.115);
         assert!(half.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.velocity_mps);
         let bias = stands.state.rate_bias_radps + -turn.scaled(0.5);

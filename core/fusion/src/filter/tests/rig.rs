@@ -15,21 +15,21 @@ use headrace_sensor::reading::{EchoRange, Level, Reading, SonarReturn, TetherLen
 pub(super) const IMU: usize = 0;
 pub(super) const TETHER: usize = 1;
 pub(super) const DEPTH: usize = 2;
-/// First of four echosounders: left, right, down, up.
+/// Source number of the first of four echosounders: left, right, down, up.
 pub(super) const ECHOES: usize = 3;
-/// First of two heads; one head is yawed ahead and the other one back.
+/// Source number of the first of two heads; one head is yawed ahead and the other head back.
 pub(super) const HEADS: usize = 7;
 pub(super) const VELOCITY_LOG: usize = 9;
-/// A source that navigation does not use.
+/// Source number of a sensor that navigation does not use.
 pub(super) const OTHER: usize = 10;
 
-/// Timestamp of the rig's time 0 s.
+/// Timestamp at time 0 s of the simulated vehicle.
 const ORIGIN: MonoNs = MonoNs(5_000_000_000_000);
 const DEVICE_MPS: f64 = 1500.0;
-/// Maximum error of the filter, in standard deviations.
+/// Maximum allowed error of the filter's estimate, in standard deviations.
 const MOST_SDS: f64 = 4.0;
 
-/// A reading with its times of arrival and of validity.
+/// A sensor reading with its time of arrival and its time of validity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Event {
     pub(super) received: MonoNs,
@@ -47,7 +47,7 @@ pub(super) struct Rig {
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) way: Way,
-    /// Factor of the sensors' noise relative to the settings.
+    /// Ratio of the sensors' noise to the noise in the settings.
     pub(super) noise: f64,
     /// Time between samples of the inertial unit, s.
     pub(super) imu_s: f64,
@@ -62,7 +62,7 @@ pub(super) fn seconds(at: MonoNs) -> f64 {
     at.since(ORIGIN).as_secs_f64()
 }
 
-/// Forward motion at 0.2 m/s with a little sway and yaw.
+/// Pose of a vehicle that moves ahead at 0.2 m/s with a little sway and yaw.
 pub(super) fn cruise(t: f64) -> Pose {
     Pose {
         position: Point3::new(3.0 + 0.2 * t, 0.4 * math::sin(t / 7.0), 4.0 + 0.3 * math::sin(t / 11.0)),
@@ -74,7 +74,7 @@ pub(super) fn cruise(t: f64) -> Pose {
     }
 }
 
-/// Vehicle at rest, level, facing along the tunnel.
+/// Pose of a vehicle at rest that is level and faces along the tunnel.
 pub(super) fn rest(_: f64) -> Pose {
     Pose { position: Point3::new(3.0, 0.4, 4.0), attitude: Rot::identity() }
 }
@@ -159,7 +159,7 @@ impl Rig {
     /// Checks that all numbers are finite, variances are not negative, and errors are within `MOST_SDS` if there is
     /// a fix.
     ///
-    /// It checks once per epoch, because nothing changes in between.
+    /// The checks run once per epoch, because the estimate does not change within an epoch.
     pub(super) fn check(&self, nav: &FilterNavigation, now: MonoNs, tally: &mut Tally) {
         let Some(running) = nav.running() else {
             assert!(nav.fix(now).is_err());
@@ -205,7 +205,7 @@ impl Rig {
         for (k, axis) in axes.iter().enumerate() {
             let mut h = [0.0; ERRORS];
             (h[POSITION + k], h[VELOCITY + k]) = (1.0, since_s);
-            // An attitude error moves the body's origin by axis x arm.
+            // An attitude error moves the body's origin by the cross product of rotation axis and lever arm.
             for (j, other) in axes.iter().enumerate() {
                 h[ATTITUDE + j] = other.cross(&arm).dot(axis);
             }
@@ -221,7 +221,7 @@ impl Rig {
     }
 
     pub(super) fn noisy(&self, t: f64, salt: u64, sd: f64) -> f64 {
-        // The noise is a sum of twelve uniform numbers from a hashed counter (splitmix64).
+        // The noise is a sum of twelve uniform random numbers from a hashed counter (splitmix64).
         let mut state = self.seed ^ at(t).0.wrapping_mul(31) ^ (salt << 50);
         let sum: f64 = (0..12)
             .map(|_| {
@@ -239,7 +239,7 @@ impl Rig {
         Vec3::new(self.noisy(t, salt, sd), self.noisy(t, salt + 1, sd), self.noisy(t, salt + 2, sd))
     }
 
-    /// Position of the inertial unit.
+    /// True position of the inertial unit.
     pub(super) fn unit(&self, t: f64) -> Point3<Tunnel> {
         (self.way)(t).place(Self::sensor(IMU).mount.position)
     }
@@ -249,7 +249,7 @@ impl Rig {
         (self.unit(t + H_S) - self.unit(t - H_S)).scaled(0.5 / H_S)
     }
 
-    /// Mean turn rate over the preceding sample period.
+    /// Mean turn rate over the inertial unit's preceding sample period.
     pub(super) fn rate(&self, t: f64) -> Reading {
         let (then, now) = ((self.way)(t - self.imu_s).attitude, (self.way)(t).attitude);
         let turn: Vec3<Body> = rotation_vector(then.inverse() * now).scaled(1.0 / self.imu_s);
@@ -257,7 +257,7 @@ impl Rig {
         Reading::AngularRate(Self::sensor(IMU).mount.rotation.inverse() * turn + noise)
     }
 
-    /// Mean specific force over the preceding sample period.
+    /// Mean specific force over the inertial unit's preceding sample period.
     pub(super) fn force(&self, t: f64) -> Reading {
         let then = t - self.imu_s;
         let gain = (self.velocity_at(t) + -self.velocity_at(then)).scaled(1.0 / self.imu_s);
@@ -269,12 +269,12 @@ impl Rig {
         Reading::SpecificForce(Self::sensor(IMU).mount.rotation.inverse() * in_body + noise)
     }
 
-    /// Attitude that the unit computes.
+    /// Attitude that the inertial unit computes, with noise and without a compass deviation.
     pub(super) fn attitude(&self, t: f64) -> Reading {
         Reading::Attitude(self.level(t, 0.0))
     }
 
-    /// Attitude that the unit computes with a compass deviation.
+    /// Attitude that the inertial unit computes with a compass deviation.
     pub(super) fn level(&self, t: f64, off_rad: f64) -> Rot<Level, Sensor> {
         let noise = Vec3::new(
             self.noisy(t, 30, self.settings.tilt_sd_rad / 2.0),
@@ -333,15 +333,15 @@ impl Rig {
     }
 }
 
-/// Results of the checks.
+/// Results of the checks of the filter against the known trajectory.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Tally {
     checked: Option<MonoNs>,
-    /// Number of epochs with a fix, and number of epochs without.
+    /// Number of epochs with a fix, and number of epochs without a fix.
     pub(super) fixes: u32,
     pub(super) lacking: u32,
-    /// Part of the fix that was missing in the last epoch without one.
+    /// Part of the fix that was missing in the last epoch without a fix.
     pub(super) lacks: Option<NoFix>,
-    /// Largest error, in standard deviations.
+    /// Largest error of the estimate so far, in standard deviations.
     pub(super) sd: f64,
 }

@@ -6,7 +6,8 @@ use super::rig::{HEADS, Rig, cruise};
 use crate::Navigation as _;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// Returns the doubt about settings after four minutes. All echoes are scaled, and each head's returns are changed.
+/// Returns the filter's doubt about settings after a dive of four minutes. All echoes are scaled, and each head's
+/// returns are changed.
 fn doubted(echoes: f64, change: impl Fn(usize, SonarReturn) -> SonarReturn) -> Option<SettingDoubt> {
     let rig = Rig::new(cruise, 3);
     let mut nav: FilterNavigation = rig.navigation();

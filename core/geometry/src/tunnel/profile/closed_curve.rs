@@ -10,7 +10,7 @@ use crate::math::{self, TAU};
 pub(super) const SAME_POINT_M: f64 = 1e-9;
 /// Number of elements above which a polygon has a table of its extent by direction.
 const MANY: usize = 256;
-/// Number of places that [`Profile::places`] returns.
+/// Number of equidistant wall places that [`Profile::places`] returns.
 const PLACES: u32 = 64;
 
 /// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
@@ -18,7 +18,7 @@ const PLACES: u32 = 64;
 pub struct Profile {
     pub(super) elements: Vec<Element>,
     pub(super) tree: Tree,
-    /// Extent by direction, present only for many elements.
+    /// Table of the profile's extent by direction, present only for many elements.
     support: Option<Support>,
     pub(super) perimeter_m: f64,
     pub(super) reference: Yz,
@@ -33,7 +33,7 @@ pub struct WallHit {
     pub range_m: f64,
     /// Arc length of the intersection, m.
     pub arc_m: f64,
-    /// The intersection.
+    /// The intersection point.
     pub point: Yz,
     /// Unit normal of the wall at the intersection, pointing inwards.
     pub normal: Yz,
@@ -52,7 +52,7 @@ pub enum ProfileError {
     /// A coordinate is not finite, or exceeds 1000 m.
     #[error("vertex {vertex} has a coordinate that is not a number within 1000 m")]
     NotFinite {
-        /// Index of the vertex, from zero.
+        /// Index of the vertex, counted from zero.
         vertex: usize,
     },
     /// As seen from the reference point, the wall at this vertex is hidden or runs backwards.
@@ -63,7 +63,7 @@ pub enum ProfileError {
     NotStarShaped {
         /// Index of the input piece, or of the polygon point at which the offending edge begins.
         vertex: usize,
-        /// The reference point.
+        /// The reference point of the profile.
         reference: Yz,
     },
     /// All of the polygon lies on one side of y = 0.
@@ -76,7 +76,7 @@ pub enum ProfileError {
     Winding {
         /// Number of turns of the curve about the reference point.
         turns: i64,
-        /// The reference point.
+        /// The reference point of the profile.
         reference: Yz,
     },
 }
@@ -143,7 +143,7 @@ impl Profile {
         Ok(profile)
     }
 
-    /// Length of the closed curve, m.
+    /// Length of the profile's closed curve, m.
     pub fn perimeter_m(&self) -> f64 {
         self.perimeter_m
     }
@@ -153,7 +153,7 @@ impl Profile {
         self.reference
     }
 
-    /// Whether `point` is inside the curve.
+    /// Whether `point` is inside the profile's curve.
     pub fn contains(&self, point: Yz) -> bool {
         let direction = sub(point, self.reference);
         if direction == [0.0, 0.0] {
@@ -175,7 +175,7 @@ impl Profile {
 
     /// Casts a ray like [`Profile::cast`], but does not check that `origin` is inside.
     ///
-    /// It is used for many rays from one point that is known to be inside.
+    /// For many rays from one point that is known to be inside.
     pub fn cast_from_inside(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         self.hit(origin, direction)
     }
@@ -260,7 +260,7 @@ impl Profile {
         self.elements.iter().map(|element| (element.arc_m, element.length_m))
     }
 
-    /// Arc lengths of the element boundaries, m.
+    /// Arc lengths of the boundaries between the profile's lines and arcs, m.
     #[cfg(test)]
     pub(crate) fn corners_m(&self) -> Vec<f64> {
         self.elements.iter().map(|element| element.arc_m).collect()
@@ -274,7 +274,7 @@ impl Profile {
         let entry = |bounds: &Bounds| bounds.entry(origin, direction);
         self.tree.search(self.elements.len(), entry, |some| {
             for (index, element) in self.elements.iter().enumerate().take(some.end).skip(some.start) {
-                // Among equally near elements, the first along the wall is the result, whatever the order of the
+                // Among equally near elements, the first one along the wall is the result, whatever the order of the
                 // search.
                 if let Some(t) = element.crossing(origin, direction)
                     && best.is_none_or(|nearest| (t, index) < nearest)

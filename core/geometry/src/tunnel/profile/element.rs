@@ -1,25 +1,25 @@
-//! One piece of a profile at its position on the curve: ray crossings and arc lengths on the piece.
+//! A straight line or arc of a tunnel profile: intersections with rays, and arc lengths on it.
 
 use super::plane::{Yz, cross, dot, norm, sub};
 use crate::math::{self, TAU};
 
-/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbouring elements leave no gap.
+/// Angle by which a ray's hit may lie beyond an arc's end, rad, so that neighbouring elements leave no gap.
 pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
-/// Margin beyond which a hit is clearly inside or outside an arc.
+/// Margin beyond which a ray's hit is clearly inside or outside the angle of an arc.
 ///
-/// The margin applies to the cosine of the angle about the arc's middle, less that of the arc's ends. It is far
-/// larger than slack plus rounding.
+/// The margin applies to the cosine of the angle about the arc's middle, minus this cosine at the arc's ends. This
+/// margin is far larger than `ARC_SLACK_RAD` plus rounding.
 const CLEAR: f64 = 1e-9;
 
-/// Sine of the angle between an edge and a ray below which they count as parallel.
+/// Sine of the angle below which an edge of the profile and a ray count as parallel.
 const PARALLEL: f64 = 1e-6;
 
-/// One input piece of a profile; pieces run counter-clockwise with y to the right and z up.
+/// One input piece of a profile, a line or an arc; pieces run counter-clockwise with y to the right and z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A straight line to the given point.
     LineTo(Yz),
-    /// An arc about `centre` through `sweep_rad` > 0.
+    /// An arc about `centre` through the angle `sweep_rad` > 0.
     ///
     /// The polar angle grows, so the arc bulges outwards.
     Arc {
@@ -60,8 +60,8 @@ impl Element {
         match self.shape {
             Shape::Line => {
                 // A ray leaves the profile if the element's start is on the ray's right and the end is on its left.
-                // The half-open test uses the same product for the vertex shared by two elements, so that exactly one
-                // of the two elements is hit.
+                // Two elements that share a vertex use the same product for it, so that the ray hits exactly one of
+                // the two.
                 let (right, left) = (cross(direction, start), cross(direction, end));
                 if !(right <= 0.0 && left > 0.0) {
                     return None;
@@ -69,7 +69,8 @@ impl Element {
                 let (along, apart) = (sub(self.end, self.start), left - right);
                 let t = cross(start, along) / apart;
                 let length2 = dot(direction, direction);
-                // For a ray along the edge, both products are rounding errors. The exit is then limited to the edge.
+                // For a ray along the edge, both products are rounding errors. The exit point is then limited to the
+                // edge.
                 let t = if apart * apart < PARALLEL * PARALLEL * length2 * dot(along, along) {
                     let ends = [dot(start, direction) / length2, dot(end, direction) / length2];
                     t.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
@@ -153,8 +154,8 @@ impl Element {
                 (angle > 0.0).then_some(angle)
             }
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
-                // The arc runs forwards where (centre - reference) . e(theta) + radius > 0. The condition is checked
-                // at 256 steps.
+                // At the polar angle theta, the arc runs forwards if (centre - reference) . e(theta) + radius > 0.
+                // The condition is checked at 256 steps.
                 let shift = sub(centre, reference);
                 let steps = 256;
                 let mut angle = 0.0;

@@ -13,7 +13,7 @@ pub struct Nearest {
     pub distance_m: f64,
     /// Arc length of the nearest point, m.
     pub arc_m: f64,
-    /// The nearest point.
+    /// The nearest point of the wall.
     pub point: Yz,
 }
 
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::tunnel::shapes;
 
-    /// Smallest distance to wall points 0.5 mm apart, which exceeds the true distance by less than 0.25 mm.
+    /// Smallest distance to a set of wall points 0.5 mm apart; it exceeds the true distance by less than 0.25 mm.
     fn by_places(profile: &Profile, point: Yz) -> f64 {
         let places = math::round_to_i64(profile.perimeter_m() / 5e-4);
         (0..places).map(|k| norm(sub(point, profile.point_at(k as f64 * 5e-4)))).fold(f64::INFINITY, f64::min)
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn distance_from_the_centre_of_a_circle_is_its_radius() {
+    fn nearest_wall_of_a_circle_is_one_radius_from_its_centre() {
         let profile = shapes::circle(2.0).unwrap();
         assert!((profile.nearest([0.0, 2.0]).distance_m - 2.0).abs() < 1e-12);
     }

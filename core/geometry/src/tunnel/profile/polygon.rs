@@ -1,4 +1,4 @@
-//! A profile from surveyed points.
+//! A tunnel profile made from surveyed points.
 
 use super::closed_curve::{Profile, ProfileError, SAME_POINT_M};
 use super::element::Piece;
@@ -9,7 +9,7 @@ impl Profile {
     ///
     /// Arc length begins at the lowest crossing of y = 0. `reference` defaults to the polygon's centroid.
     ///
-    /// Errors: see [`ProfileError`]; its vertices are indices into `points`.
+    /// Errors: see [`ProfileError`], which gives a vertex as an index into `points`.
     /// Allocates: startup only.
     pub fn polygon(points: &[Yz], reference: Option<Yz>) -> Result<Self, ProfileError> {
         if let Some(vertex) = points.iter().position(|p| !p.iter().all(|c| c.abs() <= 1000.0)) {
@@ -25,13 +25,13 @@ impl Profile {
         }
         let (edge, start) = floor_centre(&ring).ok_or(ProfileError::BesideMiddle)?;
         let count = ring.len();
-        // The curve starts on the edge that crosses y = 0.
+        // The profile's curve starts on the edge that crosses y = 0.
         let vertex = |k: usize| ring.get((edge + k) % count);
         let pieces: Vec<Piece> = (1..=count).filter_map(vertex).map(|v| Piece::LineTo(v.point)).collect();
         Self::new(start, &pieces, reference.unwrap_or(centroid)).map_err(|error| match error {
             ProfileError::NotStarShaped { vertex: piece, reference } => {
-                // A piece begins where the previous one ends. The first piece begins within the edge that crosses y =
-                // 0.
+                // Each piece of the profile begins where the previous piece ends. The first piece begins within the
+                // edge that crosses y = 0.
                 let index = vertex(piece).map_or(0, |begin| begin.index);
                 ProfileError::NotStarShaped { vertex: index, reference }
             }
@@ -40,7 +40,7 @@ impl Profile {
     }
 }
 
-/// A point with its index in the input.
+/// A surveyed point with its index in the input.
 #[derive(Debug, Clone, Copy)]
 struct Vertex {
     index: usize,

@@ -1,20 +1,21 @@
-//! Extent of a profile with many elements in any direction, bounded by a table.
+//! Table that bounds the extent of a profile with many elements in any direction.
 
 use super::plane::{Yz, dot, norm};
 use crate::math::{self, TAU};
 
-/// Number of directions in the table.
+/// Number of directions in the table of extents.
 const DIRECTIONS: usize = 128;
 
-/// Extent of the points in each direction of the table, m.
+/// Extent of the profile's points in each direction of the table, m.
 ///
 /// Between two directions of the table, their two entries give an upper bound. The bound is too large by at most half
-/// the longest edge of the points' hull times tan(pi / [`DIRECTIONS`]), 0.025: 12 mm for each metre of a flat wall.
+/// the longest edge of the points' hull times tan(pi / [`DIRECTIONS`]) = 0.025. This is 12 mm for each metre of a
+/// flat wall.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Support(Vec<(Yz, f64)>);
 
 impl Support {
-    /// Computes the table for points.
+    /// Computes the table of extents for points.
     pub(super) fn of(points: &[Yz]) -> Self {
         let reach = |k: usize| {
             let (sin, cos) = math::sin_cos(TAU * k as f64 / DIRECTIONS as f64);
@@ -40,7 +41,7 @@ impl Support {
             let index = usize::try_from(index.rem_euclid(DIRECTIONS as i64)).unwrap_or_default();
             self.0.get(index).map_or(0.0, |(_, reach_m)| *reach_m)
         };
-        // The direction is a weighted sum of its two neighbours in the table.
+        // The direction is a weighted sum of the two neighbouring directions in the table.
         let step = TAU / DIRECTIONS as f64;
         let beyond = (turned - before as f64) * step;
         let (share, other) = (math::sin(step - beyond), math::sin(beyond));

@@ -6,23 +6,23 @@
 use super::element::{Element, Shape};
 use super::plane::{Yz, norm};
 
-/// Number of elements in a leaf; neighbours along the wall are close together.
+/// Number of elements in a leaf of the tree, which are neighbours along the wall.
 const LEAF: usize = 8;
 /// Maximum number of elements without a tree; a full search of so few elements is as fast.
 const FEW: usize = 24;
 /// Margin of the boxes around their elements, m, far larger than rounding errors and an arc's slack.
 const MARGIN_M: f64 = 1e-6;
-/// Depth of a tree over the maximum number of elements.
+/// Depth of a tree over the largest supported number of elements.
 const DEPTH: usize = 40;
 
-/// A box around elements.
+/// A bounding box around elements of the profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
     low: Yz,
     high: Yz,
 }
 
-/// The boxes of the tree.
+/// The bounding boxes of the tree.
 ///
 /// Node 1 contains all elements, and nodes 2 i and 2 i + 1 contain the halves of node i. `leaves` is the number of
 /// leaves. The tree is empty for few elements.
@@ -35,7 +35,7 @@ pub(super) struct Tree {
 impl Bounds {
     const EMPTY: Self = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
 
-    /// The box of an arc contains its whole circle, which is larger but simpler.
+    /// The box of an arc contains the arc's whole circle; such a box is larger but simpler.
     fn of(element: &Element) -> Self {
         let Element { start, end, .. } = *element;
         let of = |place: fn(f64, f64) -> f64, off: f64| {
@@ -99,7 +99,7 @@ impl Tree {
         Self { nodes, leaves }
     }
 
-    /// Visits ranges of elements, by index, that may improve on the best result so far.
+    /// Visits ranges of elements, by index, that may contain a better result than the best so far.
     ///
     /// `bound` returns the minimum cost of any element in a box. `look` returns the best cost found so far. Elements
     /// of equal cost are all visited.

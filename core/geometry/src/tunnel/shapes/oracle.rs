@@ -8,7 +8,7 @@ use headrace_support::hard_cases::{found, found_at};
 
 const LINES: &str = include_str!("../../../../../tests/oracles/geometry.csv");
 
-/// Returns the largest errors of ray length and arc length in a case, m, and the number of rays.
+/// Returns the largest errors of ray length and arc length in an oracle case, m, and the number of rays in it.
 fn worst(case: &str) -> (f64, f64, u32) {
     let (mut range_m, mut arc_m, mut count) = (0.0_f64, 0.0_f64, 0);
     for line in LINES.lines().filter(|line| line.split(',').next() == Some(case)) {
@@ -39,7 +39,8 @@ fn rays_from_1_mm_off_the_wall_agree_with_50_digit_values() {
     found("geometry.millimetre", range_m.max(arc_m), 1e-13);
 }
 
-/// At 89.99 degrees to the normal, an error across the wall is multiplied by 5,730 along the wall.
+/// If a ray meets the wall at 89.99 degrees to the normal, an error across the wall becomes 5,730 times as large
+/// along it.
 #[test]
 fn rays_nearly_along_the_wall_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("grazing");
@@ -49,13 +50,13 @@ fn rays_nearly_along_the_wall_agree_with_50_digit_values() {
 }
 
 #[test]
-fn rays_through_and_an_ulp_beside_corners_agree_with_50_digit_values() {
+fn rays_through_corners_and_an_ulp_beside_them_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("corner");
     assert_eq!(count, 36);
     found("geometry.corner", range_m.max(arc_m), 1e-14);
 }
 
-/// The value under the root is 0 or a few ulps.
+/// In the formula for a tangent ray, the value under the root is 0 or a few ulps.
 ///
 /// An error of one ulp in this value is an error of sqrt(ulp) in the result.
 #[test]
@@ -77,7 +78,7 @@ fn rays_along_walls_end_at_the_end_of_the_wall() {
         let (sin, cos) = math::sin_cos(0.5 + f64::from(turn) * 1e-3);
         let turned = |[y, z]: Yz| [y * cos - z * sin, 3.0 + y * sin + z * cos];
         let inner = half - radius;
-        // The pieces run counter-clockwise from the middle of the lower wall.
+        // The profile's pieces run counter-clockwise from the middle of the lower wall.
         let corners = [[inner, -inner], [inner, inner], [-inner, inner], [-inner, -inner]];
         let lines = [[inner, -half], [half, inner], [-inner, half], [-half, -inner]];
         let mut pieces = Vec::new();
@@ -89,7 +90,7 @@ fn rays_along_walls_end_at_the_end_of_the_wall() {
         for side in [[half, 0.0, 0.0, 1.0], [0.0, half, -1.0, 0.0], [-half, 0.0, 0.0, -1.0]] {
             let [y, z, v, w] = side;
             let (origin, direction) = (turned([y, z]), [v * cos - w * sin, v * sin + w * cos]);
-            // The wall's end, where the arc starts, and the arc's centre.
+            // The end of the wall, where the arc starts, and the centre of this arc.
             let end = turned([y + inner * v, z + inner * w]);
             let centre = turned([
                 y + inner * v - radius * w.abs() * y.signum(),
@@ -108,8 +109,8 @@ fn rays_along_walls_end_at_the_end_of_the_wall() {
             let hit = profile
                 .cast_from_inside(origin, direction)
                 .unwrap_or_else(|| panic!("no wall at turn {turn}"));
-            // Because of rounding, the ray may meet the wall along which it runs. Beyond the wall's end there is only
-            // the arc.
+            // Through rounding, a ray along a straight wall may hit this wall before its end. Past the end, only the
+            // arc can be hit.
             let off = [hit.point[0] - end[0], hit.point[1] - end[1]];
             let beyond_m = off[0] * direction[0] + off[1] * direction[1];
             let across_m = off[0] * direction[1] - off[1] * direction[0];

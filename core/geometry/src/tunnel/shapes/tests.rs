@@ -50,7 +50,7 @@ fn arc_length_grows_with_the_head_angle_from_the_floor_centre() {
     }
 }
 
-/// A dense polyline of the same curve is inscribed in its arcs, so its ranges are slightly too short.
+/// A dense polyline of the same curve is inscribed in the arcs, so ranges to it are slightly too short.
 #[test]
 fn ranges_agree_with_a_dense_polyline() {
     for (name, profile) in all() {
@@ -120,7 +120,7 @@ fn rays_from_1_mm_off_the_wall_end_on_the_wall() {
 /// A ray runs up along a wall, which continues tangentially as a half-circle.
 ///
 /// The ray touches the circle at its start. A few ulps beside the wall, the ray crosses the circle above its start.
-/// The height of the crossing above the springing is sqrt((2 - y) (2 + y)), computed without cancellation.
+/// The crossing is sqrt((2 - y) (2 + y)) above the springing of the vault, computed without cancellation.
 #[test]
 fn ray_tangent_to_the_vault_meets_it_at_the_springing() {
     let profile = arch(4.0, 4.0, 2.0).unwrap();
@@ -194,7 +194,7 @@ fn repeated_collinear_and_almost_equal_points_have_no_effect() {
 proptest! {
     /// Seen from the reference point, the wall point at any arc length has that same arc length.
     #[test]
-    fn point_at_and_arc_of_are_inverse(which in 0usize..7, share in 0.0f64..1.0) {
+    fn wall_point_at_an_arc_length_has_that_arc_length(which in 0usize..7, share in 0.0f64..1.0) {
         let (name, profile) = all().swap_remove(which);
         let arc = share * profile.perimeter_m();
         let back = profile.arc_of(profile.point_at(arc));

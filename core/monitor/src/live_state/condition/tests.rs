@@ -2,21 +2,23 @@ use super::*;
 use crate::fixtures;
 use crate::live_state::{LiveMetres, SensorState};
 use headrace_geometry::time::MonoNs;
+use headrace_sampling::Target;
 use headrace_sampling::advice::Advice;
 
 const fn at(seconds: u64) -> MonoNs {
     MonoNs(seconds * 1_000_000_000)
 }
 
-/// Advice with this reason, speed and forecast T.
+/// Test advice with this reason, largest speed and forecast spacing T.
 fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
     let none = fixtures::advice(&fixtures::situation(None));
     Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
 }
 
-/// Two heads and another sensor. Their last readings came at 10 s. The speed and its limit are 0.07 m/s.
+/// Live state with two heads and another sensor. Their last readings came at 10 s. The speed and its limit
+/// are 0.07 m/s.
 pub(crate) fn state() -> LiveState {
-    let mut heard = LiveState::new(0.5, 2.0, 0b11, 3).heard;
+    let mut heard = LiveState::new(Target::new(0.5), 0b11, 3).heard;
     heard[..3].fill(Some(at(10)));
     LiveState {
         now: at(10),
@@ -29,12 +31,12 @@ pub(crate) fn state() -> LiveState {
         metres: LiveMetres { pass_m: 12.0, open_m: 1.5, ..LiveMetres::default() },
         turning: 0b11,
         heard,
-        ..LiveState::new(0.5, 2.0, 0b11, 3)
+        ..LiveState::new(Target::new(0.5), 0b11, 3)
     }
 }
 
 #[test]
-fn lamp_follows_the_ratio_of_speed_to_limit() {
+fn lamp_colour_follows_the_ratio_of_speed_to_v_max() {
     let driven = |speed_mps| LiveState { speed_mps: Some(speed_mps), ..state() };
     let shown = [0.05, 0.0713, 0.073, 0.11, -0.11].map(|mps| {
         let condition = driven(mps).condition();
@@ -52,9 +54,9 @@ fn lamp_follows_the_ratio_of_speed_to_limit() {
     );
 }
 
-/// Over wall that has passed any speed is fine, unless the position is doubtful or there is no sonar.
+/// Over wall that has passed, any speed is fine, unless the position is doubtful or sonar data are missing.
 #[test]
-fn any_speed_is_fine_over_passed_wall() {
+fn any_speed_is_fine_over_wall_with_the_verdict_pass() {
     let back = LiveState { passed: true, speed_mps: Some(-0.3), ..state() };
     assert_eq!((back.condition(), back.condition().lamp()), (Condition::Passed, Lamp::Green));
     let coarse = LiveState { advice: Some(advice(Reason::AngularStep, 0.0, 0.9)), ..back };
@@ -80,14 +82,14 @@ fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
 }
 
 #[test]
-fn condition_is_turn_fails_only_while_the_forecast_exceeds_the_target() {
+fn turn_fails_condition_holds_only_while_the_forecast_exceeds_the_target() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };
     let told = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
     assert_eq!([told(0.6), told(0.4)], [Condition::TurnFails, Condition::Good]);
 }
 
 #[test]
-fn forecast_within_the_position_error_of_the_target_is_not_good() {
+fn condition_is_not_good_if_the_forecast_may_exceed_the_target() {
     let forecast = |may_exceed, will_exceed| Advice {
         may_exceed,
         will_exceed,
@@ -126,7 +128,7 @@ fn missing_data_takes_precedence_over_doubtful_data() {
 }
 
 #[test]
-fn state_becomes_stale_as_ticks_continue_without_data() {
+fn live_state_becomes_stale_as_ticks_continue_without_data() {
     let after = |ms: u64| LiveState { now: MonoNs(at(10).0 + ms * 1_000_000), ..state() };
     assert_eq!([after(2000), after(2001)].map(|state| state.is_old()), [false, true]);
     assert_eq!(
@@ -138,7 +140,7 @@ fn state_becomes_stale_as_ticks_continue_without_data() {
 }
 
 #[test]
-fn sensor_is_ok_stalled_or_silent_by_its_readings() {
+fn readings_decide_whether_a_sensor_is_ok_stalled_or_silent() {
     let mut state = state();
     state.heard[2] = None;
     state.turning = 0b01;
@@ -157,7 +159,7 @@ fn condition_is_outside_the_tunnel_only_if_no_head_can_be_inside() {
     assert_eq!([before, beyond], [Condition::Outside(0.0), Condition::Outside(100.0)]);
     assert_eq!(inside, [Condition::Good; 3]);
     assert_eq!((beyond.as_str(), beyond.lamp()), ("outside", Lamp::Amber));
-    // A doubtful position takes precedence.
+    // A doubtful position takes precedence over being outside the tunnel.
     let unsure = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..at(100.6) };
     assert_eq!(unsure.condition(), Condition::CannotSay(PositionDoubt::Cable));
 }

@@ -9,7 +9,7 @@ use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::SourceId;
 
-/// A real ping without a fix, with or without a return.
+/// A real (not simulated) ping without a fix, with or without a return.
 fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
     let at = MonoNs(at_ms * 1_000_000);
     PlacedPing {
@@ -95,9 +95,9 @@ fn all_of(causes: &[Cause]) -> Causes {
 
 /// At angles assumed to be hidden, losses are due to occlusion, unless other pings there do detect the wall.
 #[test]
-fn loss_at_hidden_angle_is_a_missing_return_once_other_pings_return() {
+fn loss_at_an_occluded_angle_is_a_missing_return_once_other_pings_there_detect_wall() {
     let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
-    let aim = Some(Aim { x_m: 3.0, arc_m: 2.0 });
+    let aim = Some(WallPoint { x_m: 3.0, arc_m: 2.0 });
     let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
     let mut causes = |pings: &[PlacedPing]| {
         for ping in pings {
@@ -123,7 +123,7 @@ fn loss_at_hidden_angle_is_a_missing_return_once_other_pings_return() {
 /// The head looks to the left, at wall 3 m away, and the vehicle is turned to the left by 0.1 rad. The beam
 /// then meets the wall 3 tan 0.1 m astern.
 #[test]
-fn lost_ping_is_a_missing_sample_at_its_aim_with_all_causes() {
+fn lost_ping_is_recorded_with_its_causes_at_the_aimed_wall_point() {
     let profile = pipe();
     let [y_m, z_m] = profile.reference();
     let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1);
@@ -168,7 +168,8 @@ fn lost_ping_is_a_missing_sample_at_its_aim_with_all_causes() {
     }
 }
 
-/// A dive at 0.1 m/s from chainage 1 m. Its only head turned at 50 pings a second until 10 s.
+/// Situation of a dive at 0.1 m/s from chainage 1 m. Its only head turned at 50 pings a second until 10 s,
+/// then fell silent.
 struct Dive {
     world: World,
     profile: Profile,
@@ -196,7 +197,7 @@ impl Dive {
         Self { world, coverage: coverage(), profile, lacking }
     }
 
-    /// Missing samples after an update with or without a fix.
+    /// Missing samples recorded by an update with or without a fix.
     fn beat(&mut self, seconds: f64, has_fix: bool) -> Vec<MissingSample> {
         let [y_m, z_m] = self.profile.reference();
         let position = Point3::new(1.0 + 0.1 * seconds, y_m, z_m);
@@ -219,8 +220,8 @@ impl Dive {
         lacks_of(&self.coverage.lacks)
     }
 
-    /// Whether the missing samples are those of the pings after 10 s: in order, and each at the head's
-    /// expected place.
+    /// Whether the missing samples are those of the pings expected after 10 s, in order, each at its expected
+    /// place.
     fn are_pings_after_10_s(&self, lacks: &[MissingSample], why: &[Cause]) -> bool {
         let [y_m, z_m] = self.profile.reference();
         (1_u32..).zip(lacks).all(|(ping, lack)| {
@@ -238,7 +239,7 @@ impl Dive {
 fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
     let mut dive = Dive::new();
     assert_eq!(dive.beat(10.2, true).len(), 0, "the head may still ping");
-    // The missing samples are those of one second, then those of two.
+    // The missing samples are first those of one second, then those of two seconds.
     let first = dive.beat(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadSilent]), "{first:?}");
     let second = dive.beat(12.0, true);
@@ -250,10 +251,10 @@ fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
 }
 
-/// Pings without a fix have the missing position as an additional cause. They are placed along the track as
-/// soon as there is a fix again.
+/// For pings without a fix, the missing position is an additional cause. The pings are placed along the track
+/// as soon as there is a fix again.
 #[test]
-fn simulated_pings_without_a_fix_are_placed_later() {
+fn simulated_pings_without_a_fix_are_placed_at_the_next_fix() {
     let mut dive = Dive::new();
     dive.beat(10.0, true);
     assert_eq!((dive.beat(11.0, false).len(), dive.lacking.away.len()), (0, 50));
@@ -261,10 +262,10 @@ fn simulated_pings_without_a_fix_are_placed_later() {
     assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
     assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
     assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
-    // Their driving figures have the mean speed between the two fixes.
+    // The driving figures of the missing samples have the mean speed between the two fixes.
     let section = dive.coverage.sections.get(8).unwrap();
     assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
-    // If the capacity is exceeded, the first pings are kept.
+    // If there are more pings without a fix than the capacity, the first pings are kept.
     let mut dive = Dive::new();
     dive.beat(10.0, true);
     dive.beat(10.0 + 0.02 * (ROOM as f64 + 500.0), false);
@@ -303,10 +304,10 @@ fn random_numbers_from_times_are_evenly_distributed() {
         for draw in &draws {
             counts[usize::try_from(math::floor_to_i64(16.0 * draw)).unwrap()] += 1;
         }
-        // 1024 are expected in each class. The tolerance is five standard deviations.
+        // 1024 numbers are expected in each class. The tolerance is five standard deviations.
         assert!(counts.iter().all(|count| (count - 1024).abs() < 160), "{period_ns}: {counts:?}");
-        // After a number in the lower half, the next one is evenly distributed, too: neighbours are
-        // independent.
+        // After a number in the lower half, the next number is evenly distributed, too: neighbouring numbers
+        // are independent.
         let after_low = draws.windows(2).filter(|pair| pair[0] < 0.5 && pair[1] < 0.5).count();
         assert!(after_low.abs_diff(4096) < 300, "{period_ns}: {after_low}");
         let mut sorted = draws;

@@ -82,9 +82,9 @@ fn t_max_at_the_largest_speed_equals_the_target() {
 
 /// The reference table lists T_max of Eq. 16.
 ///
-/// The planner takes the worst start angle of the pings, so its T_max is at most slightly larger.
+/// The planner assumes the worst start angle of the pings, so its T_max is at most slightly larger than in the table.
 #[test]
-fn ideal_heads_give_the_reference_table() {
+fn ideal_heads_have_the_t_max_of_the_reference_table() {
     let expected = [
         [4.259, 2.132, 1.069],
         [2.134, 1.074, 0.548],
@@ -117,7 +117,8 @@ fn occluded_side_walls_get_half_of_the_passes() {
     for strip in hidden {
         assert!(strip.seen_by.len() == 2 && (strip.arc.length_m - 1.7).abs() < 0.1, "{strip:?}");
     }
-    // Steps are short on the side walls, so the corners, which all heads see, limit the speed.
+    // Neighbouring samples of a turn are close on the side walls, so the corners, which all heads see, limit the
+    // speed.
     let t_m = planner.t_max_m(fast, 0.1).unwrap();
     assert!((0.41..0.43).contains(&t_m), "{t_m}");
 }
@@ -128,7 +129,8 @@ fn sector_heads_look_outwards_and_leave_floor_and_crown_unseen() {
     assert!(planner.hidden().iter().all(|ranges| ranges.len() == 1));
     let strips = planner.nominal_strips().unwrap().as_slice();
     let unseen: Vec<_> = strips.iter().filter(|strip| strip.seen_by.is_empty()).collect();
-    // The sectors are free of occlusion. Heads 0.3 m apart leave strips between them unseen, on floor and crown.
+    // In sectors, no head occludes another head's beam. Heads 0.3 m apart leave strips on floor and crown unseen,
+    // between their sectors.
     assert_eq!(unseen.len(), 2, "{strips:?}");
     assert!(unseen.iter().all(|strip| (strip.arc.length_m - 0.3).abs() < 0.01));
     let answers = planner.answers(&speed(0.4), None).unwrap();
@@ -168,7 +170,7 @@ fn plan_gives_the_speed_for_a_target_or_the_target_for_a_time() {
 }
 
 #[test]
-fn impossible_plan_names_the_cause() {
+fn error_about_an_impossible_plan_names_the_cause() {
     let why = |inspection| Planner::new(inspection).unwrap_err();
     assert_eq!(why(ideal(0)), SamplingError::HeadCount { heads: 0 });
     let one = Inspection { layout: HeadLayout::SectorOffset, ..ideal(1) };
@@ -214,12 +216,13 @@ fn each_margin_lowers_the_speed_down_to_the_largest_planned_speed() {
     }
 }
 
-/// The stated range is the smallest of the heads' maximum ranges. The ping period follows from the turn period.
+/// The range that the plan states is the smallest of the heads' maximum ranges. The ping period follows from the turn
+/// period.
 #[test]
-fn plan_states_its_reach_and_ping_period() {
+fn plan_states_the_maximum_range_and_ping_period() {
     let mut shorter = ideal(2);
     shorter.heads[1].0.range_m[1] = 8.0;
-    // With a speed of sound 10 % higher, the same times give ranges 10 % longer.
+    // With a speed of sound 10 % higher, the same echo times give ranges 10 % longer.
     shorter.sound_speed_mps = 1650.0;
     let planner = Planner::new(shorter).unwrap();
     assert!((planner.reach_m() - 8.8).abs() < 1e-9, "{}", planner.reach_m());
@@ -237,7 +240,7 @@ fn drift_and_yaw_never_improve_the_plan() {
     for mode in 0..MODES.len() {
         assert!(drifting.modes()[mode].t_y2_m > 1.5 * still.modes()[mode].t_y2_m);
         assert!(drifting.v_max_mps(mode, 3.0).unwrap() < still.v_max_mps(mode, 3.0).unwrap());
-        // Values at the nominal pose are unchanged.
+        // Plan values at the nominal pose are unchanged by drift and yaw.
         let same = drifting.modes()[mode].chords_m.iter().zip(still.modes()[mode].chords_m);
         assert!(same.into_iter().all(|(a, b)| (a - b).abs() < 1e-12));
     }
@@ -273,7 +276,7 @@ fn sample_pattern_counts_pings_sweeps_and_hidden_angles() {
     assert!((hidden - 15.33 / 360.0).abs() < 2e-3, "{hidden}");
     let sectors = inspection(vec![head([0.0; 3], false, 0.0); 2], HeadLayout::SectorOffset);
     let samples = Planner::new(sectors).unwrap().pattern(2, 0.1, 2.0).unwrap();
-    // Two turns are four sweeps of half a turn, with three turning points in between.
+    // Two turns' time is four sweeps of half a turn, with three turning points between the sweeps.
     assert_eq!(samples.iter().filter(|sample| sample.new_sweep).count(), 2 * 4);
 }
 
@@ -285,13 +288,13 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
     let [places, sides]: [Vec<f64>; 2] =
         [0, 1].map(|k| gain.positions_m.iter().map(|place| place[k]).collect());
     assert_eq!(sides, [0.0; 4]);
-    // The line extends equally ahead and astern, and no two heads overlap.
+    // The line of heads extends equally ahead and astern, and no two heads overlap.
     assert!(places.iter().sum::<f64>().abs() < 1e-12, "{places:?}");
     let mut sorted = places.clone();
     sorted.sort_by(f64::total_cmp);
     assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] > 0.05), "{sorted:?}");
     assert!(places[0] > 0.0 && places[2] < 0.0, "heads in front must remain in front: {places:?}");
-    // A plan with the heads in line gives the same speed as this prediction.
+    // A plan for heads in line gives the same speed as this prediction.
     let mut there = vita_2(HeadLayout::PhaseShift);
     for ((spec, _), place) in there.heads.iter_mut().zip(&gain.positions_m) {
         spec.mount.position = Vec3::new(place[0], place[1], place[2]);
@@ -303,7 +306,7 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
     assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }
 
-/// Heads apart along the hull are in phase only near the speed for which they were started.
+/// Heads that are apart along the hull are in phase only near the speed for which they were started.
 ///
 /// The live advice therefore differs from a plan, which may restart the heads.
 #[test]
@@ -318,7 +321,7 @@ fn heads_started_for_another_speed_lower_the_largest_speed() {
     let held = started(&apart, HELD_SHARE);
     assert!(held > HELD_SHARE && held <= 1.0, "{held}");
     assert!(started(&apart, 0.7) < 0.9, "{}", started(&apart, 0.7));
-    // With a single head, the started speed makes no difference.
+    // With a single head, the speed for which the head was started makes no difference.
     let alone = Planner::new(ideal(1)).unwrap();
     let [slow, fast] = [0.3, 0.9].map(|share| started(&alone, share));
     assert!((slow - fast).abs() < 1e-3);
@@ -328,9 +331,9 @@ fn heads_started_for_another_speed_lower_the_largest_speed() {
     );
 }
 
-/// The error names the configured target, not the target less position errors.
+/// The error names the configured target, not the target minus the margin for position errors.
 #[test]
-fn error_names_the_configured_target() {
+fn plan_error_names_the_configured_target() {
     let swinging = Inspection { yaw_rate_radps: 10.0, ..vita_2(HeadLayout::PhaseShift) };
     let why = Planner::new(swinging).unwrap().v_max_mps(2, 0.6).unwrap_err();
     assert!(why.to_string().contains("a target of 0.6 m"), "{why}");
@@ -338,7 +341,7 @@ fn error_names_the_configured_target() {
 
 /// Heads at one position see the same neighbours as one head.
 ///
-/// For heads at different positions, minimum and maximum are over all heads.
+/// For heads at different positions, the smallest and largest distances between samples are over all heads.
 #[test]
 fn minimum_and_maximum_neighbour_distances_are_over_all_heads() {
     let chords_m = |inspection: Inspection| {

@@ -10,9 +10,9 @@ use headrace_geometry::tunnel::{Profile, Yz};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Averaging time of the speed, s.
+/// Time over which the speed is averaged from the cable counter's readings, s.
 const SPEED_OVER_S: f64 = 1.0;
-/// Age above which a reading is ignored, s.
+/// Age above which the cable counter's last reading is ignored, s.
 const STALE_S: f64 = 2.0;
 
 /// The chainage of a cable reading, m; `None` for any other reading.
@@ -71,7 +71,7 @@ impl Navigation for CableNavigation {
         }
         let [y_m, z_m] = self.middle;
         let position = Point3::new(chainage_m + self.speed_mps * age_s, y_m, z_m);
-        // Two independent roundings to the counter's quantum.
+        // The difference of two readings contains two independent roundings to the counter's quantum.
         let relative = Relative::along(self.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position, attitude: Rot::identity() },

@@ -16,7 +16,8 @@ use super::cable::CableNavigation;
 use crate::error::CostError;
 use headrace_oracle::dive::{JudgedDive, Recorded};
 
-/// Capacity of the journal. Steps are read right after their epoch, so the capacity covers the steps after a silence.
+/// Capacity of the filter's journal, steps. The journal is emptied after each reading, but the first reading
+/// after a silence may add many steps.
 const JOURNAL: usize = 4096;
 
 /// A reading as passed to navigation.
@@ -82,7 +83,8 @@ impl Hearing {
         Self { sensors: self.sensors.clone(), readings, duration_s: self.duration_s.min(part_s) }
     }
 
-    /// Runs a navigation as the loop does: requests a fix before each ping and passes the fix to `take`.
+    /// Runs a navigation method as the live loop does: requests a position fix before each ping and passes it to
+    /// `take`.
     pub(super) fn run(
         &self,
         navigation: &mut dyn Navigation,

@@ -1,4 +1,4 @@
-//! Text about the default, derived from the points.
+//! Text about the default navigation method, derived from the measured points.
 
 use crate::point::Point;
 use crate::words::number;
@@ -8,7 +8,7 @@ const DIRECT: &str = "direct";
 const USUAL: &str = "filter, sonar returns";
 const SMOOTHED: &str = "smoothed";
 
-/// Finds a figure of a point by its name.
+/// Finds a figure among the errors of a measured point, by its name.
 fn figure(point: &Point, name: &str) -> Option<f64> {
     point.errors.iter().find(|error| error.name == name).map(|error| error.interval.middle)
 }

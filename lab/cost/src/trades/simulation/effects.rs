@@ -37,7 +37,8 @@ line_delay = { jitter_ms = 2 }
 byte_errors = { flipped_per_million = 20 }
 ";
 
-/// Name of the effect that a line of a scene states: a line in `[effects]`, or the header of an effect's own table.
+/// Name of the effect that a line of a scene file defines: a line in `[effects]`, or the header of the effect's own
+/// table.
 fn effect_of(line: &str, in_effects: bool) -> Option<&str> {
     if line.starts_with('[') {
         return line.trim_matches(['[', ']']).strip_prefix("effects.");

@@ -47,7 +47,7 @@ fn solver_reports_a_residual_above_its_tolerance() {
 }
 
 #[test]
-fn same_samples_give_the_same_bits() {
+fn same_samples_give_bit_identical_surfaces() {
     let samples = sphere(700, 2.0);
     let meshes = [0, 1].map(|_| Surface::through(&samples, &settings(5)).unwrap().mesh());
     assert_eq!(meshes[0], meshes[1]);

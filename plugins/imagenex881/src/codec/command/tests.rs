@@ -80,7 +80,7 @@ fn unsupported_range_is_refused() {
 }
 
 #[test]
-fn terminator_occurs_only_at_the_end() {
+fn command_terminator_occurs_only_at_the_end() {
     let early = |command: Command| match command.encode() {
         Err(CommandError::EarlyTerminator { index }) => index,
         other => panic!("{other:?}"),

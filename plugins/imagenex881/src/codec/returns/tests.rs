@@ -68,7 +68,7 @@ fn position_past_a_turn_is_refused_for_heads_and_accepted_for_sounders() {
 }
 
 #[test]
-fn false_lengths_are_refused() {
+fn returns_with_a_false_length_are_refused() {
     let mut bytes = [0; MAX_RETURN_BYTES];
     bytes[..13].copy_from_slice(&EXAMPLE_4);
     [bytes[10], bytes[11]] = pack(1);
@@ -83,7 +83,7 @@ fn false_lengths_are_refused() {
 }
 
 #[test]
-fn value_beyond_its_bits_is_not_encoded() {
+fn value_too_large_for_its_bits_is_not_encoded() {
     let value = Return::decode(&EXAMPLE_4, None).unwrap();
     let too_far = Return { header: Header { profile_counts: 0x4000, ..value.header }, ..value };
     assert!(matches!(too_far.encode(), Err(ReturnError::TooGreat { max: 0x3FFF, .. })));

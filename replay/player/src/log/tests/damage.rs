@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::super::{LogError, LogInfo, LogWriter, LossKind};
 use super::*;
 
-/// Number of messages in each chunk of [`log`], and number of chunks.
+/// Number of messages in each chunk of the log under test, and number of chunks.
 const PER_CHUNK: usize = 6;
 const CHUNKS: usize = 6;
 
@@ -35,7 +35,7 @@ fn log() -> (Vec<u8>, Vec<Seen>, Vec<usize>) {
     (bytes, seen, places[1..].to_vec())
 }
 
-/// Returns the messages of all chunks except one.
+/// Returns the messages of all chunks except the given one.
 fn without_chunk(seen: &[Seen], chunk: usize) -> Vec<Seen> {
     [&seen[..chunk * PER_CHUNK], &seen[(chunk + 1) * PER_CHUNK..]].concat()
 }
@@ -65,7 +65,7 @@ fn log_cut_anywhere_delivers_messages_before_the_cut() {
     }
 }
 
-/// A medium with unreadable bytes.
+/// A medium that can't read some of its bytes.
 struct Worn<'a> {
     bytes: std::io::Cursor<&'a [u8]>,
     bad: core::ops::Range<usize>,
@@ -74,7 +74,7 @@ struct Worn<'a> {
 impl std::io::Read for Worn<'_> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         let at = usize::try_from(self.bytes.position()).unwrap();
-        // A read stops before the unreadable bytes.
+        // A read that reaches unreadable bytes returns only the bytes before them.
         let len = if at < self.bad.start { into.len().min(self.bad.start - at) } else { into.len() };
         if self.bad.contains(&at) {
             return Err(std::io::Error::from_raw_os_error(5));
@@ -106,7 +106,7 @@ fn long_log() -> (Vec<u8>, Vec<Seen>) {
 }
 
 #[test]
-fn unreadable_bytes_are_a_loss_and_the_rest_is_read() {
+fn unreadable_bytes_are_reported_as_a_loss_and_the_rest_is_read() {
     let (bytes, seen) = long_log();
     let chunks = places(&bytes, op::CHUNK);
     let mut told = 0;
@@ -131,7 +131,7 @@ fn unreadable_bytes_are_a_loss_and_the_rest_is_read() {
                 .iter()
                 .any(|loss| matches!(&loss.kind, LossKind::Unreadable(why) if why.contains("os error 5")));
             told += usize::from(is_told);
-            // All messages outside the unreadable sector are read.
+            // All messages of chunks outside the unreadable sector are read.
             let hit = chunks
                 .iter()
                 .filter(|place| **place < sector.end && sector.start < record_after(&bytes, **place))
@@ -168,7 +168,7 @@ fn long_chunk_cut_anywhere_delivers_messages_before_the_cut() {
 }
 
 #[test]
-fn chunk_with_zeroed_head_is_a_loss() {
+fn chunk_with_zeroed_header_is_reported_as_a_loss() {
     let (bytes, seen) = long_log();
     for chunk in &places(&bytes, op::CHUNK)[1..] {
         let mut bytes = bytes.clone();
@@ -180,7 +180,7 @@ fn chunk_with_zeroed_head_is_a_loss() {
 }
 
 #[test]
-fn losses_by_thousands_of_random_changes_are_reported() {
+fn every_message_lost_to_random_changes_is_reported() {
     let (bytes, seen) = long_log();
     let info = open(&bytes).header().clone();
     let words = noise(11, 12_000);
@@ -323,7 +323,7 @@ fn damaged_attachment_is_reported_by_name() {
 }
 
 #[test]
-fn files_other_than_mcap_are_refused_with_their_first_bytes() {
+fn error_for_a_file_other_than_mcap_shows_its_first_bytes() {
     let error = |bytes: &[u8]| {
         LogReader::new(Cursor::new(bytes.to_vec()), "dive.mcap".to_owned()).err().unwrap().to_string()
     };
@@ -403,7 +403,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_as_a_log_without_a_panic(
+    fn arbitrary_bytes_are_read_as_a_log_without_a_panic(
         start in prop::sample::select(vec![&b""[..], &b"\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..]]),
         bytes: Vec<u8>,
         records in prop::collection::vec((0_u8..17, 0_u64..80, prop::collection::vec(any::<u8>(), 0..80)), 0..20),

@@ -61,7 +61,7 @@ fn check(bytes: &[u8], what: &str) -> Vec<Loss> {
     reader.losses().to_vec()
 }
 
-/// Returns all combinations of write options, with names.
+/// Returns all combinations of the MCAP writer's options, with names.
 fn all_options() -> Vec<(String, WriteOptions)> {
     let mut all = Vec::new();
     for (name, compression) in
@@ -194,7 +194,7 @@ fn wrong_message_length_loses_at_most_two_messages() {
 }
 
 #[test]
-fn loss_up_to_the_closing_bytes_is_reported() {
+fn loss_of_all_records_before_the_closing_bytes_is_reported() {
     let chunked = WriteOptions::new().chunk_size(Some(200)).compression(None);
     for (options, opcode) in [(chunked, op::CHUNK), (WriteOptions::new().use_chunks(false), op::MESSAGE)] {
         let whole = write(options);
@@ -247,7 +247,7 @@ fn messages_of_an_undefined_channel_are_counted() {
 }
 
 #[test]
-fn chunks_with_wrong_times_give_late_messages() {
+fn messages_of_chunks_with_wrong_times_are_counted_as_late() {
     let mut bytes = write(WriteOptions::new().compression(None).chunk_size(Some(200)));
     for (number, at) in places(&bytes, op::CHUNK).into_iter().enumerate() {
         let later = (1_000_000 * (number as u64 + 1)).to_le_bytes();
@@ -338,10 +338,11 @@ fn with_attachment(name: &str) -> (Vec<u8>, usize) {
 }
 
 #[test]
-fn unreadable_attachment_is_missing_and_reported() {
+fn unreadable_attachment_is_left_out_and_reported() {
     let (whole, at) = with_attachment("notes.txt");
     assert_eq!(read(&whole).1, vec![]);
-    // The length of the data follows opcode and length, two times, and the name and media type with their lengths.
+    // The data's length comes after the opcode and the record length, two timestamps, and the name and the media type,
+    // each with its own length.
     let data_len_at = at + 9 + 16 + 4 + "notes.txt".len() + 4 + "text/plain".len();
     assert_eq!(whole[data_len_at..data_len_at + 8], 3000_u64.to_le_bytes());
     for len in [u64::MAX, u64::MAX - 3, u64::MAX - 60, 1 << 63, 3001] {

@@ -28,7 +28,7 @@ fn log(ticks: bool, is_part: bool) -> Vec<u8> {
         let at = MonoNs(1_000_000_000 + number * 10_000_000);
         match number % 5 {
             0 if ticks => log.tick(number, at, &[2]).unwrap(),
-            // This channel has messages in only a few chunks.
+            // Channel 1 has messages in only a few chunks.
             1 if number % 20 == 1 => log.raw(1, at, at, b"depth").unwrap(),
             2 => log.result(0, at, b"{}").unwrap(),
             _ => log.raw(2, at, at, &noise(number, 20)).unwrap(),
@@ -82,7 +82,7 @@ fn chunks(records: &[Vec<u8>]) -> Vec<usize> {
     chunks
 }
 
-/// Returns the kinds and texts of the losses.
+/// Returns the kinds and texts of a log's losses.
 fn losses(bytes: &[u8]) -> (Vec<LossKind>, Vec<String>) {
     let (_, losses) = read(bytes);
     let texts = losses.iter().map(ToString::to_string).collect();
@@ -124,7 +124,7 @@ fn replaced_chunk_is_reported_as_missing_messages() {
 }
 
 #[test]
-fn removed_chunk_without_summary_is_reported_at_its_place() {
+fn chunk_removed_from_a_log_without_summary_is_reported_at_its_place() {
     each(|what, records| {
         let places = chunks(&records);
         for (number, chunk) in places.iter().enumerate() {
@@ -213,7 +213,7 @@ fn part_without_its_end_record_is_reported() {
     assert_eq!(kinds, [LossKind::Metadata("headrace.part.end".to_owned())], "{texts:?}");
 }
 
-/// One cause must give only one loss.
+/// One cause of damage must give only one loss.
 #[test]
 fn damaged_chunk_is_reported_as_one_loss() {
     each(|what, records| {
@@ -228,7 +228,7 @@ fn damaged_chunk_is_reported_as_one_loss() {
 }
 
 #[test]
-fn numbering_losses_after_going_back_equal_those_of_a_straight_read() {
+fn numbering_losses_after_resuming_at_an_earlier_position_are_unchanged() {
     each(|what, records| {
         let mut records = without_summary(records);
         let places = chunks(&records);
@@ -264,7 +264,7 @@ fn chunk_of(content: &[u8], times: [u64; 2]) -> Vec<u8> {
 }
 
 #[test]
-fn chunk_within_a_chunk_is_reported_and_stated_by_recovery() {
+fn chunk_within_a_chunk_is_reported_and_listed_by_recovery() {
     each(|what, records| {
         let mut records = records;
         let place = chunks(&records)[2];

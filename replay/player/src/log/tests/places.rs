@@ -56,7 +56,7 @@ fn damaged(mut bytes: Vec<u8>, changes: &[(bool, prop::sample::Index, u8)]) -> V
 
 type Reader = LogReader<Cursor<Vec<u8>>>;
 
-/// Reads `count` messages, or all that are left.
+/// Reads the next `count` messages, or all that are left.
 fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
     let mut seen = Vec::new();
     while seen.len() < count
@@ -88,7 +88,7 @@ fn check(bytes: &[u8], first: usize, further: usize) -> Result<(), TestCaseError
 
 proptest! {
     #[test]
-    fn going_back_in_a_damaged_log_gives_the_same_messages_and_losses(
+    fn resuming_earlier_in_a_damaged_log_gives_the_same_messages_and_losses(
         changes in proptest::collection::vec((any::<bool>(), any::<prop::sample::Index>(), any::<u8>()), 0..8),
         first in 0..200_usize,
         further in 0..200_usize,
@@ -105,12 +105,12 @@ proptest! {
 /// Two adjacent chunks fail their checksums, and the first one states a wrong time.
 /// The times of each loss depend on the other chunk.
 #[test]
-fn loss_times_of_damaged_chunks_are_unchanged_after_going_back() {
+fn loss_times_of_damaged_chunks_are_unchanged_after_resuming_earlier() {
     for (whole, changed) in [(by_ticks(), 2), (by_times(), 4)] {
         let chunks = places(&whole, op::CHUNK);
         let mut bytes = whole;
         for chunk in &chunks[changed..changed + 2] {
-            // Damages the checksum of the chunk.
+            // Damages the checksum in the chunk's header.
             bytes[chunk + 9 + 24] ^= 1;
         }
         bytes[chunks[changed] + 9] ^= 2;

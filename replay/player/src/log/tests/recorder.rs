@@ -28,7 +28,7 @@ impl Write for SlowMedium {
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        // The receiver may have been dropped.
+        // The test may have dropped the receiver already.
         self.done.try_send(self.bytes.clone()).ok();
         Ok(())
     }
@@ -171,7 +171,7 @@ fn dropped_recorder_handle_completes_the_file() {
     assert_eq!((seen.len(), losses), (1, vec![]));
 }
 
-/// A medium with limited space.
+/// A medium that accepts only a limited number of bytes.
 struct SmallMedium(Arc<AtomicUsize>);
 
 impl Write for SmallMedium {
@@ -280,7 +280,7 @@ fn within(
 }
 
 #[test]
-fn filling_disk_keeps_small_messages_and_states_omissions() {
+fn filling_disk_keeps_small_messages_and_records_omissions() {
     let (medium, flushed) = slow(0);
     let mut header = header(true);
     header.results.push(ResultChannel {
@@ -288,7 +288,7 @@ fn filling_disk_keeps_small_messages_and_states_omissions() {
         follows_echoes: true,
         ..ResultChannel::default()
     });
-    // Only source 0 is a sonar. The packets of source 2 are as long as echoes, as the lines of a velocity log are.
+    // Only source 0 is a sonar. The packets of source 2 are as long as echoes, like the lines of a velocity log.
     header.sonars = vec![0];
     let (mut port, handle) = within(Some(5_000_000), medium, &header, None);
     for tick in 1..=100_u64 {
@@ -339,7 +339,7 @@ fn messages_beyond_the_queue_capacity_are_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
-/// Runs the recorder at the given times, with packets dropped before each. Returns the statements in the log.
+/// Runs the recorder at the given times, with packets dropped before each. Returns the losses that the log states.
 fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
     let (medium, flushed) = slow(0);
     let storage = Box::new(Within(None, Some(medium)));
@@ -359,7 +359,7 @@ fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
 }
 
 #[test]
-fn packets_dropped_by_lines_are_stated_per_source_every_few_seconds() {
+fn packets_dropped_by_connections_are_recorded_per_source_every_few_seconds() {
     let s = Duration::from_secs;
     let words = |packets: u64, id: &str, from: u64, to: u64| {
         format!(
@@ -383,7 +383,7 @@ fn packets_dropped_by_lines_are_stated_per_source_every_few_seconds() {
 /// Every dropped packet is counted while the recorder is too slow, but the source of some dropped packets is then
 /// unknown.
 #[test]
-fn drops_beyond_the_queue_capacity_are_counted() {
+fn dropped_packets_beyond_the_queue_capacity_are_counted() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.tick(1, MonoNs(1), &[]).unwrap();
@@ -465,7 +465,7 @@ fn recorder_ends_despite_a_blocked_medium() {
 }
 
 #[test]
-fn skipped_ticks_are_stated_in_the_log() {
+fn skipped_ticks_are_recorded_in_the_log() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let second = |seconds: u64| MonoNs(seconds * 1_000_000_000);

@@ -52,7 +52,7 @@ fn intact_log_is_recovered_completely() {
 }
 
 #[test]
-fn recovered_log_states_the_losses_of_the_damaged_log() {
+fn recovered_log_lists_the_losses_of_the_damaged_log() {
     let mut bytes = log(true);
     let chunks = places(&bytes, op::CHUNK);
     bytes.truncate(bytes.len() * 9 / 10);

@@ -50,7 +50,7 @@ fn log_with_ticks_is_read_in_the_order_of_writing() {
 }
 
 #[test]
-fn written_header_is_read_back() {
+fn written_log_header_is_read_back() {
     let written = header(true);
     let (bytes, _) = LogWriter::new(Vec::new(), &written).unwrap().finish().unwrap();
     let reader = open(&bytes);
@@ -90,7 +90,7 @@ fn equal_messages_give_equal_log_bytes() {
 }
 
 #[test]
-fn chunks_are_closed_by_size() {
+fn chunk_is_closed_when_it_reaches_its_maximum_size() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for at in 0..40 {
         log.raw(0, MonoNs(at), MonoNs(at), &vec![7; 100_000]).unwrap();

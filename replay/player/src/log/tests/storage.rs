@@ -21,7 +21,7 @@ use super::super::{
 use super::parts::{Folder, all};
 use super::*;
 
-/// An operation on the storage.
+/// An operation on the storage, which the test may let fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Op {
     Create,
@@ -30,7 +30,7 @@ enum Op {
     Remove,
 }
 
-/// Decides by kind and number whether an operation fails.
+/// Decides whether an operation fails, by its kind and number.
 type Plan = Box<dyn FnMut(Op, u64) -> Option<io::Error> + Send>;
 
 /// Content of a file, and number of its bytes that survive a power cut.
@@ -193,7 +193,7 @@ fn header_ops() -> u64 {
 }
 
 #[test]
-fn storage_fault_that_occurs_once_loses_nothing_and_is_stated() {
+fn storage_fault_that_occurs_once_loses_nothing_and_is_recorded() {
     for (name, every) in [("once", None), ("once in parts", Some(Every::Span(DurNs::from_millis(2000))))] {
         let (expected, ops) = without_faults(name, every);
         for (at, forgets) in (header_ops()..ops).flat_map(|at| [(at, false), (at, true)]) {
@@ -221,7 +221,7 @@ fn storage_fault_that_occurs_once_loses_nothing_and_is_stated() {
             let told: Vec<String> = losses.iter().map(ToString::to_string).collect();
             let is_told = told.iter().any(|told| told.contains(&fault.words()));
             assert!(is_told || fault.continued.is_none(), "{which}: {told:?}");
-            // The failed part must have no end.
+            // The part in which the fault occurred must have no end record.
             let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
             let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
             // A part without synced content was removed, and created again under the same name.
@@ -316,7 +316,8 @@ fn synced_messages_survive_a_power_cut_after_an_error() {
         storage.store(true);
         let (seen, losses) = read_back(&folder);
         assert!(expected.starts_with(&seen), "operation {at}");
-        // The loss is at most the half second between two syncs, and the step of the retry.
+        // At most seven steps of a tenth of a second are lost: half a second between two syncs, and the steps around
+        // the retry.
         assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
         assert!(!losses.is_empty(), "operation {at}");
     }
@@ -372,7 +373,7 @@ fn killed_program_loses_at_most_a_second_and_a_sync() {
 }
 
 #[test]
-fn recording_with_a_fault_is_recovered_as_one_log_that_states_it() {
+fn recording_with_a_fault_is_recovered_as_one_log_that_lists_the_fault() {
     let folder = Folder::new("recovered");
     let mut syncs = 0;
     let storage = Faulty::new(move |op, _| {

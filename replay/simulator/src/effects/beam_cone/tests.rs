@@ -15,7 +15,7 @@ fn wide_tunnel() -> Environment {
 }
 
 #[test]
-fn beam_rays_span_the_footprint_of_fig_15() {
+fn beam_rays_span_the_footprint_on_the_floor() {
     let tunnel = wide_tunnel();
     for (angle_deg, width_deg) in [(0.0, 2.4), (30.0, 2.4), (60.0, 1.4), (60.0, 20.0)] {
         let (angle_rad, width_rad) = (f64::to_radians(angle_deg), f64::to_radians(width_deg));
@@ -41,7 +41,7 @@ fn first_return_of_oblique_beam_is_from_its_nearer_edge() {
             cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m).reduce(f64::min).unwrap();
         // Range of the nearest point of the floor within the cone.
         let nearest_m = 3.0 / math::cos((angle_rad - half_rad).max(0.0));
-        // If the perpendicular to the floor is within the cone, the nearest point of the floor lies between rays.
+        // If the perpendicular to the floor is within the cone, no ray hits the nearest point of the floor exactly.
         let allowed_m = if angle_rad < half_rad { 2e-5 } else { 1e-12 };
         assert!((first_m - nearest_m).abs() < allowed_m, "{angle_deg}: {first_m} {nearest_m}");
     }
@@ -65,7 +65,7 @@ fn mean_range_is_averaged_over_the_disc_of_the_cone() {
 }
 
 #[test]
-fn single_ray_equals_the_base_ray_bit_for_bit() {
+fn beam_cone_of_one_ray_equals_the_ideal_beam_bit_for_bit() {
     let dive = Dive::with_head();
     let base = dive.dive("");
     for effects in ["[effects.beam_cone]\nrays = 1", "[effects.beam_cone]\nrays = 1\nform = \"mean\""] {
@@ -74,7 +74,7 @@ fn single_ray_equals_the_base_ray_bit_for_bit() {
 }
 
 #[test]
-fn beam_cone_keeps_the_true_axis_point_and_perpendicular_ranges() {
+fn beam_cone_leaves_the_true_axis_point_and_perpendicular_ranges_unchanged() {
     let dive = Dive::with_head();
     let (base, first, bilinear) = (
         dive.dive(""),
@@ -96,7 +96,7 @@ fn beam_cone_keeps_the_true_axis_point_and_perpendicular_ranges() {
 }
 
 #[test]
-fn small_object_on_the_wall_is_first_but_not_strongest() {
+fn small_object_gives_the_first_echo_but_not_the_strongest() {
     let mut bins = Bins::new(0.02);
     let cone = Cone::new(f64::to_radians(1.4), 64);
     for (number, part) in cone.rays.iter().enumerate() {
@@ -106,14 +106,14 @@ fn small_object_on_the_wall_is_first_but_not_strongest() {
 }
 
 #[test]
-fn beam_width_follows_frequency() {
+fn beam_width_of_a_head_follows_its_frequency() {
     for (khz, deg) in [(600.0, 2.4), (800.0, 1.9), (1000.0, 1.4)] {
         assert!((width_at_deg(khz) - deg).abs() < 1e-12);
     }
 }
 
 #[test]
-fn slice_length_does_not_change_results() {
+fn time_slice_length_does_not_change_results() {
     Dive::with_head().assert_slices_dont_matter("[effects.beam_cone]\nform = \"bilinear\"\nrays = 8");
 }
 
@@ -129,7 +129,7 @@ fn impossible_beams_are_refused() {
 }
 
 #[test]
-fn single_echo_is_found_at_its_range_and_empties_the_bins() {
+fn single_echo_is_found_at_its_range_and_then_removed() {
     let mut bins = Bins::new(0.02);
     for range_m in [3.0, 3.001, 3.009, 3.010, 3.0199, 0.0, 12.5] {
         bins.add(range_m, 0.7);

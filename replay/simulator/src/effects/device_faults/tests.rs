@@ -47,7 +47,7 @@ fn stuck_device_repeats_its_last_value_until_repaired() {
 }
 
 #[test]
-fn jump_shifts_values_by_its_size() {
+fn jump_fault_shifts_values_by_its_size() {
     #[track_caller]
     fn off(at: MonoNs, [plain, broken]: [f64; 2], size: f64) {
         let wanted = if breaks(at) { size } else { 0.0 };
@@ -98,7 +98,7 @@ fn dead_device_sends_nothing_until_it_returns() {
 }
 
 #[test]
-fn babbling_device_sends_as_many_bytes_as_before() {
+fn babbling_device_sends_as_many_bytes_as_without_the_fault() {
     let [plain, broken] = lines("depth", "kind = \"babble\"");
     assert_eq!(plain.len(), broken.len());
     let mut garbled = Vec::new();
@@ -116,7 +116,7 @@ fn babbling_device_sends_as_many_bytes_as_before() {
 }
 
 #[test]
-fn slice_length_does_not_change_results() {
+fn time_slice_length_does_not_change_results() {
     for fault in ["kind = \"stick\"", "kind = \"jump\"\nsize = 1", "kind = \"die\"", "kind = \"babble\""] {
         for sensor in ["head_a", "ping", "depth", "imu", "tether"] {
             same_in_any_slices(&Bench::turning(&keys(sensor, fault)));
@@ -125,7 +125,7 @@ fn slice_length_does_not_change_results() {
 }
 
 #[test]
-fn invalid_faults_are_refused_with_their_key() {
+fn error_for_an_invalid_fault_names_the_key() {
     assert!(refusal("[effects.device_faults]\n").contains("kind"));
     assert!(refusal("[effects.device_faults]\nkind = \"jump\"\n").contains("size"));
     assert!(refusal("[effects.device_faults]\nkind = \"die\"\nsize = 1\n").contains("\"jump\" only"));

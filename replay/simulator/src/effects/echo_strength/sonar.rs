@@ -14,7 +14,7 @@ const HEARD_M: f64 = 100.0;
 const HEARD_AT_KHZ: f64 = 675.0;
 const HEARD_DBPM: f64 = 0.2;
 const HEARD_PULSE_S: f64 = 540e-6;
-/// Excess of the echo of rough rock at 1 m over the threshold, at a gain of 20 dB, dB.
+/// Level of the echo of rough rock at 1 m, in dB above the threshold, at a gain of 20 dB.
 ///
 /// This is an assumption, since the maker states no threshold. With the usual gains, a wall's echo is then above the
 /// threshold if the absorption setting matches the water's absorption.
@@ -24,19 +24,19 @@ const USUAL_GAIN_DB: f64 = 20.0;
 const GRAIN_DENSITY: f64 = 2.65;
 /// Kinematic viscosity of water at 10 degrees, m^2/s.
 const VISCOSITY_M2PS: f64 = 1.307e-6;
-/// Decibels per neper.
+/// Number of decibels per neper.
 const DB_PER_NEPER: f64 = 8.685_889_638_065_037;
 
-/// Sound of a head in this water.
+/// Acoustic properties of a head, its water and its wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sonar {
-    /// Full width of the beam, radians.
+    /// Full width of the head's beam, radians.
     pub(crate) beam_rad: f64,
-    /// Length of the pulse, s.
+    /// Length of the head's sound pulse, s.
     pub(crate) pulse_s: f64,
-    /// Speed of sound, m/s.
+    /// Speed of sound in the water, m/s.
     pub(crate) sound_mps: f64,
-    /// Absorption by water and silt, one way, dB/m.
+    /// Absorption of sound by water and silt, one way, dB/m.
     pub(crate) absorbed_dbpm: f64,
     /// Backscatter of the wall relative to rough rock, dB.
     pub(crate) wall_db: f64,
@@ -50,14 +50,14 @@ pub(crate) struct Sonar {
 /// Silt in the water.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Silt {
-    /// Mass of the grains, grams per litre.
+    /// Mass of silt grains in the water, grams per litre.
     pub(crate) gpl: f64,
-    /// Radius of the grains, m.
+    /// Radius of the silt grains, m.
     pub(crate) grain_m: f64,
 }
 
 impl Sonar {
-    /// Probability that the echo of a wall at `range_m` is detected. `square` is the cosine of incidence.
+    /// Probability that a head detects the echo of a wall at `range_m`. `square` is the cosine of incidence.
     pub(crate) fn detected(&self, range_m: f64, square: f64) -> f64 {
         let echo_db = self.echo_db(range_m.max(0.01), square);
         let noise_db = 10.0 * log10(HEARD_PULSE_S / self.pulse_s);

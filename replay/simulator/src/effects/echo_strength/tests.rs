@@ -28,7 +28,7 @@ fn water_absorption_matches_measurements() {
 /// The drag is that on an oscillating sphere (Landau and Lifshitz, "Fluid mechanics", §24, problem 5). The sound loses
 /// the work done by the drag.
 #[test]
-fn silt_absorption_matches_friction_at_its_grains() {
+fn silt_absorption_matches_the_drag_on_its_grains() {
     let (sound_mps, viscosity) = (1447.0, 1.307e-6);
     for (frequency_khz, grain_m) in [(675.0, 2e-6), (1000.0, 5e-6), (1000.0, 20e-6)] {
         let omega = math::TAU * frequency_khz * 1000.0;
@@ -56,7 +56,8 @@ fn silt_absorption_matches_friction_at_its_grains() {
             v = next;
         }
         let power = work / (5.0 * math::TAU / omega);
-        // For a sound velocity amplitude of 1, the power per area is c / 2, per unit of the water's density.
+        // If the water moves with velocity amplitude 1, the sound's power per area, divided by the water's density, is
+        // c / 2.
         let volume = 1.0 / 2650.0;
         let neper_pm = volume * power / (sound_mps / 2.0) / 2.0;
         let scattering_neper_pm =
@@ -112,7 +113,7 @@ fn detected_share_matches_the_sonar_equation() {
 
 /// The vehicle's own parts are detected even if no wall is detected.
 #[test]
-fn parts_of_the_vehicle_are_always_detected() {
+fn echoes_of_vehicle_parts_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";
     let dive = Dive { vehicle: hull, ..Dive::with_head() };
     let plain = dive.dive("[effects.occlusion]").ranges_m(0);
@@ -127,7 +128,7 @@ fn parts_of_the_vehicle_are_always_detected() {
 }
 
 #[test]
-fn absorption_follows_water_temperature() {
+fn sound_absorption_follows_water_temperature() {
     let head = Dive::with_head().scene("").unwrap().facts.sensors[0].head.unwrap();
     for temperature_degc in [4.0, 25.0] {
         let parameters = Parameters {
@@ -155,7 +156,7 @@ fn head_with_usual_settings_detects_surrounding_rock() {
 }
 
 #[test]
-fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
+fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
     Dive::with_head().assert_slices_dont_matter("[effects.echo_strength]\nwall_db = -20\ngain_db = 0");
     let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.echo_strength]\n{keys}"));
     assert!(refusal("frequency_khz = 100").contains("from 600 to 1000"));

@@ -10,7 +10,7 @@ use crate::sensing::Ray;
 
 /// Directions that differ by less than this count as equal, radians.
 const SAME_RAD: f64 = 1e-9;
-/// Maximum number of pings that are extrapolated.
+/// Maximum number of pings extrapolated at once.
 const MOST_FORESEEN: u32 = 16;
 
 /// A ping: time, origin, direction, and the point where it meets the wall.
@@ -24,7 +24,7 @@ pub(super) struct Ping {
     foreseen: bool,
 }
 
-/// Pings in order of time.
+/// A head's pings in order of time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pings(Vec<Ping>);
 
@@ -35,7 +35,7 @@ impl Ping {
         Self { at, origin: ray.origin, direction: ray.direction, wall, foreseen: false }
     }
 
-    /// Computes the wall point if the ping is extrapolated.
+    /// Computes the point on the wall if the ping is extrapolated.
     pub(super) fn seen(self, environment: &Environment, far_m: f64) -> Self {
         if !self.foreseen {
             return self;
@@ -63,14 +63,14 @@ impl Ping {
 }
 
 impl Pings {
-    /// Drops pings earlier than `rings_s` before `from`. The last two pings are kept for extrapolation.
+    /// Drops pings that are more than `rings_s` earlier than `from`. The last two pings are kept for extrapolation.
     pub(super) fn forget(&mut self, from: MonoNs, rings_s: f64) {
         let old = |ping: &Ping| from.since(ping.at).as_secs_f64() > rings_s;
         let gone = self.0.partition_point(old).min(self.0.len().saturating_sub(2));
         self.0.drain(..gone);
     }
 
-    /// Adds the next ping.
+    /// Adds the head's next ping.
     pub(super) fn add(&mut self, ping: Ping) {
         self.0.push(ping);
     }
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn future_pings_continue_the_last_two() {
+    fn future_pings_are_extrapolated_from_the_last_two() {
         let mut pings = Pings::default();
         for k in 0..100 {
             pings.add(ping(20 * k, f64::from(i32::try_from(k).unwrap()) * 0.02));
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn old_pings_are_dropped_except_two() {
+    fn old_pings_are_dropped_except_the_last_two() {
         let mut pings = Pings((0..10).map(|k| ping(20 * k, 0.0)).collect());
         let from = |ms| MonoNs(1_000_000_000) + DurNs::from_millis(ms);
         pings.forget(from(200), 0.05);

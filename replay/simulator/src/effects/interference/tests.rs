@@ -15,7 +15,7 @@ fn pair() -> Dive {
     dive
 }
 
-/// A pair whose heads ping out of step.
+/// A pair of heads that ping out of step.
 fn out_of_step() -> Dive {
     let mut dive = pair();
     dive.sensors[1].2 = dive.sensors[1].2.replace("medium", "fastest");
@@ -80,7 +80,7 @@ fn reflected_and_direct_paths_give_their_apparent_ranges() {
     }
     // An even earlier ping arrives before this head's own ping, or within the least range.
     assert_eq!(heard(-inwards, inwards, -3.4), None);
-    // Another point of the wall isn't within the beam.
+    // The other head now looks at a wall point that isn't within this head's beam.
     assert_eq!(heard(-inwards, inwards + 0.1, -1.0), None);
     // The heads face each other, 0.8 m apart. If both ping at once, each hears the other at an apparent range of 0.4 m.
     let (right, left) = (1.5 * math::PI, math::FRAC_PI_2);
@@ -90,7 +90,8 @@ fn reflected_and_direct_paths_give_their_apparent_ranges() {
     assert_eq!(heard(right - 0.3, left, 0.0), None);
 }
 
-/// Two heads half a turn apart face each other twice per turn. Each then hears the other at half their distance.
+/// Two heads half a turn apart face each other twice per turn. Each then hears the other at an apparent range of half
+/// their distance.
 #[test]
 fn synchronous_heads_hear_each_other_when_facing() {
     let dive = pair();
@@ -106,7 +107,7 @@ fn synchronous_heads_hear_each_other_when_facing() {
         let faces =
             off(angle_rad, 1.5 * math::PI) <= half_rad && off(others[number], math::FRAC_PI_2) <= half_rad;
         if faces {
-            // The heads' places may differ by the vehicle's motion between two pings.
+            // The apparent range is only approximate, because the vehicle moves between the pings of the two heads.
             assert!((range_m.unwrap() - 0.4).abs() < 1e-4, "{range_m:?}");
             heard += 1;
         } else {
@@ -133,7 +134,7 @@ fn unsynchronised_heads_hear_each_other_by_the_wall_and_through_side_lobes() {
 }
 
 #[test]
-fn slice_length_does_not_change_interference() {
+fn time_slice_length_does_not_change_interference() {
     let mut dive = out_of_step();
     dive.seconds = 12.0;
     dive.assert_slices_dont_matter("[effects.interference]\nshare = 0.5");
@@ -165,7 +166,7 @@ fn idealised_heads_in_one_place_do_not_hear_each_other() {
 }
 
 #[test]
-fn single_head_is_refused() {
+fn interference_of_a_single_head_is_refused() {
     assert!(
         Dive::with_head().refusal("[effects.interference]").contains("has one head; at least two are needed")
     );

@@ -51,10 +51,10 @@ fn row(at: u64, values: &[f64]) -> [f64; 9] {
     row
 }
 
-/// Effects on other sensors change neither the draws of an effect on one sensor, nor the measurements of sensors
-/// without effects.
+/// Effects on other sensors change neither the random numbers of an effect on one sensor, nor the measurements of
+/// sensors without effects.
 #[test]
-fn naming_an_effect_changes_nothing_for_other_sensors() {
+fn adding_an_effect_to_one_sensor_changes_nothing_for_others() {
     for (sensor, alone) in ALONE.iter().filter(|(sensor, _)| !sensor.is_empty()) {
         let touching = ALONE.iter().filter(|(touched, _)| !touched.is_empty() && touched != sensor);
         let others: Vec<String> =
@@ -67,13 +67,13 @@ fn naming_an_effect_changes_nothing_for_other_sensors() {
 }
 
 #[test]
-fn all_effects_together_are_independent_of_slice_length() {
+fn all_motion_effects_together_do_not_depend_on_time_slice_length() {
     let all: String = ALONE.iter().map(|(_, effect)| *effect).collect();
     same_in_any_slices(&Bench::sectors(&all));
 }
 
 #[test]
-fn effects_run_in_the_order_of_kinds_for_any_scene() {
+fn effects_run_in_a_fixed_order_whatever_their_order_in_the_scene() {
     let (ahead, back): (String, String) =
         (ALONE.iter().map(|(_, e)| *e).collect(), ALONE.iter().rev().map(|(_, e)| *e).collect());
     assert_eq!(Bench::sectors(&ahead).messages(), Bench::sectors(&back).messages());

@@ -1,9 +1,9 @@
-//! Combinations of effects on sonars.
+//! Tests of combinations of effects on sonars.
 
 use crate::testing::{Dive, Dived};
 use crate::truth::TruthRow;
 
-/// Each effect on sonars, with some keys.
+/// Each effect on sonars, as a table of a scene with some keys.
 const EFFECTS: [&str; 11] = [
     "[effects.beam_cone]\n",
     "[effects.occlusion]\n",
@@ -22,7 +22,8 @@ fn pair() -> Dive {
     Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]])
 }
 
-/// Changes of each measurement by an effect. `effect` is the effect's index in the scene.
+/// For each measurement of the dive, the values before and after its change by an effect; `None` if unchanged.
+/// `effect` is the effect's index in the scene.
 fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
     let of = |row: &TruthRow| {
         let cause = row.causes.iter().find(|cause| cause.effect == effect)?;
@@ -32,7 +33,7 @@ fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
 }
 
 #[test]
-fn naming_an_effect_does_not_change_draws_of_others() {
+fn adding_an_effect_keeps_the_random_numbers_of_other_effects() {
     let dive = pair();
     let outliers = |before: &str, place: u16| {
         let strays = changes(&dive.dive(&format!("{before}[effects.outliers]\nshare = 0.2")), place);
@@ -49,7 +50,7 @@ fn naming_an_effect_does_not_change_draws_of_others() {
 }
 
 #[test]
-fn adding_a_head_does_not_change_draws_of_the_first() {
+fn adding_a_head_keeps_the_random_numbers_of_the_first_head() {
     let effects = [EFFECTS[2], EFFECTS[3], EFFECTS[5], EFFECTS[6], EFFECTS[8]].concat();
     let bits = |dive: &Dive| {
         let ranges_m = dive.dive(&effects).ranges_m(0);
@@ -61,12 +62,12 @@ fn adding_a_head_does_not_change_draws_of_the_first() {
 }
 
 #[test]
-fn all_effects_together_do_not_depend_on_slice_length() {
+fn all_sonar_effects_together_do_not_depend_on_time_slice_length() {
     pair().assert_slices_dont_matter(&EFFECTS.concat());
 }
 
 #[test]
-fn two_tables_of_one_effect_apply_to_their_own_sensors() {
+fn each_table_of_an_effect_applies_only_to_its_own_sensors() {
     let effects = "[[effects.range_noise]]\nsensors = [\"sonar_0\"]\nsd_m = 0.01\n\
                    [[effects.range_noise]]\nsensors = [\"sonar_1\"]\nsd_share = 0.1\n";
     let dive = Dive { seconds: 60.0, ..pair() };

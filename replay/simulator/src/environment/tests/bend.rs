@@ -11,7 +11,7 @@ fn axis() -> Axis {
 }
 
 #[test]
-fn place_and_chart_conversions_are_inverse() {
+fn conversions_between_chainage_and_tunnel_frame_are_inverse() {
     let axis = axis();
     let mut lcg = Lcg(20);
     for _ in 0..20_000 {

@@ -68,7 +68,7 @@ fn side_tunnel_has_the_given_length() {
 }
 
 #[test]
-fn slanting_side_tunnel_leads_forwards() {
+fn positive_slant_turns_a_side_tunnel_forwards() {
     let keys = "chainage_m = 10\nside = \"right\"\nwidth_m = 3\nheight_m = 2\nlength_m = 10\nangle_deg = 30";
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     // The centre line of the side tunnel meets the wall at chainage 10.
@@ -86,7 +86,7 @@ fn slanting_side_tunnel_leads_forwards() {
 }
 
 #[test]
-fn gate_has_slots_and_a_bulkhead_if_closed() {
+fn gate_has_slots_and_a_closed_gate_has_a_bulkhead() {
     let keys = "chainage_m = 10\nslot_width_m = 0.8\nslot_depth_m = 0.4";
     let mut oracle = Oracle::new(Shape::Circle(3.0));
     oracle.hollows.push(Box::new(|p, _| {
@@ -108,7 +108,7 @@ fn gate_has_slots_and_a_bulkhead_if_closed() {
 }
 
 #[test]
-fn fall_leaves_a_cavity_and_a_heap() {
+fn rock_fall_leaves_a_cavity_and_a_heap() {
     let keys = "chainage_m = 20\nlength_m = 6\nwidth_m = 5\ndepth_m = 2\npieces = 40\nseed = 7";
     let text = feature("fall", keys)
         + &feature("debris", "chainage_m = 30\nlength_m = 4\nheight_m = 0.7\nname = \"spoil\"");

@@ -13,8 +13,8 @@ fn circle() -> Profile {
     shapes::circle(RADIUS_M).unwrap()
 }
 
-/// A prism about the axis of the circle as PLY, from x = 0 to `length_m` in `rings`, without the faces of the given
-/// numbers.
+/// A prism around the circle's axis, as PLY text. It extends from x = 0 to `length_m` in `rings`, and lacks the faces
+/// whose numbers are in `without`.
 fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     let (mut vertices, mut faces, mut count) = (String::new(), String::new(), 0);
     for ring in 0..=rings {
@@ -36,7 +36,7 @@ fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     )
 }
 
-/// A box from -`half` to `half` on each axis, as PLY.
+/// A box from -`half` to `half` on each axis, as PLY text.
 fn cuboid(half: V3) -> String {
     let mut text = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n\
@@ -78,7 +78,7 @@ fn to_circle(radius_m: f64, origin: V3, direction: V3) -> f64 {
     (-b + math::sqrt(b * b - a * c)) / a
 }
 
-/// Cosine of the incidence.
+/// Cosine of the ray's incidence on the surface it hits.
 fn facing(hit: &Hit, direction: V3) -> f64 {
     -vector::dot([hit.normal.x(), hit.normal.y(), hit.normal.z()], direction)
 }
@@ -98,7 +98,7 @@ fn mesh_of_the_profile_gives_equal_ranges() {
     for _ in 0..20_000 {
         let origin = place_in(&mut lcg, within_m, [35.0, 55.0]);
         let mut direction = lcg.direction();
-        // Every third ray is nearly along the tunnel.
+        // About every third ray is nearly along the tunnel.
         if lcg.between(0.0, 3.0) < 1.0 {
             let (y, z) = (lcg.between(-0.3, 0.3), lcg.between(-0.3, 0.3));
             direction = [math::sqrt(1.0 - y * y - z * z) * direction[0].signum(), y, z];
@@ -167,7 +167,7 @@ fn no_ray_escapes_between_mismatched_mesh_and_profile() {
 }
 
 #[test]
-fn ragged_end_is_cut_to_the_closed_part() {
+fn mesh_with_ragged_ends_is_a_wall_only_where_closed() {
     // Some faces of the first and the last ring are missing. The mesh is closed from x = 0.25 m to 9.75 m.
     let ragged = tube(4.0, 10.0, 40, &[0, 1, 2, 50, 51, 39 * SIDES + 7]);
     let environment = wall(&ragged.replace("\n0.0 ", "\n-0.0 "));
@@ -268,7 +268,7 @@ fn refused(text: &str, files: &[(&str, &str)], words: &[&str]) {
 }
 
 #[test]
-fn invalid_mesh_files_are_refused_with_their_location() {
+fn error_for_an_invalid_mesh_names_scene_line_and_place() {
     let good = cuboid([0.5; 3]);
     let keys = table("chainage_m = 20\nfile = \"box.ply\"");
     let place = "s.toml:4: tunnel.features[0].file = \"box.ply\": ";

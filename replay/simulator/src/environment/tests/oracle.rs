@@ -3,12 +3,12 @@
 
 use super::*;
 
-/// Length of a step along a ray, m.
+/// Length of the model's steps along a ray, m.
 const STEP_M: f64 = 2e-3;
-/// Length over which rays are followed, m.
+/// Length over which the model follows rays, m.
 pub(super) const FAR_M: f64 = 20.0;
 
-/// A profile with a closed form for its wall.
+/// A tunnel profile with a closed form for its wall.
 #[derive(Clone, Copy)]
 pub(super) enum Shape {
     Circle(f64),
@@ -16,7 +16,8 @@ pub(super) enum Shape {
     Trimmed(f64, f64),
 }
 
-/// A test of a point, given in the tunnel's frame and as chainage, y and z.
+/// A function that tests whether a point is in an object. The point is given in the tunnel's frame, and as chainage, y
+/// and z.
 pub(super) type Test = Box<dyn Fn(V3, V3) -> bool>;
 
 pub(super) struct Oracle {
@@ -50,7 +51,7 @@ impl Shape {
 
     /// Distance from the reference point to the wall in a direction, and the arc length of that wall point.
     fn wall(self, [dy, dz]: [f64; 2]) -> (f64, f64) {
-        // Angle from straight down, growing to the left.
+        // Angle of a direction from straight down, growing to the left.
         let angle = math::wrap(math::atan2(dy, -dz), math::TAU);
         match self {
             Self::Circle(radius) => (radius, radius * angle),
@@ -140,7 +141,7 @@ impl Oracle {
         [s, (p[1] - at[1]) * math::cos(heading) - (p[0] - at[0]) * math::sin(heading), p[2]]
     }
 
-    /// Chainage and y of a point, without an estimate.
+    /// Chainage and y of a point, searched without an estimate.
     pub(super) fn search(&self, p: V3) -> V3 {
         let distance = |s: &f64| {
             let (at, _) = self.station(*s);
@@ -183,7 +184,7 @@ impl Oracle {
             && !self.solids.iter().any(|test| test(p, chart))
     }
 
-    /// Range of the first point along the ray that is not in water, from `from` on in steps.
+    /// Range of the first point along the ray that is not in water, searched in steps from range `from`.
     pub(super) fn range(&self, ray: &Ray, from: f64, far: f64, step: f64) -> Option<f64> {
         let mut chart = self.search(ray.at(from));
         let mut t = from;
@@ -191,7 +192,8 @@ impl Oracle {
             let next = t + step;
             let p = ray.at(next);
             chart = self.chart(p, chart[0]);
-            // Far from the axis, the nearest point of the axis may jump.
+            // Far from the axis, the nearest point of the axis may jump between steps, so it is searched without an
+            // estimate.
             if chart[1].abs() > 8.0 && !self.axis.is_empty() {
                 chart = self.search(p);
             }
@@ -283,12 +285,12 @@ impl Oracle {
     }
 }
 
-/// A box with sides along the axes, about a point of a straight tunnel.
+/// Tests whether a point of a straight tunnel is in a box with sides along the axes.
 pub(super) fn upright(least: V3, most: V3) -> Test {
     Box::new(move |p, _| (0..3).all(|k| (least[k]..=most[k]).contains(&p[k])))
 }
 
-/// An ellipsoid with its axes along x, y and z.
+/// Tests whether a point is in an ellipsoid with its axes along x, y and z.
 pub(super) fn ellipsoid(centre: V3, half: V3) -> Test {
     Box::new(move |p, _| {
         (0..3).map(|k| (p[k] - centre[k]) * (p[k] - centre[k]) / half[k] / half[k]).sum::<f64>() < 1.0

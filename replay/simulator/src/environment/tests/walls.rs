@@ -6,7 +6,7 @@ use super::*;
 const CERAN: Shape = Shape::Trimmed(6.05, 10.4);
 
 #[test]
-fn plain_tunnel_equals_the_profile_bit_for_bit() {
+fn ranges_in_a_plain_tunnel_equal_those_of_its_profile_bit_for_bit() {
     let profile = shapes::ceran().unwrap();
     let far_feature = "[tunnel]\n[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = 90\nsize_m = 1";
     let bare = Environment::straight(profile.clone());
@@ -29,7 +29,7 @@ fn plain_tunnel_equals_the_profile_bit_for_bit() {
 }
 
 #[test]
-fn tunnel_as_built_may_have_another_profile_than_the_design() {
+fn as_built_profile_may_differ_from_the_design() {
     let text = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4";
     let environment = parse(text, &shapes::ceran().unwrap());
     Oracle::new(Shape::Circle(4.0)).compare(&environment, 2, 1_000, [0.0, 50.0]);
@@ -80,7 +80,7 @@ fn bulges_displace_the_wall() {
 }
 
 #[test]
-fn thin_bulge_is_not_skipped() {
+fn rays_do_not_skip_a_thin_bulge() {
     let environment = parse(&bulge(&[10.0, 0.02, 0.0, 0.02, 0.02]), &shapes::ceran().unwrap());
     let centre = environment.design.reference();
     let hit = cast(&environment, [10.0, centre[0], centre[1]], [0.0, 0.0, -1.0]).unwrap();
@@ -130,7 +130,7 @@ fn combined_bends_stations_and_bulges_match_the_model() {
 }
 
 #[test]
-fn arc_length_is_on_the_design_profile_in_the_axis_chart() {
+fn arc_length_is_measured_on_the_design_profile_in_bends_too() {
     let design = shapes::ceran().unwrap();
     let environment =
         parse(&format!("{}[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4", bends()), &design);

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A star-shaped polygon with these radii.
+/// A star-shaped polygon whose vertices have these distances from the centre.
 fn polygon(radii: &[f64]) -> Profile {
     let count = radii.len() as f64;
     let points = radii.iter().enumerate().map(|(k, radius_m)| {
@@ -12,13 +12,13 @@ fn polygon(radii: &[f64]) -> Profile {
     Profile::polygon(&points.collect::<Vec<_>>(), Some([0.0, 3.0])).unwrap()
 }
 
-/// Returns the same curve without a tree.
+/// Returns the same profile without its search tree.
 fn plain(profile: &Profile) -> Profile {
     Profile { tree: Tree::default(), support: None, ..profile.clone() }
 }
 
 proptest! {
-    /// The answers with a tree are bit-identical to those without, even for rays through vertices.
+    /// Results with a search tree are bit-identical to those without, even for rays through vertices.
     #[test]
     fn profile_queries_with_a_search_tree_equal_queries_without(
         radii in prop::collection::vec(1.8..2.2_f64, 25..400),
@@ -45,12 +45,12 @@ proptest! {
 }
 
 proptest! {
-    /// The bounds of the table hold, and their excess follows from geometry.
+    /// Distances never exceed the bounds from the table of extents, and the bounds' excess is limited by geometry.
     ///
-    /// The farthest point is at most half a step away from a direction of the table. The tangents in two neighbouring
-    /// directions meet beyond the edge between their points. They meet at most half the edge's length times the
-    /// tangent of half a step away from it. The longest edge of the hull in this test is a chord that passes 1.8 m
-    /// from the centre, with its ends at 2.2 m.
+    /// The direction of the farthest point is at most half an angular step away from a direction of the table. The
+    /// tangents in two neighbouring directions meet beyond the edge between their points. The tangents meet at a
+    /// distance from the edge of at most half its length times the tangent of half a step. The longest edge of the
+    /// hull in this test is a chord that passes 1.8 m from the centre, with its ends at 2.2 m.
     #[test]
     fn precomputed_distance_bounds_exceed_the_exact_values_by_a_limited_amount(
         radii in prop::collection::vec(prop_oneof![9 => 1.8..2.2_f64, 1 => Just(1.8)], 257..600),
@@ -58,7 +58,8 @@ proptest! {
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
     ) {
-        // A few of many points are much farther out than the rest, so the edges of the convex hull are long.
+        // A few of many points are much farther from the centre than the rest, so the edges of the convex hull are
+        // long.
         let radii: Vec<f64> = match level {
             Some(of_32) => radii.iter().enumerate().map(|(k, r)| if k % 32 == of_32 { *r } else { 1.8 }).collect(),
             None => radii,
@@ -88,9 +89,9 @@ fn first_of_equally_near_elements_is_the_result() {
     assert_eq!(tree.nearest([0.0, 3.0]), plain(&tree).nearest([0.0, 3.0]));
 }
 
-/// Few of the 100,000 elements are visited per query. The test counts the visits and measures no time.
+/// A query visits few of the profile's 100,000 elements. The test counts the visits and measures no time.
 #[test]
-fn query_visits_few_of_many_elements() {
+fn profile_query_visits_few_of_many_elements() {
     let radii: Vec<f64> = (0..100_000).map(|k| 2.0 + 0.01 * math::sin(f64::from(k) * 0.37)).collect();
     let profile = polygon(&radii);
     let mut looked = 0;
@@ -131,7 +132,7 @@ fn error_of_a_rejected_polygon_names_the_input_point() {
         // With repeated points, the error still refers to the numbering of the input.
         let repeated: Vec<Yz> = turned.iter().flat_map(|point| [*point, *point]).collect();
         assert_eq!(refused(&repeated), 2, "from {first}");
-        // In the opposite sense of rotation, the edge begins at its other end.
+        // If the points run in the opposite sense, the offending edge begins at its other end.
         turned.reverse();
         assert!([2, 3].contains(&refused(&turned)), "from {first}");
     }

@@ -1,0 +1,156 @@
+//! One section as read by outsiders. The report, the page and the tables are encodings of this row.
+
+use serde::{Serialize, Serializer};
+
+use crate::report::spread::SpreadReport;
+use headrace_coverage::{Evidence, Section, Sections, Unsure, Verdict};
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
+
+/// One section with its verdict and figures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SectionRow {
+    /// Chainage of the section's start, as a multiple of the section length.
+    #[serde(skip)]
+    pub index: i64,
+    /// Beginning of the section, m.
+    pub start_m: f64,
+    /// End of the section, m.
+    pub end_m: f64,
+    /// Diameter of the section's largest hole, m; `None` if the hole wasn't measured.
+    pub hole_m: Option<f64>,
+    /// Lower bound of the hole's diameter, m. Samples that were dropped may have divided the hole.
+    pub hole_least_m: Option<f64>,
+    /// Upper bound of the hole's diameter, m; `None` if unbounded.
+    pub hole_most_m: Option<f64>,
+    /// Whether there are samples around the hole. If not, the diameter is at least `hole_m`.
+    pub hole_bounded: bool,
+    /// Standard deviation of the hole's diameter, m.
+    pub hole_sd_m: f64,
+    /// Chainage of the hole's centre, m.
+    pub hole_x_m: Option<f64>,
+    /// Arc length of the hole's centre, m from the floor's centre via the left wall.
+    pub hole_arc_m: Option<f64>,
+    /// Clock position of the hole's centre, looking along the tunnel: 6 is the floor's centre, 9 the left
+    /// wall.
+    pub hole_clock: Option<String>,
+    /// Distance along the tunnel between passes of heads over the same arc length.
+    pub t_x: SpreadReport,
+    /// Distance between neighbouring samples of one sweep.
+    pub t_y: SpreadReport,
+    /// Diagonal of the lattice formed by neighbouring samples of neighbouring passes.
+    pub t: SpreadReport,
+    /// Number of samples on the section's wall.
+    pub samples: u32,
+    /// Number of samples per square metre of the section's wall.
+    pub density_perm2: f64,
+    /// Deviation of the section's wall from the design profile; `None` without samples.
+    pub deviation: Option<DeviationReport>,
+    /// Share of the section's wall that is a declared opening.
+    pub masked_share: f64,
+    /// Verdict: `pass`, `fail`, `cannot_say` or `open`.
+    #[serde(serialize_with = "verdict_word")]
+    pub verdict: Verdict,
+    /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
+    #[serde(skip)]
+    pub settled: bool,
+    /// Whether the section is open although further driving won't change it.
+    ///
+    /// The vehicle began or turned back there, so some heads have not been in the section.
+    pub not_inspected: bool,
+    /// Reason for `cannot_say`. For a section with `not_inspected`, the reason is `NotInspected`, which the
+    /// report omits.
+    #[serde(serialize_with = "reason_word")]
+    pub cannot_say: Option<Unsure>,
+    /// Evidence for the cause of a fail; `None` unless the verdict is `fail`.
+    pub cause: Option<Evidence>,
+    /// Time at which the section was flagged, seconds on the log's clock.
+    pub flagged_s: Option<f64>,
+    /// Time at which a later pass cleared the flag.
+    pub cleared_s: Option<f64>,
+    /// Number of returns on the section's wall that were not accepted as wall.
+    pub doubtful_returns: u32,
+    /// Whether the section has samples of a head that became distrusted soon afterwards. Such a section can't
+    /// pass.
+    pub suspect: bool,
+}
+
+/// Deviation of a section's wall from the design, along the rays from the reference point. Outward is
+/// positive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DeviationReport {
+    /// Mean deviation, m.
+    pub mean_m: f64,
+    /// Largest inward deviation, m; never above zero.
+    pub inmost_m: f64,
+    /// Largest outward deviation, m; never below zero.
+    pub outmost_m: f64,
+    /// Ratio of the cross-section area to the design's; `None` without sweeps.
+    pub area_ratio: Option<f64>,
+    /// Whether most samples deviate by more than the contradiction limit.
+    pub contradicts: bool,
+}
+
+impl SectionRow {
+    /// Row of the section with this index, or `None` if there is no such section. `profile` is the tunnel's design.
+    pub(super) fn of(sections: &Sections, index: i64, profile: &Profile) -> Option<Self> {
+        let section = sections.get(index)?;
+        let (start_m, end_m) = sections.bounds_m(index);
+        let area_m2 = profile.perimeter_m() * sections.section_m();
+        Some(Self {
+            index,
+            start_m,
+            end_m,
+            hole_m: section.hole.map(|hole| hole.diameter_m),
+            hole_least_m: section.hole.map(|hole| hole.least_m),
+            hole_most_m: section.hole.map(|hole| hole.most_m).filter(|most_m| most_m.is_finite()),
+            hole_bounded: section.hole.is_some_and(|hole| hole.bounded),
+            hole_sd_m: section.hole_sd_m,
+            hole_x_m: section.hole.map(|hole| hole.x_m),
+            hole_arc_m: section.hole.map(|hole| hole.arc_m),
+            hole_clock: section.hole.map(|hole| profile.clock(hole.arc_m)),
+            t_x: SpreadReport::from(&section.t_x_m),
+            t_y: SpreadReport::from(&section.t_y_m),
+            t: SpreadReport::from(&section.t_m),
+            samples: section.samples,
+            density_perm2: f64::from(section.samples) / area_m2,
+            deviation: deviation_report(section),
+            masked_share: section.masked_share,
+            verdict: section.verdict,
+            settled: section.settled,
+            not_inspected: section.not_inspected,
+            cannot_say: section.unsure(),
+            cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
+            flagged_s: section.flagged.map(MonoNs::as_secs_f64),
+            cleared_s: section.cleared.map(MonoNs::as_secs_f64),
+            doubtful_returns: section.doubtful,
+            suspect: section.suspect,
+        })
+    }
+
+    /// Whether the section is flagged at present.
+    pub fn is_flagged(&self) -> bool {
+        self.flagged_s.is_some() && self.cleared_s.is_none()
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn verdict_word<S: Serializer>(verdict: &Verdict, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(verdict.as_str())
+}
+
+#[expect(clippy::ref_option, reason = "serde's signature")]
+fn reason_word<S: Serializer>(reason: &Option<Unsure>, to: S) -> Result<S::Ok, S::Error> {
+    reason.filter(|reason| *reason != Unsure::NotInspected).map(Unsure::as_str).serialize(to)
+}
+
+fn deviation_report(section: &Section) -> Option<DeviationReport> {
+    let [inmost_m, outmost_m] = section.deviation.extremes_m()?;
+    Some(DeviationReport {
+        mean_m: section.deviation.mean_m()?,
+        inmost_m,
+        outmost_m,
+        area_ratio: section.deviation.area_ratio(),
+        contradicts: section.contradicts(),
+    })
+}
