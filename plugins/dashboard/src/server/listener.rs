@@ -19,7 +19,7 @@ use super::client::Client;
 use super::shared::Shared;
 use super::stall::Stream;
 
-/// Pause after a failure to accept a connection.
+/// Pause after accepting a connection has failed.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Timeout for the head of a request. Silent and idle connections are closed, and so are unfinished requests.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
@@ -99,10 +99,11 @@ impl Tls {
 /// Errors: those of the system.
 pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
-    // Set on Unix only, as in the standard library. On other systems the option would let two programs share a port.
+    // The option SO_REUSEADDR is set on Unix only, as in the standard library. On other systems the option
+    // would let two programs share a port.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
-    // Accepted connections inherit this size.
+    // Accepted connections inherit this buffer size.
     socket.set_send_buffer_size(SEND_BUFFER)?;
     socket.bind(address)?;
     socket.listen(BACKLOG)
@@ -115,7 +116,7 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
     loop {
         match listener.accept().await {
             Ok((tcp, from)) => {
-                // Without this option TCP would delay small messages.
+                // Without TCP_NODELAY, TCP would delay small messages.
                 if let Err(error) = tcp.set_nodelay(true) {
                     tracing::debug!(%error, "a connection of the page delays small messages");
                 }
@@ -128,14 +129,14 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Let each new connection run before enough others arrive to take its place.
+        // Let each new connection run before so many others arrive that it is closed for them.
         tokio::task::yield_now().await;
     }
 }
 
 type App = TowerToHyperService<axum::Router>;
 
-/// Serves a connection until it ends or its place is taken away.
+/// Serves a connection until it ends or has to make room for another one.
 async fn serve(tcp: TcpStream, caller: Caller, app: App, tls: Option<Arc<Tls>>, shared: Arc<Shared>) {
     let place = Arc::clone(&caller.place);
     let stream = Stream::new(tcp, Arc::clone(&place), shared);
