@@ -8,10 +8,11 @@ use headrace_sensor::measurement::Sounding;
 use headrace_geometry::frames::{Body, Mount, Point3, Rot, Tunnel, head_direction};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
+use headrace_oracle::timed;
 use headrace_simulator::{START, Scene, Simulation};
 use headrace_tests::scenes;
 
-use crate::{SPEED_MPS, best, text, timed};
+use crate::workload::{SPEED_MPS, best, text};
 
 /// Number of timed rounds. It is large, because the result is a small difference of two times.
 const ROUNDS: usize = 40;

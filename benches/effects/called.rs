@@ -5,7 +5,7 @@
 use headrace_simulator::{Scene, Simulation};
 use headrace_tests::scenes;
 
-use crate::{EFFECTS, best, simulate};
+use crate::workload::{EFFECTS, best, simulate};
 
 /// Shipped scenes on which the bench runs; each dive lasts some minutes.
 const SCENES: [&str; 6] = ["rehearsal", "steel", "collapse", "drop-outs", "leak-current", "small-pipe"];

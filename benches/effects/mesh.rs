@@ -1,10 +1,11 @@
 //! Simulation speed with a wall of a million triangles, compared with the profile that the mesh follows.
 
 use headrace_geometry::tunnel::Profile;
+use headrace_oracle::timed;
 use headrace_simulator::Simulation;
 use headrace_tests::scenes;
 
-use crate::{ROUNDS, best, timed};
+use crate::workload::{ROUNDS, best};
 
 const EFFECTS: [(&str, &str); 2] = [
     ("rays", "motion_within_turn = {}\n"),

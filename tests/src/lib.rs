@@ -28,6 +28,7 @@ pub mod planned;
 pub mod pty;
 pub mod random;
 pub mod random_dives;
+mod repository;
 #[cfg(unix)]
 pub mod rig;
 pub mod scenes;
@@ -40,16 +41,9 @@ pub mod truth;
 #[cfg(unix)]
 pub mod world;
 
-use std::path::Path;
-
-pub use headrace_support::recordings;
-pub use headrace_support::skipped;
+pub use headrace_support::{recordings, skipped};
 
 pub use folder::{Answer, Folder, program};
 pub use log_files::{raw_messages, write_log};
+pub use repository::root;
 pub use short_dive::{SCENE, VEHICLE, other_vehicle};
-
-/// The repository's root.
-pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
-}

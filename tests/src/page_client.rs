@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::{Message, WebSocket};
 
-use crate::{Folder, program};
+use crate::folder::{Folder, program};
 
 /// Longest wait for an expected message.
 const WITHIN: Duration = Duration::from_mins(2);

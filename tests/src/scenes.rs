@@ -7,9 +7,11 @@ use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
 use headrace_simulator::{FileLoader, Scene, Simulation};
 
+use crate::repository::root;
+
 /// Content of a vehicle file in `deploy/vehicles`.
 pub fn vehicle_file(name: &str) -> Result<Vec<u8>, String> {
-    let folder = crate::root().join("deploy/vehicles");
+    let folder = root().join("deploy/vehicles");
     std::fs::read(folder.join(name)).map_err(|error| error.to_string())
 }
 

@@ -15,7 +15,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcsetwinsize};
 
-use crate::{Folder, program};
+use crate::folder::{Folder, program};
 
 /// Longest wait for expected output, as a number of steps.
 const STEPS: u32 = 1200;

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::skipped;
+use crate::skip_notice::skipped;
 
 /// Path of a trimmed recording.
 pub fn trimmed(name: &str) -> PathBuf {

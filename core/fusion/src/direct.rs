@@ -6,7 +6,8 @@
 
 use super::relative::Relative;
 use super::section::{Echo, settle};
-use super::{Fix, Navigation, NoFix, Times};
+use crate::fix::{Fix, NoFix, Times};
+use crate::navigation::Navigation;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel};
 use headrace_geometry::math;
 use headrace_geometry::site::Site;
@@ -14,8 +15,7 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
-use headrace_sensor::reading::MAX_SOURCES;
-use headrace_sensor::reading::{EchoRange, Level, Reading, TetherLength};
+use headrace_sensor::reading::{EchoRange, Level, MAX_SOURCES, Reading, TetherLength};
 
 /// Maximum age of an echosounder range that is used for the position in the cross-section.
 const ECHO_AGE: DurNs = DurNs(500_000_000);

@@ -28,8 +28,6 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-pub use crate::stateful;
-
 /// State that can be saved and restored to continue a run.
 pub trait Stateful {
     /// Appends the state to a snapshot.
@@ -288,6 +286,8 @@ macro_rules! stateful {
         }
     };
 }
+
+pub use stateful;
 
 #[cfg(test)]
 mod tests {

@@ -3,7 +3,8 @@
 
 use super::adviser::Advised;
 use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};
-use super::console::{Command, ReceivedCommand};
+use super::console::command::Command;
+use super::console::packets::ReceivedCommand;
 use super::live_state::{LiveMetres, LiveState, PositionDoubt, PositionState, source_bits};
 use super::merge::MAX_TICK_PACKETS;
 use super::messages::{Event, Notice, PlacedItem, Placement, Standing, Update};

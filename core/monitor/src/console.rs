@@ -14,13 +14,13 @@ use super::ring::Port;
 use super::run::Loop;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-mod command;
-mod packets;
+pub(crate) mod command;
+pub(crate) mod packets;
 mod text;
 
 pub use command::{Command, CommandError, MAX_COMMAND_BYTES, MAX_NOTE_BYTES, NoteText, Who};
+pub(super) use packets::Console;
 pub use packets::ConsoleCounts;
-pub(super) use packets::{Commands, Console, ReceivedCommand};
 pub use text::ShortText;
 
 pub use headrace_vehicle::CONSOLE_ID;

@@ -6,9 +6,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::advice_log::AdviceEntry;
-use super::alert_list::{AlertChange, ListedAlert};
-use super::live_state::{ActiveObservations, LiveMetres};
 use super::notes::Note;
+use crate::alert_list::alert::{AlertChange, ListedAlert};
+use crate::live_state::state::{ActiveObservations, LiveMetres};
 use headrace_coverage::{Judgement, Loss, Reach, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;

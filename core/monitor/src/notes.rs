@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
-use super::console::{NoteText, Who};
+use super::console::command::{NoteText, Who};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 

@@ -5,9 +5,10 @@
 
 use super::advice_log::AdviceEntry;
 use super::head_descriptions::HeadDescriptions;
-use super::live_state::{Condition, LEAST_MPS};
 use super::observations::{ObservedKind, Occurrence};
 use super::words::{condition_words, limit_words};
+use crate::live_state::condition::Condition;
+use crate::live_state::state::LEAST_MPS;
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::{Action, Again, Cause, Causes, Evidence, Run, Sections};

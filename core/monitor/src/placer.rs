@@ -14,7 +14,6 @@ use std::sync::Arc;
 use bevy_ecs::component::Component;
 use bevy_ecs::prelude::Resource;
 
-use super::console::{Commands, Console, ConsoleCounts};
 use super::entities::{
     LossCount, MeasuredMotion, Navigator, SensorDecoder, SensorHealth, VehicleEntities, VehicleState,
 };
@@ -25,6 +24,7 @@ use super::part::Part;
 use super::result_stream::ResultStream;
 use super::ring::PortReader;
 use super::stage::{PlaceStage, Stage as _};
+use crate::console::packets::{Commands, Console, ConsoleCounts};
 use decode::Events;
 use georeference::PlacedList;
 use headrace_fusion::Navigation;

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use crate::report::SpreadReport;
+use crate::report::spread::SpreadReport;
 use headrace_coverage::{Evidence, Section, Sections, Unsure, Verdict};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;

@@ -4,7 +4,7 @@
 use super::adviser::Advised;
 use super::alert_list::{AlertList, TextContext};
 use super::alerter::Alerter;
-use super::console::ConsoleCounts;
+use super::console::packets::ConsoleCounts;
 use super::digest::Digest;
 use super::entities::{SensorHealth, VehicleState};
 use super::head_descriptions::HeadDescriptions;

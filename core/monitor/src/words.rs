@@ -1,12 +1,11 @@
 //! The table of words for codes: conditions, positions, reasons, verdicts, sensors and priorities.
 //!
-//! The lines, the terminal and the page use these words. [`typescript`] makes the page's copy. Texts with
-//! figures are in [`pilot_text`](super::pilot_text).
+//! The lines, the terminal and the page use these words. [`page_words`](super::page_words) makes the page's
+//! copy. Texts with figures are in [`pilot_text`](super::pilot_text).
 
-pub mod typescript;
-
-use super::alert_list::Priority;
-use super::live_state::{Condition, PositionDoubt, SensorState};
+use crate::alert_list::kind::Priority;
+use crate::live_state::condition::Condition;
+use crate::live_state::state::{PositionDoubt, SensorState};
 use headrace_coverage::Verdict;
 use headrace_fusion::NoFix;
 use headrace_sampling::advice::Reason;

@@ -24,13 +24,10 @@ use headrace_geometry::tunnel::Profile;
 use intervals::Driving;
 use ring_cache::AdvisedHead;
 
-pub use answer::{Advice, Alternative, Anew, Left, ModeName, Reason, Remedy};
+pub use answer::{Advice, Alternative, Anew, Left, MAX_MODES, ModeName, Reason, Remedy};
 pub use hysteresis::Hysteresis;
 pub use ring_cache::Looks;
 pub use search::SPEED_MARGIN;
-
-/// Maximum number of modes per head for which alternatives are computed.
-pub const MAX_MODES: usize = 8;
 
 /// The alternatives are recomputed once per this number of advice updates.
 const ALTERNATIVES_EVERY: u32 = 25;

@@ -12,10 +12,6 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::array;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-mod sample_times;
-
-pub use sample_times::SampleTimes;
-
 /// Maximum number of stretches of time for which a stamp is kept.
 const PLACES: usize = 128;
 

@@ -39,6 +39,7 @@ pub mod device_clock;
 pub mod driver;
 pub mod measurement;
 pub mod reading;
+pub mod sample_times;
 
 pub use device::SensorConfig;
 pub use headrace_config as config;

@@ -14,7 +14,7 @@ use headrace_sampling::occlusion::{self, AngleRange};
 use headrace_sampling::ring::Standing;
 use headrace_sensor::connect::Connect;
 
-use crate::VehicleConfig;
+use crate::vehicle::VehicleConfig;
 
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,11 +2,11 @@
 
 use core::cell::RefCell;
 
-use crate::Mission;
-use crate::NavigationConfig;
 use crate::advice::parse_looks;
 use crate::alerts::{AlertTiming, LimitsConfig};
 use crate::coverage::CoverageConfig;
+use crate::mission::Mission;
+use crate::navigation::NavigationConfig;
 use crate::sensors::{self, DEGREES, SENSOR_DISTANCE_M, Sensors};
 use crate::tunnel::TunnelConfig;
 use headrace_config::{ConfigError, ConfigErrors, Document, Loader, Section};

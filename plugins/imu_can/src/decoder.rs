@@ -2,10 +2,11 @@
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_sensor::device::Decoder;
-use headrace_sensor::device_clock::{ClockReport, SampleTimes};
+use headrace_sensor::device_clock::ClockReport;
 use headrace_sensor::geometry::frames::{Rot, Sensor, Vec3};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
+use headrace_sensor::sample_times::SampleTimes;
 use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 

@@ -10,12 +10,12 @@ use headrace_sensor::reading::{Decoded, EchoRange, Packet, Reading, WaterPressur
 use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
-use crate::dialect::ATTITUDE_DATA;
 use crate::frame::{Frame, Frames, MavlinkCodec, is_autopilots_heartbeat, system_of};
 use crate::message::{
     Distance, HECTOPASCAL, Imu, ImuMessage, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, PressureMessage,
     to_ours,
 };
+use mavlink::dialects::ardupilotmega::ATTITUDE_DATA;
 
 /// Longest usual gap between the bytes of a frame. The longest frame takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);

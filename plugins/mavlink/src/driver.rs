@@ -10,8 +10,10 @@ use headrace_sensor::reading::Packet;
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 
 use crate::decoder::{DecoderSettings, MavlinkDecoder};
-use crate::dialect::{HEARTBEAT_DATA, MavAutopilot, MavComponent, MavModeFlag, MavState, MavType};
 use crate::frame::{Frames, MAX_FRAME_BYTES, encode, is_autopilots_heartbeat, system_of};
+use mavlink::dialects::ardupilotmega::{
+    HEARTBEAT_DATA, MavAutopilot, MavComponent, MavModeFlag, MavState, MavType,
+};
 
 /// Carriers over which an autopilot can be connected.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];

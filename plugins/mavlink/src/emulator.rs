@@ -8,9 +8,11 @@ use headrace_sensor::measurement::{Inertia, Measurement, Pressure as InertialSam
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 
 use crate::decoder::{DecoderSettings, DistancePart, Part};
-use crate::dialect::{ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType};
 use crate::frame::encode;
 use crate::message::{Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, to_ours};
+use mavlink::dialects::ardupilotmega::{
+    ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
+};
 
 /// Limits of an emulated distance sensor, cm. They are about those of a Ping1D.
 const LEAST_CM: u16 = 30;

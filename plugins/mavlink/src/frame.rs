@@ -17,7 +17,7 @@ use mavlink::{
     calculate_crc,
 };
 
-use crate::dialect::{self, MavMessage};
+use mavlink::dialects::ardupilotmega::{self as dialect, MavMessage};
 
 /// Maximum frame length: header, payload, checksum, signature.
 pub const MAX_FRAME_BYTES: usize = V2_HEADER_BYTES + MAX_PAYLOAD_LEN + CHECKSUM_SIZE + v2::SIGNATURE_SIZE;

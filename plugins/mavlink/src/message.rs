@@ -7,11 +7,11 @@
 use mavlink::error::ParserError;
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, MessageData};
 
-use crate::dialect::{
+use crate::frame::{Frame, encode};
+use mavlink::dialects::ardupilotmega::{
     ATTITUDE_DATA, DISTANCE_SENSOR_DATA, MavDistanceSensor, MavMessage, RAW_IMU_DATA, SCALED_IMU_DATA,
     SCALED_IMU2_DATA, SCALED_IMU3_DATA, SCALED_PRESSURE_DATA, SCALED_PRESSURE2_DATA, SCALED_PRESSURE3_DATA,
 };
-use crate::frame::{Frame, encode};
 
 /// Acceleration of one count: a thousandth of standard gravity, m/s^2.
 pub const MILLI_G_MPS2: f64 = 9.806_65e-3;

@@ -7,11 +7,11 @@
 use mavlink::MavHeader;
 use mavlink::types::CharArray;
 
-use crate::dialect::{
+use crate::frame::encode;
+use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavSeverity, MavState, MavType, NAMED_VALUE_FLOAT_DATA,
     STATUSTEXT_DATA,
 };
-use crate::frame::encode;
 
 /// Component id of an onboard computer. Source: MAVLink, MAV_COMP_ID_ONBOARD_COMPUTER.
 pub const COMPONENT_ID: u8 = 191;

@@ -2,7 +2,8 @@
 //!
 //! Source: can-utils, whose `lib.h` describes the format.
 
-use crate::{Clock, Entry, Format, Step};
+use crate::entry::{Clock, Entry, Step};
+use crate::format::Format;
 
 /// Length of a SocketCAN `can_frame`, bytes.
 const FRAME_BYTES: usize = 16;

@@ -11,7 +11,8 @@ use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
 
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
-use crate::{Clock, Entry, Format, Step};
+use crate::entry::{Clock, Entry, Step};
+use crate::format::Format;
 
 /// Maximum number of values that a sensor's reading has.
 const SLOTS: usize = 9;

@@ -1,6 +1,7 @@
 //! Files written by Imagenex's own software.
 
-use crate::{Clock, Entry, Format, Step};
+use crate::entry::{Clock, Entry, Step};
+use crate::format::Format;
 use headrace_geometry::time::DurNs;
 use headrace_imagenex881::logfile::{LogFile, LogFileError};
 

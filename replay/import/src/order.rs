@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::Entry;
+use crate::entry::Entry;
 
 /// Entries within this time of the latest timestamp are held back, because older entries may still follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;

@@ -3,7 +3,8 @@
 //! Source: Ping Viewer, docs, "Binary log file structure". Numbers are big-endian. A text is stored as its length in
 //! bytes, a u32, followed by UTF-16.
 
-use crate::{Clock, Entry, Format, Step};
+use crate::entry::{Clock, Entry, Step};
+use crate::format::Format;
 
 /// The Ping Viewer format. Its only stream is [`STREAM`].
 #[derive(Debug, Default)]

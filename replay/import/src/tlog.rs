@@ -1,6 +1,7 @@
 //! Telemetry logs of the MAVLink protocol.
 
-use crate::{Clock, Entry, Format, Step};
+use crate::entry::{Clock, Entry, Step};
+use crate::format::Format;
 use headrace_mavlink::frame::Frames;
 use headrace_mavlink::tlog::{Tlog, TlogError};
 use headrace_sensor::codec::{Framing as _, Verdict};

@@ -16,8 +16,9 @@ use headrace_fusion::smooth::journal::{Journal, JournalReader};
 use headrace_fusion::smooth::step::{Placed, WORDS, Words};
 use headrace_fusion::smooth::track::{Track, TrackNavigation};
 use headrace_fusion::smooth::two_filters::TwoFilterNavigation;
-use headrace_monitor::report::{Report, smoothing_changes};
+use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
+use headrace_monitor::smoothing_changes;
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_vehicle::VehicleConfig;
 

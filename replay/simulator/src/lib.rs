@@ -9,6 +9,7 @@ pub mod effects;
 pub mod environment;
 mod error;
 mod facts;
+mod file_loader;
 mod implied_effects;
 #[cfg(feature = "mesh")]
 pub mod mesh;
@@ -33,6 +34,7 @@ pub use builder::Added;
 pub use clock::START;
 pub use error::SceneError;
 pub use facts::{Facts, SensorFacts};
+pub use file_loader::FileLoader;
 pub use implied_effects::{Called, Fate, Take};
 pub use outbox::Message;
 pub use scene::Scene;
@@ -41,6 +43,3 @@ pub use simulation::{Adviser, Simulation};
 pub use stages::Stage;
 pub use trajectory::{Leg, PilotAdvice, Trajectory};
 pub use truth::{Cause, SoundingTruth, TruthRow};
-
-/// Loads the content of a file named in a scene.
-pub type FileLoader<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, String>;

@@ -16,8 +16,8 @@ use headrace_sensor::device::{DeviceKind, Direction, SensorInfo};
 use headrace_sensor::reading::Packet;
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 
-use crate::FileLoader;
 use crate::error::SceneError;
+use crate::file_loader::FileLoader;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 

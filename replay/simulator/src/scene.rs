@@ -6,11 +6,11 @@ use headrace_sampling::head::HeadProgram;
 use headrace_sensor::device::DeviceKind;
 use headrace_vehicle::VehicleConfig;
 
-use crate::FileLoader;
 use crate::effects::{self, Effect, EffectKind, Named};
 use crate::environment::Environment;
 use crate::error::SceneError;
 use crate::facts::Facts;
+use crate::file_loader::FileLoader;
 use crate::implied_effects::{self, Called, Choice, Described, Tables, Take};
 use crate::trajectory::{self, Ground, Trajectory};
 

@@ -7,8 +7,8 @@ use headrace_pictures::look::{self, Colour, Look};
 use headrace_pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 
-use super::Shown;
 use super::modes::{self, Mode};
+use super::shown::Shown;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
 /// Ratio of successive speeds along a curve.

@@ -5,7 +5,7 @@ use headrace_pictures::polyline;
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::PatternSample;
 
-use super::Shown;
+use super::shown::Shown;
 
 /// Maximum number of samples computed for a chart.
 const MOST_SAMPLES: f64 = 400_000.0;

@@ -4,7 +4,7 @@ use headrace_pictures::look::{self, Look};
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::Planner;
 
-use super::Shown;
+use super::shown::Shown;
 
 /// A mode as shown in the charts.
 #[derive(Debug, Clone)]

@@ -4,15 +4,13 @@ use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart};
 use headrace_pictures::clock;
 use headrace_pictures::look::{self, Look};
-use headrace_pictures::polyline::Frame;
-use headrace_pictures::polyline::Px;
+use headrace_pictures::polyline::{Frame, Px};
 use headrace_sampling::SamplingError;
 
-use super::Shown;
 use super::detail::{self, CIRCLE};
 use super::laid::{self, Laid};
-use super::modes;
-use super::wall;
+use super::shown::Shown;
+use super::{modes, wall};
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 548.0, bottom: 482.0 };
 /// Position of the legend, pixels.

@@ -9,8 +9,8 @@ use headrace_pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::WallPlace;
 
-use super::Shown;
 use super::modes;
+use super::shown::Shown;
 use super::wall::{self, Thin};
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::truth::Truth;
 use super::wall::Wall;
-use crate::TruthError;
+use crate::error::TruthError;
 
 /// Length of a block, and of the overlap that is searched on either side of the block, m.
 const BLOCK_M: f64 = 64.0;

@@ -27,9 +27,9 @@ use headrace_sensor::reading::SourceId;
 use headrace_simulator::{Scene, Scenery, Simulation};
 use headrace_vehicle::VehicleConfig;
 
-use crate::TruthError;
 use crate::blocks::Blocks;
-use crate::timed;
+use crate::cpu::timed;
+use crate::error::TruthError;
 use crate::truth::{Truth, TruthTaker};
 
 /// Samples within this distance of a section are used for the section's chainage offset, m.

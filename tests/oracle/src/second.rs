@@ -6,7 +6,7 @@
 
 use super::truth::Truth;
 use super::wall::Wall;
-use crate::TruthError;
+use crate::error::TruthError;
 
 /// The search doesn't divide stretches of chainage with this half length or less, m.
 const FINEST_M: f64 = 2e-10;

@@ -10,7 +10,7 @@ use headrace_sensor::device::Sense;
 use headrace_simulator::{Scene, SensorFacts, Simulation, TruthRow};
 
 use super::wall::{Place, Wall};
-use crate::TruthError;
+use crate::error::TruthError;
 use crate::outline::Outline;
 
 /// Effects that replace or remove the wall's return, or corrupt its bytes.

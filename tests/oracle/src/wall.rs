@@ -6,7 +6,7 @@
 use headrace_geometry::math;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
-use crate::TruthError;
+use crate::error::TruthError;
 
 /// Coordinates smaller than this are set to zero, because the exact predicates accept no nonzero value below 1e-142.
 const TINY_M: f64 = 1e-100;

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use headrace_coverage::Cause;
 
+use super::judging::{InterventionDive, Right, hole_at_m, report, right};
 use super::matrix::Count;
-use super::{InterventionDive, Right, hole_at_m, report, right};
 
 /// Number of noise seeds with which the reference simulates each dive.
 const NOISES: u64 = 3;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use headrace_coverage::Cause;
 
-use super::{InterventionDive, Right};
+use super::judging::{InterventionDive, Right};
 
 /// Number of the program's answers, and how many of them are right.
 #[derive(Debug, Default, Clone, Copy)]

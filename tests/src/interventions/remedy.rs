@@ -3,7 +3,8 @@
 use headrace_coverage::Action;
 use headrace_monitor::report::ReturnReport;
 
-use super::{Injected, InterventionDive, Judged, hole_at_m, report};
+use super::draw::Injected;
+use super::judging::{InterventionDive, Judged, hole_at_m, report};
 
 /// Length added at either end of a stretch that is passed again, m, because heads are mounted at different places along
 /// the hull.

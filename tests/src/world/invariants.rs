@@ -1,7 +1,7 @@
 //! Invariants of every dive in a simulated world, whichever faults occur.
 
+use super::dive_result::{DiveResult, Line, Replayed};
 use super::plan::{Ending, MachineFault};
-use super::{DiveResult, Line, Replayed};
 use crate::drops;
 
 /// Longest time for which packets may wait while the loop runs, with or without a recording.

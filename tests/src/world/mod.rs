@@ -7,6 +7,7 @@
 pub mod cable;
 pub mod device;
 pub mod disk;
+mod dive_result;
 pub mod invariants;
 pub mod plan;
 mod sabotage;
@@ -27,9 +28,7 @@ use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Attached, Common, LineHistory, LineRecord, LineService, StatusQueue, Waker};
 use headrace_replay::drive::{Pace, drive};
-use headrace_replay::log::{
-    LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Summary,
-};
+use headrace_replay::log::{LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo};
 use headrace_replay::player::Player;
 use headrace_replay::record::{RecorderOutlet, result_channels};
 use headrace_sensor::connect::Connect;
@@ -41,7 +40,8 @@ use crate::folder::Folder;
 use crate::random::Random;
 use cable::{Cable, Clock, Machine};
 use device::Device;
-use disk::{LeftFile, SimulatedDisk};
+use disk::SimulatedDisk;
+pub use dive_result::{Consumed, DiveResult, Line, Replayed};
 use plan::{BEGIN, Ending, MachineFault, Plan};
 pub use sabotage::Sabotage;
 
@@ -91,17 +91,6 @@ pub fn vehicle_text() -> String {
     text
 }
 
-/// A packet that the loop has taken.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Consumed {
-    /// Source of the packet.
-    pub source: u16,
-    /// Receive time of the packet.
-    pub received: MonoNs,
-    /// Content of the packet.
-    pub bytes: Vec<u8>,
-}
-
 /// A dive in a simulated world.
 pub struct World {
     sabotage: Option<Sabotage>,
@@ -128,53 +117,6 @@ pub struct World {
     notices: NoticeReceiver,
     /// Number of packets that must be in the log, whichever way the dive ends.
     certain: usize,
-}
-
-/// Result of a dive in a simulated world.
-pub struct DiveResult {
-    /// Faults planned for the dive.
-    pub plan: Plan,
-    /// Packets that the loop took during the dive, in order.
-    pub consumed: Vec<Consumed>,
-    /// Digest of the results.
-    pub digest: u64,
-    /// Results of the lines between devices and loop, one for each device.
-    pub lines: Vec<Line>,
-    /// Summary of the recorder; `None` if it was killed.
-    pub summary: Option<Summary>,
-    /// Number of failed disk operations.
-    pub disk_failures: usize,
-    /// Files of the recording that are left on the disk.
-    pub left: Vec<LeftFile>,
-    /// Number of consumed packets that must be in the log, whichever way the dive ends.
-    pub certain: usize,
-    /// Longest time for which packets waited to be taken although the loop ran.
-    pub longest_wait: DurNs,
-}
-
-/// Result of a replay of the remaining files.
-pub struct Replayed {
-    /// Packets that the loop took.
-    pub consumed: Vec<Consumed>,
-    /// Digest of the results.
-    pub digest: u64,
-    /// Losses that the replay reported.
-    pub losses: Vec<String>,
-}
-
-/// Result of the line of one device.
-#[derive(Debug)]
-pub struct Line {
-    /// Whether the plan has no fault for the device.
-    pub untouched: bool,
-    /// Whether the cable only splits and delays frames.
-    pub lossless: bool,
-    /// Number of frames sent whole.
-    pub whole: u64,
-    /// Number of good frames that the loop found.
-    pub good: u64,
-    /// Counts of openings, losses and dropped packets of the line, and its last status.
-    pub history: LineHistory,
 }
 
 impl World {

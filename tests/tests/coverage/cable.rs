@@ -12,7 +12,7 @@ use headrace_simulator::{Scene, Simulation};
 use headrace_tests::random_dives::Draw;
 use headrace_tests::{scenes, truth};
 
-use crate::observed;
+use crate::observed::observed;
 
 const DIVES: u64 = 24;
 /// Largest speed by the paper's Eq. 16 for this vehicle and mode at a target of 0.5 m, m/s.

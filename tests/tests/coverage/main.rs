@@ -16,6 +16,7 @@ mod interventions;
 mod long_dives;
 mod memory;
 mod metamorphic;
+mod observed;
 mod oracle;
 mod settings;
 mod stuck_sensors;
@@ -23,11 +24,3 @@ mod true_holes;
 mod truth;
 mod visits;
 mod wall_samples;
-
-use headrace_monitor::alert_list::ListedAlertJson;
-use headrace_monitor::report::Report;
-
-/// Alerts about observations, such as an impossible wall, that the report lists with their number of occurrences.
-fn observed(report: &Report) -> Vec<&ListedAlertJson> {
-    report.alert_list.iter().filter(|alert| alert.occurrences.is_some()).collect()
-}

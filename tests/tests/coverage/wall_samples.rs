@@ -13,7 +13,7 @@ use headrace_simulator::Simulation;
 use headrace_tests::instrumented::{self, Dive, Sample};
 use headrace_tests::scenes;
 
-use crate::observed;
+use crate::observed::observed;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
 /// Scene of a very slow dive in a pipe of 1 m radius.

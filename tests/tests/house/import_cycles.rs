@@ -1,8 +1,8 @@
 //! Finds import cycles between files of a crate, because such files can't be understood, tested or moved separately.
 //!
-//! A file depends on the file that defines an imported item. `pub use` is followed to that file and counts as no
-//! dependency itself. A path in code counts if it begins with `crate`, `super` or `self`. Bare names of child modules
-//! don't count.
+//! A file depends on the files of its child modules, and on the file of each module that its paths name. `pub use`
+//! counts like `use`, and an import of a reexported item depends on the file that reexports it. A path in code counts
+//! if it begins with `crate`, `super` or `self`. Modules for tests only don't count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -33,8 +33,8 @@ type Module = Vec<String>;
 struct Content {
     /// Files of the module: usually one, but several if Cargo features choose between them.
     files: Vec<PathBuf>,
+    children: Vec<Module>,
     used: Vec<Used>,
-    reexports: BTreeMap<String, Vec<String>>,
 }
 
 /// All modules of a crate that have their own files.
@@ -65,6 +65,7 @@ impl Sources {
             } else {
                 file.with_extension("")
             };
+            let mut children = Vec::new();
             for declared in found.modules {
                 let path: PathBuf = declared.name.iter().collect();
                 let file = match declared.file {
@@ -74,12 +75,14 @@ impl Sources {
                         .find(|file| load(file).is_some())
                         .unwrap_or_else(|| panic!("{}: no file of mod {}", file.display(), path.display())),
                 };
-                waiting.push(([module.clone(), declared.name].concat(), file));
+                let child = [module.clone(), declared.name].concat();
+                children.push(child.clone());
+                waiting.push((child, file));
             }
             let content = sources.0.entry(module).or_default();
             content.files.push(file);
+            content.children.extend(children);
             content.used.extend(found.used);
-            content.reexports.extend(found.reexports);
         }
         sources
     }
@@ -107,31 +110,17 @@ impl Sources {
         Some(from)
     }
 
-    /// The module with the file that defines the item at this path.
-    fn definition(&self, path: &[String], depth: u32) -> Module {
-        let mut here = Module::new();
-        for (place, name) in path.iter().enumerate() {
-            here.push(name.clone());
-            if self.0.contains_key(&here) {
-                continue;
-            }
-            here.pop();
-            // The depth is limited, because two modules may reexport each other by globs.
-            if let Some(behind) = self.0.get(&here).and_then(|content| content.reexports.get(name))
-                && depth < 8
-                && let Some(on) = self.absolute(&here, &Used { inside: Vec::new(), path: behind.clone() })
-            {
-                return self.definition(&[&on, &path[place + 1..]].concat(), depth + 1);
-            }
-            break;
-        }
-        here
+    /// The module that a path from the crate's root names: its longest beginning that is a module with a file.
+    fn named(&self, path: &[String]) -> Module {
+        let is_module = |len: &usize| self.0.contains_key(&path[..*len]);
+        path[..(1..=path.len()).take_while(is_module).last().unwrap_or(0)].to_vec()
     }
 
     fn circles(&self) -> Vec<Circle> {
         let needs = self.0.iter().map(|(module, content)| {
             let absolute = content.used.iter().filter_map(|used| self.absolute(module, used));
-            let mut needs: BTreeSet<Module> = absolute.map(|path| self.definition(&path, 0)).collect();
+            let named = absolute.map(|path| self.named(&path));
+            let mut needs: BTreeSet<Module> = named.chain(content.children.iter().cloned()).collect();
             needs.remove(module);
             (module.clone(), needs)
         });
@@ -255,50 +244,52 @@ mod tests {
     }
 
     #[test]
-    fn parent_and_child_that_import_each_other_are_a_cycle() {
-        let child = ("src/a/b.rs", "use super::A;");
-        for (parent, text) in [("src/a.rs", "mod b;\nuse b::B;"), ("src/a/mod.rs", "mod b;\nuse self::b::B;")]
-        {
+    fn child_that_imports_from_its_parent_is_in_a_cycle() {
+        let root = ("src/lib.rs", "mod a;\nmod c;");
+        let c = ("src/c.rs", "pub struct C;");
+        for parent in ["src/a.rs", "src/a/mod.rs"] {
+            let of = |child| circles(&[root, (parent, "mod b;\npub struct A;"), ("src/a/b.rs", child), c]);
             let mut files = [parent, "src/a/b.rs"];
             files.sort_unstable_by(|a, b| Path::new(a).cmp(Path::new(b)));
-            assert_eq!(circles(&[("src/lib.rs", "mod a;"), (parent, text), child]), [files.join(" ")]);
+            for child in ["use super::A;", "use crate::a::A;", "use super::*;", "fn f(_: super::A) {}"] {
+                assert_eq!(of(child), [files.join(" ")], "{child}");
+            }
+            assert_eq!(of("use crate::c::C;"), NONE);
         }
-        assert_eq!(circles(&[("src/lib.rs", "mod a;"), ("src/a.rs", "mod b;"), child]), NONE);
     }
 
     #[test]
-    fn reexport_is_followed_and_is_no_import_itself() {
-        let root = "mod a;\nmod b;\npub use b::B as Other;\npub struct Error;";
+    fn import_of_a_nested_item_depends_on_the_innermost_module() {
         let files = [
-            ("src/lib.rs", root),
-            ("src/a.rs", "use crate::Other;\npub struct A;"),
-            ("src/b.rs", "use crate::Error;\npub struct B;"),
+            ("src/lib.rs", "mod a;\nmod c;"),
+            ("src/a.rs", "pub mod b;"),
+            ("src/a/b.rs", "use crate::c::C;"),
+            ("src/c.rs", "use crate::a::b::B;"),
         ];
-        assert_eq!(circles(&files), NONE, "lib.rs reexports b, and b needs lib.rs");
-        let back = ("src/b.rs", "use crate::a::A;\npub struct B;");
-        assert_eq!(
-            circles(&[files[0], files[1], back]),
-            ["src/a.rs src/b.rs"],
-            "a needs b by its other name"
-        );
+        assert_eq!(circles(&files), ["src/a/b.rs src/c.rs"]);
     }
 
     #[test]
-    fn mutual_glob_reexports_terminate() {
-        let files = [
-            ("src/lib.rs", "mod a;\nmod b;\nmod c;"),
-            ("src/a.rs", "pub use crate::b::X;"),
-            ("src/b.rs", "pub use crate::a::X;"),
-            ("src/c.rs", "use crate::a::X;"),
-        ];
-        assert_eq!(circles(&files), NONE);
+    fn import_of_a_reexport_depends_on_the_reexporting_file() {
+        let root = ("src/lib.rs", "mod a;\nmod b;\npub use b::B as Other;");
+        let b = ("src/b.rs", "pub struct B;");
+        assert_eq!(circles(&[root, ("src/a.rs", "use crate::b::B;"), b]), NONE);
+        for import in ["use crate::Other;", "use super::Other;", "pub use crate::Other;"] {
+            assert_eq!(circles(&[root, ("src/a.rs", import), b]), ["src/a.rs src/lib.rs"], "{import}");
+        }
+    }
+
+    #[test]
+    fn reexport_depends_on_the_reexported_file() {
+        let root = ("src/lib.rs", "mod a;\nmod b;");
+        let b = ("src/b.rs", "use crate::a::X;");
+        assert_eq!(circles(&[root, ("src/a.rs", "pub use crate::b::X;"), b]), ["src/a.rs src/b.rs"]);
     }
 
     #[test]
     fn tests_may_import_the_tested_module() {
         let root = ("src/lib.rs", "mod a;\n#[cfg(test)]\nmod tests;");
-        let inline =
-            "use crate::Error;\n#[cfg(test)]\nmod tests { use super::*; use crate::tests::fixture; }";
+        let inline = "#[cfg(test)]\nmod tests { use super::*; use crate::tests::fixture; }";
         let tests = ("src/tests.rs", "use crate::a::A;");
         assert_eq!(circles(&[root, ("src/a.rs", inline), tests]), NONE);
     }

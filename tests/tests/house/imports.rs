@@ -36,8 +36,6 @@ pub(crate) struct Imports {
     pub(crate) modules: Vec<Declared>,
     /// Paths of `use` declarations, and paths in code that begin with `crate`, `super` or `self`.
     pub(crate) used: Vec<Used>,
-    /// Reexports by `pub use`: the public name, and the path to which it refers.
-    pub(crate) reexports: Vec<(String, Vec<String>)>,
 }
 
 /// Reads declarations and imports from the text of a file.
@@ -73,18 +71,21 @@ pub(crate) fn imports(text: &str) -> Imports {
                     }
                 }
             }
+            // A module in a macro definition, whose name is an argument.
+            [Word("mod"), Mark('$'), Word(name), Mark('{'), ..] => {
+                around.push((name, depth));
+                depth += 1;
+                taken = 4;
+            }
             // The condition `!= Mark('<')` excludes `use<..>`, a capture list in a type.
             [Word("use"), next, ..] if *next != Mark('<') => {
                 let end = here.iter().position(|token| *token == Mark(';')).unwrap_or(here.len());
                 let (front, mut leaves) = (Front::of(before), Vec::new());
                 tree(&here[1..end], &[], &mut leaves);
                 let owned = |path: Vec<&str>| path.into_iter().map(str::to_owned).collect::<Vec<_>>();
-                for (name, path) in leaves {
-                    if front.is_public && around.is_empty() {
-                        found.reexports.push((name.to_owned(), owned(path)));
-                    } else if !front.is_public && !front.is_test {
-                        found.used.push(Used { inside: inside(), path: owned(path) });
-                    }
+                if !front.is_test {
+                    let used = |path| Used { inside: inside(), path: owned(path) };
+                    found.used.extend(leaves.into_iter().map(used));
                 }
                 taken = end;
             }
@@ -106,10 +107,9 @@ pub(crate) fn imports(text: &str) -> Imports {
     found
 }
 
-/// Visibility and attributes before an item.
+/// Attributes of an item, which come before its visibility.
 #[derive(Debug, Default)]
 struct Front<'a> {
-    is_public: bool,
     /// Whether `#[cfg(test)]` is present, alone or with other conditions.
     is_test: bool,
     /// Value of `#[path]`.
@@ -120,12 +120,12 @@ impl<'a> Front<'a> {
     fn of(mut before: &[Token<'a>]) -> Self {
         let mut front = Self::default();
         if let [rest @ .., Word("pub")] = before {
-            (front.is_public, before) = (true, rest);
+            before = rest;
         } else if let [.., Mark(')')] = before
             && let Some(open) = before.iter().rposition(|token| *token == Mark('('))
             && let [rest @ .., Word("pub")] = &before[..open]
         {
-            (front.is_public, before) = (true, rest);
+            before = rest;
         }
         while let [.., Mark(']')] = before {
             let mut depth = 0_usize;
@@ -152,8 +152,8 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Collects the leaves of a `use` tree, each with its local name and its path.
-fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str, Vec<&'a str>)>) {
+/// Collects the paths of the leaves of a `use` tree.
+fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<Vec<&'a str>>) {
     let (mut path, mut rest) = (around.to_vec(), tokens);
     while let [Word(word), Separator, behind @ ..] = rest {
         path.push(word);
@@ -173,11 +173,8 @@ fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str,
             parts.for_each(|part| tree(part, &path, leaves));
         }
         // `self` means the module itself, even if it is the target of a glob.
-        [Word("self")] => leaves.extend(path.last().copied().map(|name| (name, path.clone()))),
-        [Word("self"), Word("as"), Word(name)] => leaves.push((name, path)),
-        [Mark('*')] => leaves.push(("*", path)),
-        [Word(word)] => leaves.push((word, [path, vec![word]].concat())),
-        [Word(word), Word("as"), Word(name)] => leaves.push((name, [path, vec![word]].concat())),
+        [Word("self"), ..] | [Mark('*')] => leaves.push(path),
+        [Word(word), ..] => leaves.push([path, vec![word]].concat()),
         _ => {}
     }
 }
@@ -307,13 +304,9 @@ mod tests {
     }
 
     #[test]
-    fn reexports_use_the_public_name() {
-        let found =
-            imports("pub use a::{B, C as D};\npub(crate) use self::e::F;\npub(in crate::g) use h::*;");
-        let names: Vec<_> =
-            found.reexports.iter().map(|(name, path)| (name.as_str(), path.join("::"))).collect();
-        let expected = [("B", "a::B"), ("D", "a::C"), ("F", "self::e::F"), ("*", "h")];
-        assert_eq!(names, expected.map(|(name, path)| (name, path.to_owned())));
+    fn reexports_count_as_imports() {
+        let text = "pub use a::{B, C as D};\npub(crate) use self::e::F;\npub(super) use h::*;";
+        assert_eq!(used(text), ["a::B", "a::C", "self::e::F", "h"]);
     }
 
     #[test]
@@ -350,11 +343,12 @@ mod tests {
     #[test]
     fn paths_include_their_inline_modules() {
         let found = imports(
-            "mod a { use super::B; mod c { fn d() { super::e() } } }\nuse super::F;\nmod g { mod h; }",
+            "mod a { use super::B; mod c { fn d() { super::e() } } }\nuse super::F;\nmod g { mod h; }\n\
+             macro_rules! i { ($j:ident) => { mod $j { use super::K; } } }",
         );
         let used: Vec<_> =
             found.used.iter().map(|used| (used.inside.join("::"), used.path.join("::"))).collect();
-        let expected = [("a", "super::B"), ("a::c", "super::e"), ("", "super::F")];
+        let expected = [("a", "super::B"), ("a::c", "super::e"), ("", "super::F"), ("j", "super::K")];
         assert_eq!(used, expected.map(|(inside, path)| (inside.to_owned(), path.to_owned())));
         assert_eq!(found.modules, [Declared { name: vec!["g".to_owned(), "h".to_owned()], file: None }]);
     }

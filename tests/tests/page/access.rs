@@ -6,7 +6,7 @@ use headrace_tests::random::Random;
 use serde_json::json;
 use tungstenite::Message;
 
-use crate::ANY;
+use crate::address::ANY;
 
 const TOKENS: &str = "operator = operator-0123456789abcdef\nviewer = viewer-0123456789abcdef\n";
 

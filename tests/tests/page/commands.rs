@@ -4,7 +4,7 @@ use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer, acknowledge_all};
 use serde_json::{Value, json};
 
-use crate::ANY;
+use crate::address::ANY;
 
 #[test]
 fn acknowledgements_and_notes_reach_other_viewers_and_the_log() {

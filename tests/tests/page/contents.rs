@@ -4,7 +4,7 @@ use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer};
 use serde_json::{Value, json};
 
-use crate::ANY;
+use crate::address::ANY;
 
 /// Replays the short dive with a page. Playback pauses at the end of the log.
 fn replayed(folder: &Folder) -> (Serving, Viewer) {

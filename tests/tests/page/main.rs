@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod access;
+mod address;
 mod commands;
 mod contents;
 #[cfg(feature = "tls")]
@@ -11,6 +12,3 @@ mod tls;
 mod undisturbed;
 mod voice;
 mod words;
-
-/// Serves the page on any free port.
-const ANY: &str = "--page=127.0.0.1:0";

@@ -8,7 +8,7 @@ use headrace_tests::page_client::{Serving, Viewer};
 use serde_json::Value;
 use tungstenite::Message;
 
-use crate::ANY;
+use crate::address::ANY;
 
 #[test]
 fn stalled_and_flooding_viewers_do_not_change_results() {

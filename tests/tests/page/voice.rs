@@ -9,7 +9,7 @@ use headrace_tests::page_client::{Serving, Viewer};
 use headrace_tests::random::Random;
 use serde_json::{Value, json};
 
-use crate::ANY;
+use crate::address::ANY;
 
 const TOKENS: &str = "operator = operator-0123456789abcdef\nviewer = viewer-0123456789abcdef\n";
 const OPERATOR: &str = "Authorization: Bearer operator-0123456789abcdef";

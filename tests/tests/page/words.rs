@@ -1,6 +1,6 @@
 //! The page's table of words equals the program's table, and has every code of the live state.
 
-use headrace_monitor::words::typescript::table;
+use headrace_monitor::page_words::table;
 use headrace_tests::root;
 use serde_json::Value;
 

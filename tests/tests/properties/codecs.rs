@@ -10,7 +10,7 @@ use headrace_simulator::Simulation;
 use headrace_tests::scenes;
 use headrace_vehicle::VehicleConfig;
 
-use crate::{Case, few, many};
+use crate::cases::{Case, few, many};
 
 /// A vehicle, and the bytes that each of its sensors sends in a short dive.
 struct Lines {

@@ -4,7 +4,7 @@
 use headrace_fusion::filter::factors::Factors;
 use headrace_geometry::math;
 
-use crate::{Case, few, many};
+use crate::cases::{Case, few, many};
 
 const N: usize = 6;
 /// Relative tolerance of variances. Correlated errors with variances of 1e-10 and 1e+10 give factors with a ratio of

@@ -3,7 +3,7 @@
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
-use crate::{Case, few, many, within};
+use crate::cases::{Case, few, many, within};
 
 /// Tolerance, m. On edges of a micrometre, hits are exact to some nanometres. To find the side of the ray on which an
 /// edge's end lies, the program subtracts nearly equal numbers. The error is then comparable with the edge's length.

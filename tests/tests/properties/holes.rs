@@ -3,7 +3,7 @@
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
 use headrace_oracle::wall::Wall;
 
-use crate::{Case, few, many};
+use crate::cases::{Case, few, many};
 
 /// Draws samples on the wall: at random, on a lattice, on a line, all at one place, partly coincident, or closer
 /// together than those of any vehicle.

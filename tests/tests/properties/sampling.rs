@@ -7,7 +7,7 @@ use headrace_sampling::layout::{start_rad, start_reversed_rad};
 use headrace_sampling::section;
 use headrace_sampling::spacing::{self, Spiral};
 
-use crate::{Case, few, many, within};
+use crate::cases::{Case, few, many, within};
 
 /// A random argument of an equation. It is often zero, negative, extreme, infinite or not a number.
 fn any(case: &mut Case) -> f64 {

@@ -1,7 +1,7 @@
 //! Early fail, before the hole is final. It needs a large empty circle that lies wholly where no more samples
 //! can land.
 
-use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
+use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 

@@ -2,7 +2,7 @@
 //!
 //! Missing samples are put back, the wall is compressed, or stretches count as covered.
 
-use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
+use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
 use headrace_geometry::tunnel::WallPoint;

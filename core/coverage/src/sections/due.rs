@@ -3,19 +3,16 @@
 //! During the dive, a section is due if the heads have left it, or if a part of it may already be certain to
 //! fail. At the end of a dive, a section is due if its verdict may still change.
 
-use super::super::frontier::{Moved, Outlook, Reach, clear_of};
-use super::super::hole::{FARTHEST_M, Needed};
-use super::super::section::Verdict;
-use super::{Ended, Judging, Request, Sections, clamp};
+use super::section_table::{Ended, Judging, LOOK_AT_ONCE, Request, Sections, clamp};
+use crate::frontier::{Moved, Outlook, Reach, clear_of};
+use crate::hole::{FARTHEST_M, Needed};
+use crate::section::Verdict;
 use headrace_geometry::math;
 
 /// Distance travelled between two checks of sections left behind, m.
 ///
 /// This distance bounds the delay of a flag.
 const LOOK_M: f64 = 0.125;
-
-/// Initial check positions. Every finite reach is beyond them, so the first movement causes a check.
-pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Sections {
     /// Whether the heads have moved far enough for some sections to be due for judging.

@@ -2,8 +2,8 @@
 
 use core::ops::Range;
 
-use super::SampleStore;
 use super::open::Node;
+use super::sample_store::SampleStore;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::WallPoint;
 

@@ -11,15 +11,14 @@ use super::state::{
     SLACK_RATE, State, VELOCITY,
 };
 use super::updates::in_tunnel;
-use crate::NoFix;
+use crate::fix::NoFix;
 use crate::section::{Echo, settle};
 use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{SensorInfo, SensorKind};
-use headrace_sensor::reading::MAX_SOURCES;
-use headrace_sensor::reading::Reading;
+use headrace_sensor::reading::{MAX_SOURCES, Reading};
 
 /// Duration of the filter's alignment.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);

@@ -53,7 +53,8 @@ use self::zupt::RestDetector;
 use super::relative::Relative;
 use super::smooth::journal::Journal;
 use super::smooth::relative_backward::UNTIED;
-use super::{Fix, Navigation, NoFix, Times};
+use crate::fix::{Fix, NoFix, Times};
+use crate::navigation::Navigation;
 use headrace_geometry::frames::{Body, Pose, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::site::Site;
@@ -62,8 +63,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
 use headrace_sensor::device::{SensorInfo, SensorKind};
-use headrace_sensor::reading::MAX_SOURCES;
-use headrace_sensor::reading::Reading;
+use headrace_sensor::reading::{MAX_SOURCES, Reading};
 
 /// Maximum time by which a fix is extrapolated beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);

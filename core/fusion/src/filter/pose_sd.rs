@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::factors::Factors;
 use super::state::{ATTITUDE, CREEP, ERRORS, POSITION};
-use crate::NoFix;
+use crate::fix::NoFix;
 use crate::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;

@@ -7,14 +7,14 @@ use crate::filter::pose_sd::PoseSd;
 use crate::filter::sources::Consistency;
 use crate::filter::state::{State, rotation, rotation_vector};
 use crate::filter::{CARRIES, CLOCK_JUMP};
+use crate::fix::{Fix, NoFix, Times};
+use crate::navigation::Navigation;
 use crate::relative::Relative;
-use crate::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::frames::{Body, Pose, Vec3};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorInfo;
-use headrace_sensor::reading::MAX_SOURCES;
-use headrace_sensor::reading::Reading;
+use headrace_sensor::reading::{MAX_SOURCES, Reading};
 
 /// State of the inertial unit at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,15 +1,17 @@
 //! Conditions checked at each update, by situation.
 
-use serde::{Deserialize, Serialize};
-
+use super::alert::{AlertChange, AlertState, Figures};
+use super::kind::{ListKind, Priority};
+use super::life_cycle::Telling;
+use super::list::AlertList;
 use super::timer::{self, Due};
-use super::{AlertList, AlertState, Figures, ListKind, Priority, Telling};
-use crate::live_state::{
-    ActiveObservation, Condition, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState,
+use crate::live_state::condition::Condition;
+use crate::live_state::state::{
+    ActiveObservation, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState,
 };
 use crate::observations::{Observations, ObservedKind};
 use crate::pilot_text::AdviceFigures;
-use headrace_coverage::{Stretch, Unsure};
+use headrace_coverage::Unsure;
 use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
@@ -28,17 +30,6 @@ const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
 /// Dead band: before the alert ends, the remaining amount must rise by this much above the limit of the
 /// warning, percent.
 const MORE_PCT: f64 = 2.0;
-
-/// Record of which kinds of data and positions have arrived so far.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct Had {
-    position: bool,
-    sure_position: bool,
-    sonar: bool,
-    turning: u64,
-    /// The last stretch without a verdict, and the time at which it last grew.
-    unsure: Option<(Stretch, MonoNs)>,
-}
 
 /// An advice update, with the live state at that time.
 pub(crate) struct Beat<'a> {
@@ -356,7 +347,7 @@ impl AlertList {
         if alert.stretch != stretch {
             alert.stretch = stretch;
             let alert = *alert;
-            to.tell(&alert, super::AlertChange::Changed, at);
+            to.tell(&alert, AlertChange::Changed, at);
         }
     }
 }

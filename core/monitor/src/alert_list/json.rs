@@ -5,10 +5,13 @@
 
 use serde::Serialize;
 
+use super::alert::{AlertState, Figures, ListedAlert};
+use super::kind::Priority;
+use super::list::AlertList;
 use super::texts::TextContext;
-use super::{AlertList, AlertState, Figures, ListedAlert, Occurrences, Priority};
-use crate::live_state::LiveState;
+use crate::live_state::state::LiveState;
 use crate::notes::{Note, Spoken};
+use crate::observations::Occurrences;
 use crate::pilot_text::station;
 use crate::source::SourceInfo;
 use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};

@@ -1,10 +1,9 @@
 //! Life cycle of an alert: the effect of each event on its state.
 
-use super::{
-    Acknowledgement, AlertChange, AlertList, AlertState, Figures, ListKind, ListedAlert, MOST_LISTED,
-    Priority, SILENCE,
-};
-use crate::console::Who;
+use super::alert::{Acknowledgement, AlertChange, AlertState, Figures, ListedAlert};
+use super::kind::{ListKind, Priority};
+use super::list::{AlertList, MOST_LISTED, SILENCE};
+use crate::console::command::Who;
 use crate::messages::Notice;
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::time::MonoNs;

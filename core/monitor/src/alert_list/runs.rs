@@ -1,6 +1,9 @@
 //! Alerts for missed stretches: one per run of flagged sections. If two runs merge, their alerts merge, too.
 
-use super::{AlertChange, AlertList, AlertState, Figures, ListKind, ListedAlert, Telling};
+use super::alert::{AlertChange, AlertState, Figures, ListedAlert};
+use super::kind::ListKind;
+use super::life_cycle::Telling;
+use super::list::AlertList;
 use crate::pilot_text::CauseFigures;
 use headrace_coverage::{RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;

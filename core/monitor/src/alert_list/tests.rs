@@ -1,12 +1,15 @@
 use super::conditions::Seen;
 use super::*;
+use crate::console::Who;
 use crate::live_state::ActiveObservation;
 use crate::messages::Notice;
 use crate::observations::{Observations, ObservedKind};
 use crate::result_stream::ResultStream;
 use headrace_coverage::{RunChange, RunId};
 use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _};
-use headrace_vehicle::ClassTiming;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::SourceId;
+use headrace_vehicle::{AlertTiming, ClassTiming, LimitsConfig};
 use proptest::prelude::*;
 
 /// An alert list for a test, and the context in which its changes are published.

@@ -1,8 +1,10 @@
 //! Texts of alerts, from the same table of words as the pilot's other messages. Allocates: outlets only,
 //! never within a tick.
 
-use super::{AlertState, Figures, ListKind, ListedAlert, Occurrence, Occurrences};
+use super::alert::{AlertState, Figures, ListedAlert};
+use super::kind::ListKind;
 use crate::head_descriptions::HeadDescriptions;
+use crate::observations::{Occurrence, Occurrences};
 use crate::pilot_text::{
     actions_text, advice_text, cause_text, clock_text, no_position_text, observation_text, setting_text,
     speed_text, station,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ListKind;
+use super::kind::ListKind;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{LiveState, PositionDoubt, PositionState};
+use super::state::{LiveState, PositionDoubt, PositionState};
 use headrace_fusion::NoFix;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::advice::Reason;
@@ -102,6 +102,11 @@ impl Condition {
 }
 
 impl LiveState {
+    /// Whether the pilot is advised to stay stationary for the gyros' bias, rather than to keep a speed.
+    pub fn asks_to_stand(&self) -> bool {
+        self.condition() == Condition::CannotSay(PositionDoubt::Spread) && self.stand_s > 0
+    }
+
     /// Whether the sample spacing T forecast for the present speed is unbounded or exceeds the limit, m.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)

@@ -5,8 +5,11 @@
 
 use serde::Serialize;
 
-use super::{LIVE_STATE_VERSION, Lamp, LiveMetres, LiveState, PositionState, SensorState};
-use crate::alert_list::{AlertCountsJson, AlertList, LeftJson, ListedAlertJson, TextContext};
+use super::condition::Lamp;
+use super::state::{LIVE_STATE_VERSION, LiveMetres, LiveState, PositionState, SensorState};
+use crate::alert_list::AlertList;
+use crate::alert_list::TextContext;
+use crate::alert_list::{AlertCountsJson, LeftJson, ListedAlertJson};
 use crate::pilot_text::{gain_text, station};
 use headrace_geometry::time::{DurNs, MonoNs};
 

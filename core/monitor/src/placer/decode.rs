@@ -4,7 +4,7 @@ use bevy_ecs::prelude::{Query, Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
 
 use super::sound_speed::SoundSpeed;
-use crate::console::{Commands, Console};
+use crate::console::packets::{Commands, Console};
 use crate::entities::{SensorDecoder, SensorHealth, VehicleEntities};
 use crate::merge::Inbox;
 use crate::messages::Event;

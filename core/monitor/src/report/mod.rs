@@ -17,9 +17,8 @@ mod advice;
 mod inspected;
 mod runs;
 mod smoothing;
-pub mod smoothing_changes;
 mod sources;
-mod spread;
+pub(crate) mod spread;
 mod survey;
 mod unsure;
 

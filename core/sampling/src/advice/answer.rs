@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::MAX_MODES;
 use crate::margin::Margins;
 
+/// Maximum number of modes per head for which alternatives are computed.
+pub const MAX_MODES: usize = 8;
 /// Maximum length of a mode name, bytes.
 const MODE_NAME_BYTES: usize = 15;
 

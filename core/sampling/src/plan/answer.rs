@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::Planner;
+use super::planner::Planner;
 use crate::error::{SamplingError, positive};
 use crate::margin::Margins;
 use crate::section;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Inspection, Planner};
+use super::planner::{Inspection, Planner};
 use crate::error::SamplingError;
 use headrace_geometry::frames::Vec3;
 

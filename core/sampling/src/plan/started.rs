@@ -1,6 +1,6 @@
 //! Prediction of the live advice: the largest speed for heads that were started for another speed.
 
-use super::Planner;
+use super::planner::Planner;
 use crate::advice::{Advisor, Looks, Task};
 use crate::error::{SamplingError, positive};
 use crate::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};

@@ -1,11 +1,10 @@
 //! Planned spacing of samples, and planned sample pattern, by place on the wall.
 
-use super::Planner;
+use super::planner::{Planner, RING, stride_of};
 use crate::error::{SamplingError, positive};
 use crate::head::{HeadProgram, HeadSpec};
-use crate::layout;
 use crate::ring::{Ring, Standing};
-use crate::spacing;
+use crate::{layout, spacing};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
@@ -144,10 +143,10 @@ impl Around {
         program: &HeadProgram,
     ) -> Result<(), SamplingError> {
         let standing = Standing::new(&planner.inspection().profile, &planner.nominal_pose(), &spec.mount)?;
-        let ring = Ring::cast(&standing, 0.0, super::RING)?;
+        let ring = Ring::cast(&standing, 0.0, RING)?;
         let hidden = planner.hidden().get(number).map_or(&[][..], Vec::as_slice);
         let places = self.t_y_m.len();
-        let stride = super::stride_of(spec.step_rad);
+        let stride = stride_of(spec.step_rad);
         for ((sounding, next), step_m) in ring.pairs(stride).zip(ring.steps_m(stride)) {
             if hidden.iter().any(|range| range.has(sounding.angle_rad)) {
                 continue;

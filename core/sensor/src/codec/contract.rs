@@ -5,7 +5,7 @@
 
 use proptest::test_runner::{Config, RngSeed};
 
-use super::Codec;
+use super::interface::Codec;
 
 /// Seed of the random values in contract tests; an arbitrary number.
 const SEED: u64 = 881;

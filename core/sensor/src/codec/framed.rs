@@ -1,6 +1,6 @@
 //! Search for frames that rescans the bytes of a failed frame candidate; shared by all codecs.
 
-use super::{Codec, CodecCounts};
+use super::interface::{Codec, CodecCounts};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// Verdict on the bytes from the start of a frame candidate on.

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Codec as _, Framed, Framing};
+use super::framed::{Framed, Framing};
+use super::interface::Codec as _;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 

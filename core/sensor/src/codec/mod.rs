@@ -8,58 +8,10 @@ mod bytes;
 #[cfg(feature = "contract")]
 pub mod contract;
 mod framed;
+mod interface;
 mod line_clock;
 
 pub use bytes::{Bytes, TooLong};
 pub use framed::{Framed, Framing, Verdict};
+pub use interface::{Codec, CodecCounts};
 pub use line_clock::LineClock;
-use serde::{Deserialize, Serialize};
-
-/// Counters of a codec. Every pushed byte belongs to a good frame, counts in `skipped_bytes`, or is still held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct CodecCounts {
-    /// Number of complete, valid frames.
-    pub good_frames: u64,
-    /// Number of frame candidates that begin with a start marker, but fail by checksum, terminator, length or range.
-    pub bad_frames: u64,
-    /// Number of bytes that belong to no good frame.
-    pub skipped_bytes: u64,
-}
-
-/// Converts bytes to values and back, without I/O.
-///
-/// The module `contract` checks every implementation against this contract:
-/// - No input panics.
-/// - The same bytes split anywhere give the same values.
-/// - A good frame after garbage is found.
-/// - Decoding reverses encoding.
-/// - At most [`Codec::MAX_FRAME_BYTES`] bytes are held between pushes.
-pub trait Codec {
-    /// Value of one frame, in the protocol's units.
-    type Value: Clone + PartialEq + core::fmt::Debug;
-
-    /// Maximum frame length; also the maximum number of bytes held between two pushes.
-    const MAX_FRAME_BYTES: usize;
-
-    /// Whether the transport delivers whole messages (CAN frames, HID reports, I2C transactions).
-    ///
-    /// If so, the port calls [`Codec::flush`] after each message, and garbage is a message of its own. On a byte
-    /// stream, garbage may directly precede a frame.
-    const WHOLE_MESSAGES: bool;
-
-    /// Takes received bytes and calls `sink` for each completed value, in order.
-    ///
-    /// Allocates: never.
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Self::Value));
-
-    /// Signals the end of a message, or a silence that is longer than any pause within a frame.
-    ///
-    /// Gives up an incomplete frame and rescans its bytes.
-    fn flush(&mut self, sink: &mut dyn FnMut(Self::Value));
-
-    /// Counters of frames and bytes so far.
-    fn counts(&self) -> CodecCounts;
-
-    /// Number of bytes held because they may begin an incomplete frame.
-    fn held_bytes(&self) -> usize;
-}

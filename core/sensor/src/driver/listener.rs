@@ -1,6 +1,7 @@
 //! Drivers of devices that transmit without being polled.
 
-use super::{Cutter, DeviceHealth, Driver, Wire};
+use super::cutter::Cutter;
+use super::interface::{DeviceHealth, Driver, Wire};
 use crate::codec::Framing;
 use headrace_geometry::time::{DurNs, MonoNs};
 

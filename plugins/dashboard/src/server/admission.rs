@@ -1,24 +1,19 @@
 //! Decides by its tokens whether a request may see the dive, and with which role.
 
-use std::collections::{BTreeSet, VecDeque};
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::collections::BTreeSet;
 use std::net::IpAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 
-use super::Shared;
 use super::client::Client;
 use super::places::Place;
 use super::reply::{ask_to_wait, plain, refused};
+use super::shared::Shared;
 use crate::access::{Role, tokens_of};
-
-/// Maximum number of wrong tokens whose hashes are remembered, in total and per client.
-const MOST_WRONG: usize = 256;
-const MOST_WRONG_OF_CLIENT: usize = 4;
 
 /// Connection on which a request arrived.
 #[derive(Clone)]
@@ -101,41 +96,6 @@ impl Admitted {
     pub(super) fn may_stream(&self) -> bool {
         self.place.stream(self.client, self.is_forwarded)
     }
-}
-
-/// Hashes of wrong tokens by client, the latest last.
-///
-/// A repeated wrong token isn't a new guess. Old tokens in a browser's tabs therefore don't exhaust the budget of
-/// their address.
-#[derive(Default)]
-pub(super) struct WrongTokens(Mutex<VecDeque<(Client, u64)>>);
-
-impl WrongTokens {
-    fn list(&self) -> MutexGuard<'_, VecDeque<(Client, u64)>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn has(&self, client: Client, token: &str) -> bool {
-        self.list().contains(&(client, hash_of(token)))
-    }
-
-    fn add(&self, client: Client, token: &str) {
-        let mut list = self.list();
-        if list.iter().filter(|(of, _)| *of == client).count() >= MOST_WRONG_OF_CLIENT {
-            let oldest = list.iter().position(|(of, _)| *of == client);
-            oldest.and_then(|oldest| list.remove(oldest));
-        }
-        if list.len() >= MOST_WRONG {
-            list.pop_front();
-        }
-        list.push_back((client, hash_of(token)));
-    }
-}
-
-fn hash_of(token: &str) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    token.hash(&mut hasher);
-    hasher.finish()
 }
 
 impl Shared {

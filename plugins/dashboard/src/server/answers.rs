@@ -18,8 +18,8 @@ use tokio::time::{Instant, timeout};
 
 use super::admission::{Admitted, Caller, Denied};
 use super::reply::{Here, json_answer, plain, refused};
-use super::stall::STALLED_AFTER;
-use super::{Shared, feed, metrics, neighbours, voices};
+use super::shared::{STALLED_AFTER, Shared};
+use super::{feed, metrics, neighbours, voices};
 use crate::access::{COOKIE, name_of, query};
 use crate::assets;
 use crate::command::{Asked, LONGEST};

@@ -10,9 +10,8 @@ use serde_json::{Value, json};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::time::{Instant, sleep_until, timeout};
 
-use super::Shared;
 use super::budget::Budget;
-use super::stall::STALLED_AFTER;
+use super::shared::{STALLED_AFTER, Shared};
 use crate::access::Role;
 use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};

@@ -14,9 +14,10 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 
 use super::admission::Caller;
+use super::answers;
 use super::client::Client;
+use super::shared::Shared;
 use super::stall::Stream;
-use super::{Shared, TlsFiles, answers};
 
 /// Pause after accepting a connection has failed.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -35,6 +36,15 @@ const SEND_BUFFER: u32 = 32 << 10;
 const HELD: usize = 64 << 10;
 /// Maximum number of connections that wait in the kernel to be accepted.
 const BACKLOG: u32 = 1024;
+
+/// Files with certificate and key, in PEM format.
+#[derive(Debug, Clone)]
+pub struct TlsFiles {
+    /// File with the certificate and its intermediate certificates.
+    pub certificate: std::path::PathBuf,
+    /// File with the certificate's private key.
+    pub key: std::path::PathBuf,
+}
 
 /// TLS configuration from a certificate and its key.
 pub(super) struct Tls {

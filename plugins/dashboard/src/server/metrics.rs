@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use serde_json::Value;
 
-use super::Shared;
+use super::shared::Shared;
 
 /// Returns the metrics in Prometheus' text format.
 pub(super) fn metrics(shared: &Shared) -> String {

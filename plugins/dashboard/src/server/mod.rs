@@ -13,27 +13,35 @@ mod neighbours;
 mod places;
 mod pump;
 mod reply;
+mod shared;
 mod stall;
+mod voice_desk;
 mod voices;
+mod wrong_tokens;
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use headrace_monitor::run::Loop;
-use headrace_monitor::voice::Voice;
 use tokio::net::TcpListener;
 use tokio::sync::{Notify, broadcast, mpsc};
 
+use self::shared::{Counts, Shared};
+use self::voice_desk::Desk;
+use self::wrong_tokens::WrongTokens;
 use crate::access::{Access, Tokens};
 use crate::collector::{Collector, WAITING};
-use crate::command::{Command, Play};
 use crate::fed::Fed;
-use crate::model::{Message, Model};
+use crate::model::Model;
 use crate::site::Site;
+
+pub use self::listener::TlsFiles;
+pub use self::shared::{Act, Direct};
+pub use self::voice_desk::{Keep, Recall, Voices};
 
 /// Default port of the page.
 pub const PORT: u16 = 8881;
@@ -46,15 +54,6 @@ const MOST_GUESSES: f64 = 20.0;
 const GUESSES_PER_S: f64 = 1.0;
 /// Time limit for viewers to receive the last messages when the page ends.
 const ENDS_WITHIN: Duration = Duration::from_secs(1);
-
-/// Files with certificate and key, in PEM format.
-#[derive(Debug, Clone)]
-pub struct TlsFiles {
-    /// File with the certificate and its intermediate certificates.
-    pub certificate: std::path::PathBuf,
-    /// File with the certificate's private key.
-    pub key: std::path::PathBuf,
-}
 
 /// Address and access rules of the page.
 #[derive(Debug, Clone)]
@@ -91,88 +90,6 @@ pub enum PageError {
     /// TLS can't be set up.
     #[error("{0}")]
     Tls(String),
-}
-
-/// Handler of operators' commands. Its error is the reason for a refusal.
-pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
-/// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason for a
-/// refusal.
-pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
-/// Handler that finds in a log the recording of the voice note with this id and time, seconds.
-///
-/// Returns `None` if the log has no readable recording of it. The search may take seconds.
-pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;
-
-/// Source and destination of voice recordings.
-#[derive(Clone)]
-pub enum Voices {
-    /// Recordings are not available.
-    None,
-    /// Recordings are written to the log of a live dive.
-    Kept(Keep),
-    /// Recordings are read from a recorded log.
-    Recalled(Recall),
-}
-
-/// Handler of commands to playback. Its error is the reason for a refusal.
-pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
-
-/// Counters that `/metrics` reports.
-#[derive(Debug, Default)]
-pub(crate) struct Counts {
-    pub(crate) viewers: AtomicUsize,
-    pub(crate) served: AtomicU64,
-    pub(crate) stalled: AtomicU64,
-    pub(crate) lagged: AtomicU64,
-    pub(crate) refused: AtomicU64,
-    pub(crate) unauthorised: AtomicU64,
-    pub(crate) foreign: AtomicU64,
-    pub(crate) bytes: AtomicU64,
-}
-
-/// State shared by all handlers of requests.
-pub(crate) struct Shared {
-    model: Mutex<Model>,
-    pub(crate) access: Access,
-    /// Sender of messages to all viewers; `None` once the page ends.
-    fan: Mutex<Option<broadcast::Sender<Arc<[Message]>>>>,
-    pub(crate) counts: Counts,
-    pub(crate) act: Act,
-    pub(crate) direct: Direct,
-    pub(crate) voices: voices::Desk,
-    pub(crate) is_tls: bool,
-    proxies: Vec<IpAddr>,
-    places: Arc<places::Places>,
-    /// Budget of wrong tokens for each client.
-    guesses: budget::Budgets,
-    wrong_tokens: admission::WrongTokens,
-    /// Budget of HTTP actions for each operator's address.
-    actions: budget::Budgets,
-    stop: Notify,
-    has_ended: AtomicBool,
-}
-
-impl Shared {
-    pub(crate) fn model(&self) -> MutexGuard<'_, Model> {
-        self.model.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn fan(&self) -> MutexGuard<'_, Option<broadcast::Sender<Arc<[Message]>>>> {
-        self.fan.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Counts a viewer that was dropped because it accepted no data.
-    fn count_stalled(&self) {
-        Self::count(&self.counts.stalled, 1);
-        tracing::info!(
-            "a viewer of the page read nothing for {} s and was dropped",
-            stall::STALLED_AFTER.as_secs()
-        );
-    }
-
-    pub(crate) fn count(counter: &AtomicU64, by: u64) {
-        counter.fetch_add(by, Ordering::Relaxed);
-    }
 }
 
 /// The page while it is being served.
@@ -216,12 +133,12 @@ impl Page {
             counts: Counts::default(),
             act,
             direct,
-            voices: voices::Desk::new(voices),
+            voices: Desk::new(voices),
             is_tls: tls.is_some(),
             proxies: proxies.iter().map(IpAddr::to_canonical).collect(),
             places: Arc::default(),
             guesses: budget::Budgets::new(MOST_GUESSES, GUESSES_PER_S),
-            wrong_tokens: admission::WrongTokens::default(),
+            wrong_tokens: WrongTokens::default(),
             actions: budget::Budgets::new(feed::MOST_PER_S, feed::MOST_PER_S),
             stop: Notify::new(),
             has_ended: AtomicBool::new(false),

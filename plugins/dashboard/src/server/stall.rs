@@ -4,17 +4,13 @@ use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Sleep, sleep};
 
-use super::Shared;
 use super::places::Place;
-
-/// Time after which a peer that accepts no data is dropped.
-pub(super) const STALLED_AFTER: Duration = Duration::from_secs(10);
+use super::shared::{STALLED_AFTER, Shared};
 
 /// A TCP stream whose writes fail after [`STALLED_AFTER`] without progress.
 pub(super) struct Stream {

@@ -2,7 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpStream};
-use std::sync::atomic::AtomicU32;
+use std::sync::atomic::{AtomicU32, AtomicU64};
 
 use headrace_geometry::tunnel::shapes::circle;
 use headrace_sampling::Target;
@@ -10,7 +10,7 @@ use tokio::time::Instant;
 
 use super::*;
 use crate::access::Token;
-use crate::model::{Body, Sort};
+use crate::model::{Body, Message, Sort};
 use crate::site::Mode;
 
 const VIEWER: &str = "Authorization: Bearer viewer-0123456789\r\n";

@@ -4,7 +4,7 @@
 //! The unit has no turn rate about its pitch axis.
 //! Source: Bosch Motorsport, ABS M5 Kit manual, p. 40 to 42.
 
-use super::{MessageError, data_id};
+use super::fields::{MessageError, data_id};
 use crate::frame::{CanFrame, CanId, Payload};
 
 const YAW: u16 = 0x70;

@@ -5,7 +5,7 @@
 //! Source: SAE J1939-71, parameter groups 61481, 61482, 61485; figures of merit and latency as Axiomatic UMAX0608XX and
 //! Honeywell TARS document them.
 
-use super::{MessageError, data_id, exactly};
+use super::fields::{MessageError, data_id, exactly};
 use crate::frame::{CanFrame, CanId, Payload};
 
 const SLOPE_2: u32 = 61_481;

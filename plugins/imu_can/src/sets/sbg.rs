@@ -4,7 +4,7 @@
 //! to headrace's. [`to_ours`] converts vectors and [`rotation_to_ours`] rotations; both are their own inverse.
 //! Source: SBG Systems, sbgECom CAN protocol and sbgCan.dbc; bits of the status in its firmware reference.
 
-use super::{MessageError, data_id, exactly, words};
+use super::fields::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
 /// Acceleration of one count, m/s^2.

@@ -4,7 +4,7 @@
 //! identifiers: a base, with the same code in the lowest byte.
 //! Source: Xsens MT CAN protocol (MT1604P); byte order as in all known readers.
 
-use super::{MessageError, data_id, exactly, words};
+use super::fields::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
 /// Quaternion component of one count.

@@ -2,7 +2,7 @@
 
 use headrace_sensor::codec::{Bytes, TooLong};
 
-use super::MAX_FRAME_BYTES;
+use super::frame::MAX_FRAME_BYTES;
 
 /// A frame whose payload is being written.
 pub(super) type Payload = Bytes<MAX_FRAME_BYTES>;

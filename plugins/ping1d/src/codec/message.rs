@@ -5,7 +5,7 @@
 use headrace_sensor::codec::{Bytes, TooLong};
 
 use super::fields::{Field, Payload, record};
-use super::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, frame};
+use super::frame::{self, Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES};
 
 record! {
     /// Identity of a device.

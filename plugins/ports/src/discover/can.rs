@@ -3,7 +3,8 @@
 use headrace_sensor::connect::Connect;
 use headrace_sensor::driver::Carrier;
 
-use super::{Found, Machine};
+use super::found::Found;
+use super::machine::Machine;
 use crate::fix_hint;
 use crate::open_error::{OpenError, OpenErrorKind};
 

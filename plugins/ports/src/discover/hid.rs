@@ -5,7 +5,9 @@ use std::fs;
 use headrace_sensor::connect::{Connect, UsbIdentity};
 use headrace_sensor::driver::Carrier;
 
-use super::{Found, Machine, Rights};
+use super::found::Found;
+use super::machine::Machine;
+use super::rights::Rights;
 
 const CLASS: &str = "/sys/class/hidraw";
 /// First item of a report descriptor: the usage page, with one or two bytes of data. Source: HID 1.11, 6.2.2.7.

@@ -2,7 +2,9 @@
 
 use headrace_sensor::driver::Carrier;
 
-use super::{Found, Machine, Rights};
+use super::found::Found;
+use super::machine::Machine;
+use super::rights::Rights;
 use crate::fix_hint;
 use crate::open_error::{OpenError, OpenErrorKind};
 

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 use headrace_sensor::driver::Carrier;
 
-use super::machine::text;
-use super::{Found, Machine, Rights};
+use super::found::Found;
+use super::machine::{Machine, text};
+use super::rights::Rights;
 
 const CLASS: &str = "/sys/class/tty";
 const BY_ID: &str = "/dev/serial/by-id";

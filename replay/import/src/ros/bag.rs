@@ -7,9 +7,14 @@
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
 
-use super::{Encoding, Feeds, Topic, Type};
+use super::feeds::{Feeds, Topic};
+use super::message::Type;
+use super::wire::Encoding;
+use crate::entry::{Clock, Entry, ImportReport, Step};
+use crate::error::ImportError;
+use crate::format::Format;
+use crate::input::{Input, Source as _};
 use crate::order::Order;
-use crate::{Clock, Entry, Format, ImportError, ImportReport, Input, Source as _, Step};
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Upper bound on the length of a record's header, bytes.

@@ -10,7 +10,7 @@ use super::message::{Read, Type, Values, read};
 use super::points::{Beam, Beams, Plane};
 use super::wire::Encoding;
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
-use crate::{Entry, ImportReport};
+use crate::entry::{Entry, ImportReport};
 
 /// Settings of a topic in the mapping, apart from its sensor.
 #[derive(Debug, Clone, Copy)]

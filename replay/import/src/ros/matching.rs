@@ -6,9 +6,9 @@ use headrace_vehicle::VehicleConfig;
 
 use super::clocks::Base;
 use super::feed::{Feed, Manner};
+use super::feeds::{Feeds, Topic};
 use super::message::Type;
 use super::points::Plane;
-use super::{Feeds, Topic};
 use crate::csv::{LENGTH, PRESSURE};
 use crate::emulated::EmulatedSensor;
 

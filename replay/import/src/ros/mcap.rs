@@ -7,9 +7,13 @@ use std::collections::BTreeMap;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 use super::bag::FIRST_UTC_NS;
-use super::{Encoding, Feeds, Topic, Type};
+use super::feeds::{Feeds, Topic};
+use super::message::Type;
+use super::wire::Encoding;
+use crate::entry::{Clock, Entry, ImportReport};
+use crate::error::ImportError;
+use crate::input::Source;
 use crate::order::Order;
-use crate::{Clock, Entry, ImportError, Source};
 use headrace_replay::log::format::FORMAT_KEY;
 use headrace_replay::log::{ChannelInfo, LogReader};
 
@@ -126,7 +130,7 @@ impl<R: Read + Seek> Source for Mcap<R> {
         self.bytes
     }
 
-    fn told(&self) -> crate::ImportReport {
+    fn told(&self) -> ImportReport {
         let mut told = self.feeds.told();
         told.losses.extend(self.reader.losses().iter().map(ToString::to_string));
         if let Some(stated) = self.stated.filter(|stated| self.is_at_end && *stated > self.read) {

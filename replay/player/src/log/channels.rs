@@ -7,7 +7,8 @@ use super::format::{
 };
 use super::framing::Definition;
 use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
-use super::{Many, SourceInfo};
+use super::loss::Many;
+use super::writer::SourceInfo;
 
 /// Rank of the first channel that isn't raw. Source numbers are u16, so raw channels rank lower.
 const OTHER_RANK: u32 = 1 << 16;

@@ -11,9 +11,10 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult};
 use zstd_safe::{DCtx, DParameter, InBuffer, OutBuffer, ResetDirective, get_error_name};
 
+use super::error::LogError;
 use super::framing::{ChunkPlace, LogFile};
 use super::limits::{MAX_UNPACKED_BYTES, MAX_WINDOW_LOG, RECORD_COST};
-use super::{LogError, LossKind};
+use super::loss::LossKind;
 
 /// Number of bytes read from the file at once.
 const READ_BYTES: usize = 1 << 20;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use super::LogError;
+use super::error::LogError;
 use super::format::hex;
 use crate::regular_file;
 

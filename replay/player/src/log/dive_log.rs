@@ -11,9 +11,12 @@ use std::path::{Path, PathBuf};
 use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
+use super::error::LogError;
 use super::limits::MAX_SOURCES;
+use super::loss::{Loss, LossKind};
 use super::part::{Part, Progress, named_part};
-use super::{LogError, LogInfo, LogMessage, LogPlace, LogReader, Loss, LossKind, MessageKind, SourceInfo};
+use super::reader::{LogInfo, LogMessage, LogPlace, LogReader, MessageKind};
+use super::writer::SourceInfo;
 
 /// A file of a dive's log.
 #[derive(Debug, Clone, PartialEq, Eq)]

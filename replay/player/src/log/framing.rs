@@ -14,7 +14,7 @@ use std::io::{BufReader, Read, Seek};
 use mcap::records::op;
 use serde::{Deserialize, Serialize};
 
-use super::LogError;
+use super::error::LogError;
 use super::fields::{Fields, MessageHead};
 use super::format::LIBRARY;
 use super::limits::map_cost;

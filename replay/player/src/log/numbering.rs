@@ -9,11 +9,10 @@ use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
 use super::channels::Channels;
-use super::loss::Losses;
+use super::loss::{Loss, LossKind, Losses};
 use super::merge::Entry;
 use super::part::{PART_END, Part};
 use super::scan::{Scan, Span};
-use super::{Loss, LossKind};
 
 /// Maximum number of runs kept per channel. An intact log has one run, or a few while pieces are read out of order.
 const MAX_RUNS: usize = 64;

@@ -11,16 +11,17 @@ use serde::{Deserialize, Serialize};
 
 use super::channels::{Admission, ChannelKind, Channels};
 use super::chunk::{Unpacked, data_section_holds, unpack};
+use super::error::LogError;
 use super::fields::Fields;
 use super::format::VEHICLE_FILE;
 use super::framing::{ChunkPlace, Definition, LogFile};
 use super::limits::{LATEST, MAX_HELD_BYTES, quoted};
-use super::loss::Losses;
+use super::loss::{Loss, LossKind, Losses, Many};
 use super::merge::{Batch, Merge};
 use super::numbering::Numbering;
 use super::part::{Part, Progress};
 use super::scan::{FoundDefinitions, Piece, Span, beyond, date_losses, scan};
-use super::{LogError, Loss, LossKind, Many, SourceInfo};
+use super::writer::SourceInfo;
 use crate::regular_file;
 
 /// First opcode that other programs may use. Source: MCAP format specification, "Records".

@@ -17,7 +17,7 @@ use ringbuf::HeapRb;
 use ringbuf::traits::Observer as _;
 use ringbuf::wrap::{Cons, Prod};
 
-use super::LogError;
+use super::error::LogError;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, LinePort, Queue, State, until_stopped};

@@ -12,8 +12,8 @@ use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-use super::LogError;
 use super::backlog::{Backlog, Head, Tally};
+use super::error::LogError;
 use super::fault::{RecordingEvent, RecordingFault, add};
 use super::part::{PartHead, part_path};
 use super::rotate::{Every, Rotation};

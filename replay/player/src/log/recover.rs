@@ -5,12 +5,12 @@ use std::io::{Read, Seek, Write};
 
 use headrace_geometry::time::MonoNs;
 
+use super::dive_log::DiveLog;
+use super::error::LogError;
 use super::format::BYTES_ENCODING;
-use super::writer::Lane;
-use super::{
-    DiveLog, LogError, LogHeader, LogMessage, LogWriter, Loss, LossKind, MessageKind, ResultChannel,
-    SourceInfo,
-};
+use super::loss::{Loss, LossKind};
+use super::reader::{LogMessage, MessageKind};
+use super::writer::{Lane, LogHeader, LogWriter, ResultChannel, SourceInfo};
 
 /// Metadata key of a recovered log. Its value is the name of the original log.
 pub const RECOVERED_FROM: &str = "recovered_from";

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use headrace_geometry::time::DurNs;
 
-use super::LogError;
+use super::error::LogError;
 use super::fields::Fields;
 use super::format::unseal;
 use super::framing::{Found, Item, LogFile, look};

@@ -11,6 +11,7 @@ use mcap::records::op;
 
 use super::channels::{Channels, listed};
 use super::chunk::{Unpacked, summary_holds, unpack};
+use super::error::LogError;
 use super::fields::Fields;
 use super::format::{
     ATTACHMENT_PREFIX, CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, LOSSES, METADATA, read_loss, unseal,
@@ -20,9 +21,8 @@ use super::limits::{
     HeaderBudget, MAX_ATTACHMENT_BYTES, MAX_CHANNELS, MAX_HEADER_BYTES, MAX_PIECES, MAX_SOURCES,
     MAX_UNPACKED_BYTES, MAX_UNPACKED_RATIO, map_cost, quoted, unpacked_limit,
 };
-use super::loss::Losses;
+use super::loss::{Loss, LossKind, Losses, Many};
 use super::search::find_records;
-use super::{LogError, Loss, LossKind, Many};
 
 /// Approximate size of a piece of messages outside chunks, bytes.
 const RUN_BYTES: u64 = 1 << 20;

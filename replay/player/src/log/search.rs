@@ -4,7 +4,7 @@ use std::io::{Read, Seek};
 
 use mcap::records::op;
 
-use super::LogError;
+use super::error::LogError;
 use super::framing::{Found, Item, LogFile, look};
 
 /// Number of consecutive records after which a position is accepted.

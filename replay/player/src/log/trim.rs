@@ -5,9 +5,11 @@ use std::io::{Read, Seek, Write};
 
 use headrace_geometry::time::MonoNs;
 
+use super::dive_log::DiveLog;
+use super::error::LogError;
+use super::reader::{LogInfo, LogMessage};
 use super::recover::{header, lane, look_through, words};
-use super::writer::Lane;
-use super::{DiveLog, LogError, LogHeader, LogInfo, LogMessage, LogWriter, ResultChannel};
+use super::writer::{Lane, LogHeader, LogWriter, ResultChannel};
 
 /// Metadata key of a trimmed log. Its value describes the changes.
 pub const TRIMMED: &str = "trimmed";

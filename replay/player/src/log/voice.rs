@@ -13,9 +13,11 @@ use std::sync::atomic::Ordering;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::voice::{Container, Voice, VoiceError};
 
+use super::dive_log::DiveLog;
+use super::error::LogError;
 use super::fields::Fields;
 use super::queue::State;
-use super::{DiveLog, LogError, MessageKind};
+use super::reader::MessageKind;
 
 /// Reason why a voice recording isn't accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

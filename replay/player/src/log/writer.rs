@@ -11,13 +11,15 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 
+use super::error::LogError;
+use super::fault::RecordingFault;
 use super::format::{
     ATTACHMENT_PREFIX, BYTES_ENCODING, CHANNEL_LIST, CONNECT_KEY, FORMAT_KEY, FORMAT_VERSION, LIBRARY,
     LOSSES, METADATA, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, Tick,
     VEHICLE_FILE, VOICE_TOPIC, order_bytes, seal, stated_loss, tick_head,
 };
 use super::part::{PART, PART_END, PartEnd, PartHead, Progress};
-use super::{LeftOut, LogError, RecordingFault};
+use super::space::LeftOut;
 
 /// Size at which a chunk is closed, bytes, whatever its time span is.
 const CHUNK_BYTES: u64 = 1 << 20;

@@ -14,7 +14,7 @@ use super::mesh_parts::{MeshBody, MeshWall};
 use super::placing::{Placed, Site, span_m};
 use super::shapes::Solid;
 use super::vector::Frame;
-use crate::FileLoader;
+use crate::file_loader::FileLoader;
 use crate::mesh::{self, Mesh, Role};
 
 /// Allowed chainage of the origin of a mesh, m. The origin of a survey may be far away.

@@ -42,7 +42,7 @@ use headrace_vehicle::TunnelConfig;
 
 pub use axis::Axis;
 
-use crate::FileLoader;
+use crate::file_loader::FileLoader;
 use features::Features;
 use index::Index;
 use placing::{Placed, Site};

@@ -7,7 +7,7 @@ use super::keys::{self, Kind};
 use super::mesh_parts::MeshWall;
 use super::placing::{Placed, Site};
 use super::shapes::Solid;
-use crate::FileLoader;
+use crate::file_loader::FileLoader;
 
 /// Refuses meshes.
 ///

@@ -18,7 +18,7 @@
 use headrace_sensor::device::{InertialNoise, Sense};
 use headrace_vehicle::VehicleConfig;
 
-use super::{Call, number};
+use super::call::{Call, number};
 use crate::facts::{Facts, SensorFacts};
 
 /// Largest difference in beam width between heads of one frequency, radians. It corresponds to 5 kHz.

@@ -5,7 +5,7 @@ use headrace_geometry::math;
 use headrace_geometry::site::{Site, fresh_water_sound_speed_mps};
 use headrace_sensor::device::Sense;
 
-use super::{Call, number};
+use super::call::{Call, number};
 use crate::environment::Environment;
 use crate::facts::Facts;
 use crate::stretch::Stretch;

@@ -1,7 +1,7 @@
 //! Merges many calls for effects into one set of tables. A call is one reason to simulate an effect, see [`Call`].
 //! Where two calls for an effect overlap, the keys of the later call apply.
 
-use super::{Call, Called, Fate, Value};
+use super::call::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
 /// The key of effects whose value is a list. The lists of several calls are concatenated. For any other key the later

@@ -3,6 +3,7 @@
 //! A lining, silt, a leak, rubble, thrusters, a cable and the models of sensors each imply effects. The key `take` of
 //! `[effects]` decides whether implied effects are simulated.
 
+mod call;
 mod data_sheets;
 mod described;
 mod merge;
@@ -13,6 +14,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::environment::Environment;
 use crate::facts::Facts;
 
+pub use call::{Called, Fate};
 pub(crate) use described::{Described, Tables};
 
 /// Selects which of the implied effects are simulated.
@@ -23,78 +25,6 @@ pub enum Take {
     Only,
     /// Simulates implied effects too. An effect that the scene names is simulated with the scene's own tables.
     Called,
-}
-
-/// An effect that a scene implies, with its tables.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Called {
-    /// Name of the effect.
-    pub effect: &'static str,
-    /// Parts of the scene or its vehicle file that imply the effect.
-    pub by: Vec<String>,
-    /// Tables of the effect, in the form in which a scene would contain them.
-    pub tables: String,
-    /// Whether and how the effect is simulated.
-    pub fate: Fate,
-}
-
-/// Whether and how an implied effect is simulated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fate {
-    /// The effect is simulated with its implied tables.
-    Taken,
-    /// The effect is simulated with the tables in the scene.
-    Named,
-    /// The effect isn't simulated: the scene asks only for the effects that it names.
-    NotTaken,
-    /// The effect isn't simulated: the key `leave` lists it.
-    Left,
-}
-
-impl Fate {
-    /// Whether and how the effect is simulated, as text for display.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Taken => "taken",
-            Self::Named => "as named",
-            Self::NotTaken => "not taken",
-            Self::Left => "left",
-        }
-    }
-}
-
-/// A value of an effect's key, as TOML text.
-type Value = String;
-
-/// A call: one reason to simulate an effect, with the sensors, the range of chainage and the keys that follow from it.
-#[derive(Debug, Clone, PartialEq)]
-struct Call {
-    effect: &'static str,
-    by: String,
-    /// Sensors that the effect acts on; `None` for an effect on the vehicle or the water.
-    sensors: Option<Vec<String>>,
-    /// Chainages between which the effect acts; `None` if it acts everywhere.
-    place_m: Option<[f64; 2]>,
-    keys: Vec<(&'static str, Value)>,
-}
-
-impl Call {
-    fn new(effect: &'static str, by: impl Into<String>, keys: &[(&'static str, Value)]) -> Self {
-        Self { effect, by: by.into(), sensors: None, place_m: None, keys: keys.to_vec() }
-    }
-
-    fn on(self, sensors: &[String]) -> Self {
-        Self { sensors: Some(sensors.to_vec()), ..self }
-    }
-
-    fn within(self, place_m: [f64; 2]) -> Self {
-        Self { place_m: Some(place_m), ..self }
-    }
-}
-
-/// Formats a number as TOML.
-fn number(value: f64) -> Value {
-    format!("{value:?}")
 }
 
 /// All effects that a scene implies, in the order of [`crate::effects::KINDS`].

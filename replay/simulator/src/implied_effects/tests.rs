@@ -1,4 +1,5 @@
-use super::{Call, Fate, merge, number};
+use super::call::{Call, Fate, number};
+use super::merge;
 use crate::testing::Dive;
 
 const MURK: &str = "[water]\ntemperature_degc = 8\n[[water.murk]]\nfrom_m = 5\nto_m = 9\nsilt_gpl = 0.4\n\

@@ -5,7 +5,7 @@ use ply_rs_bw::ply::{
     ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::MeshError;
+use super::error::MeshError;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 /// Names of the property that lists a face's corners. Both are in use.

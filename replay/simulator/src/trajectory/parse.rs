@@ -2,15 +2,17 @@
 
 use std::ops::RangeInclusive;
 
-use headrace_config::Loader;
-use headrace_config::{ConfigError, Section};
+use headrace_config::{ConfigError, Loader, Section};
 use headrace_geometry::tunnel::Profile;
 
 use super::advised::{Advised, Heeding, Hurry};
+use super::composed::Trajectory;
 use super::knots::Offsets;
+use super::legs::Leg;
 use super::pilot::{Pilot, Piloted};
+use super::place::Ground;
+use super::recorded;
 use super::waypoints::{self, Waypoint};
-use super::{Ground, Leg, Trajectory, recorded};
 use crate::random::Stream;
 
 /// Largest distance outside the tunnel at which a dive may start or end, m.

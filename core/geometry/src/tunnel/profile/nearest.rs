@@ -1,6 +1,6 @@
 //! Point of a profile nearest to another point.
 
-use super::Profile;
+use super::closed_curve::Profile;
 use super::element::{ARC_SLACK_RAD, Element, Shape};
 use super::plane::{Yz, dot, norm, sub};
 use super::tree::Bounds;

@@ -1,8 +1,8 @@
 //! A tunnel profile made from surveyed points.
 
+use super::closed_curve::{Profile, ProfileError, SAME_POINT_M};
 use super::element::Piece;
 use super::plane::{Yz, cross, norm, sub};
-use super::{Profile, ProfileError, SAME_POINT_M};
 
 impl Profile {
     /// Creates a polygon through `points`, in either sense of rotation.

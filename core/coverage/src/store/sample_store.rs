@@ -1,19 +1,10 @@
-//! Samples on the unrolled wall, in bricks of several rows of square cells around the perimeter.
-//!
-//! Bricks near the vehicle are open: they hold unpacked samples, listed by cell. Bricks farther away are packed to
-//! four bytes per sample. A packed brick is opened again when the vehicle comes back or a pass search needs it. Full
-//! cells are thinned, so memory in use grows with the wall seen, not with the duration of the dive. All memory is
-//! allocated before the loop is armed. The OS maps a page on first use.
-
-mod open;
-mod packed;
-mod passes;
-mod thinning;
+//! The store: insertion, queries, and opening and packing of bricks.
 
 use serde::{Deserialize, Serialize};
 
-use self::open::{CellAt, OpenBricks};
-use self::packed::{Arena, Lattice, MOST_WORDS, Packed, Reader, Writer};
+use super::open::{CellAt, OpenBricks};
+use super::packed::{self, Arena, Lattice, MOST_WORDS, Packed, Reader, Writer};
+use super::thinning;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::WallPoint;
@@ -135,17 +126,17 @@ impl Brick {
 /// Store of samples in bricks; see the module's description.
 #[derive(Debug, Clone)]
 pub struct SampleStore {
-    layout: StoreLayout,
-    rows: i64,
-    columns: i64,
-    column_m: f64,
+    pub(super) layout: StoreLayout,
+    pub(super) rows: i64,
+    pub(super) columns: i64,
+    pub(super) column_m: f64,
     /// Number of rows of a brick, as a power of two.
     rows_shift: u32,
     bricks: Vec<Brick>,
-    open: OpenBricks,
+    pub(super) open: OpenBricks,
     arena: Arena,
     /// Longest single step so far, along the tunnel and along the perimeter, m.
-    longest_step_m: [f64; 2],
+    pub(super) longest_step_m: [f64; 2],
     kept: u64,
     thinned: u64,
 }
@@ -346,7 +337,7 @@ impl SampleStore {
     /// Returns the slot of a brick.
     ///
     /// The function opens the brick if it is packed, or if it is empty and `wanted`.
-    fn opened(&mut self, number: u32, wanted: bool) -> Option<usize> {
+    pub(super) fn opened(&mut self, number: u32, wanted: bool) -> Option<usize> {
         let brick = *self.bricks.get(number as usize)?;
         if brick.slot > 0 || (brick.count == 0 && !wanted) {
             return brick.open_slot();
@@ -440,11 +431,11 @@ impl SampleStore {
         math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m).clamp(0, self.rows - 1)
     }
 
-    fn brick_of(&self, row: i64) -> u32 {
+    pub(super) fn brick_of(&self, row: i64) -> u32 {
         u32::try_from(row >> self.rows_shift).unwrap_or(0)
     }
 
-    fn row_in_brick(&self, row: i64) -> i64 {
+    pub(super) fn row_in_brick(&self, row: i64) -> i64 {
         row & ((1 << self.rows_shift) - 1)
     }
 
@@ -452,7 +443,7 @@ impl SampleStore {
         math::floor_to_i64(arc_m / self.column_m).clamp(0, self.columns - 1)
     }
 
-    fn cell_at(&self, slot: usize, row: i64, column: i64) -> CellAt {
+    pub(super) fn cell_at(&self, slot: usize, row: i64, column: i64) -> CellAt {
         let row = self.row_in_brick(row);
         let [row, column] = [row, column].map(|number| usize::try_from(number).unwrap_or(usize::MAX));
         CellAt { slot, row, column }

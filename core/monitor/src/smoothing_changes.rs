@@ -1,8 +1,7 @@
 //! Compares the report of a smoothed dive with the report of the same dive by the navigation filter alone.
 
-use super::smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
-use super::{Report, SummaryReport};
-use crate::section_row::SectionRow;
+use super::report::{ChangeReport, JudgedReport, MetresReport, Report, SmoothingReport, SummaryReport};
+use super::section_row::SectionRow;
 
 /// Compares the report by the navigation filter with the report after smoothing. The smoothed trajectory has
 /// `estimates` state estimates in `pieces` contiguous pieces.

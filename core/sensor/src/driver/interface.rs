@@ -1,17 +1,6 @@
-//! Host side of a device's line, without I/O.
-//!
-//! A driver decides which bytes to send and when, which bytes go to the loop, and whether the device is healthy. It
-//! is a state machine run by the thread of a port. Every call passes the time, so that tests can run a driver
-//! against an emulated device without a port, a thread or a clock.
+//! Interface of a driver: transport, setup, I/O operations, health and identification.
 
-mod cutter;
-mod listener;
-mod strangers;
-
-pub use cutter::{Cutter, Piece};
-pub use listener::{Judge, Listener, MessageListener};
-pub use strangers::IgnoredSenders;
-
+use super::strangers::IgnoredSenders;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::HeadProgram;
 

@@ -1,34 +1,13 @@
-//! The largest hole of a section: the largest empty circle on the unrolled wall with its centre in the section.
-//!
-//! Let f(c) be the distance from a point c to the nearest sample. D = 2 max f over the section
-//! (docs/reference/glossary.md). Branch and bound over tiles finds it:
-//!
-//! 1. A tile is divided among a few samples. Each share is a convex polygon, on which the distance to its
-//!    sample is largest at a corner.
-//! 2. The farthest corner bounds the tile, since further samples only lower f.
-//! 3. The sample nearest to that corner either proves the bound, or gets a share and lowers it.
-//! 4. Tiles whose bound can't exceed the best point found are dropped, so only the worst areas are divided
-//!    finely.
-//!
-//! Clipping is exact except for rounding. Without a triangulation, lattices, lines and duplicate samples need
-//! no special handling.
+//! The search for the largest hole: tiles, their bounds, and the holes found.
 
 use serde::{Deserialize, Serialize};
 
-use self::division::Division;
-use self::window::{Nearest, Window};
-use super::store::SampleStore;
+use super::division::Division;
+use super::window::{Nearest, Window};
+use crate::store::SampleStore;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::WallPoint;
-
-mod certain;
-mod division;
-mod hypothetical;
-mod window;
-
-pub use certain::Needed;
-pub use hypothetical::WallChanges;
 
 /// Maximum search radius, m. Wall farther than this from every sample counts as wall that no head has swept.
 pub const FARTHEST_M: f64 = 12.0;
@@ -39,7 +18,7 @@ const NO_FINER_M: f64 = 1e-10;
 /// Upper limit of the rounding error of a computed distance, m.
 const ROUNDING_M: f64 = 1e-9;
 /// Value of `owner` for a tile whose nearest sample isn't known.
-const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
+pub(super) const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance with which a corner's bound counts as proven, m.
 const PROVEN_M: f64 = 1e-11;
 
@@ -84,19 +63,19 @@ impl Hole {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Tile {
+pub(super) struct Tile {
     /// Centre of the tile, from the start of the section, m.
-    x_m: f64,
-    arc_m: f64,
-    half_x_m: f64,
-    half_arc_m: f64,
+    pub(super) x_m: f64,
+    pub(super) arc_m: f64,
+    pub(super) half_x_m: f64,
+    pub(super) half_arc_m: f64,
     /// Sample nearest to the tile's centre, relative to the centre, m.
     ///
     /// The searches for an empty circle of given size use it differently. They store the chainage and arc
     /// length of any nearby sample, with the chainage from the start of the section.
-    owner: (f64, f64),
+    pub(super) owner: (f64, f64),
     /// Upper bound of f, the distance to the nearest sample, in the tile, m.
-    bound_m: f64,
+    pub(super) bound_m: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -112,7 +91,7 @@ struct Best {
 struct Beyond(WallPoint);
 
 /// Result of searching for a sample near the centre of a tile.
-enum Near {
+pub(super) enum Near {
     /// No empty circle has its centre in the tile: one sample is within the radius of all points of the tile.
     Settled,
     /// The sample nearest to the centre, or an equally near one.
@@ -123,7 +102,7 @@ enum Near {
 
 impl Near {
     /// Returns the sample and its distance, m; `None` for [`Near::Settled`].
-    fn unsettled(self) -> Option<(Option<Nearest>, f64)> {
+    pub(super) fn unsettled(self) -> Option<(Option<Nearest>, f64)> {
         match self {
             Self::Settled => None,
             Self::Sample(found) => Some((Some(found), math::sqrt(found.distance2))),
@@ -134,12 +113,12 @@ impl Near {
 
 impl Tile {
     /// Centre of the tile, with the chainage from the start of the section.
-    fn centre(&self) -> WallPoint {
+    pub(super) fn centre(&self) -> WallPoint {
         WallPoint { x_m: self.x_m, arc_m: self.arc_m }
     }
 
     /// Half diagonal of the tile, m.
-    fn half_m(&self) -> f64 {
+    pub(super) fn half_m(&self) -> f64 {
         math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
     }
 
@@ -160,7 +139,7 @@ impl Tile {
     ///
     /// If the known sample `owner` is within the radius of the whole tile, the function does not search.
     /// Otherwise, it returns any sample that is near enough, or the nearest one.
-    fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
+    pub(super) fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
         // The margins are larger than the rounding errors of the distances.
         let enough_m = radius_m - self.half_m() - ROUNDING_M;
         let (dx, darc) = (self.owner.0 - self.x_m, self.owner.1 - self.arc_m);
@@ -173,7 +152,7 @@ impl Tile {
     }
 
     /// Returns the halves of a tile. Their `owner` becomes the nearest sample, if one is within reach.
-    fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
+    pub(super) fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
         if let Some(found) = nearest {
             self.owner = (found.x_m, found.arc_m + found.turns * perimeter_m);
         }
@@ -189,7 +168,7 @@ impl Tile {
 }
 
 /// Covers a section with roughly square tiles.
-fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
+pub(super) fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
     let half_x_m = length_m / 2.0;
     let count = math::floor_to_i64(perimeter_m / length_m).clamp(1, 8192) + 1;
     let half_arc_m = perimeter_m / (2 * count) as f64;
@@ -210,9 +189,9 @@ pub struct HoleFinder {
     /// Radius of the last hole found, m: the first guess for the next search.
     last_m: f64,
     /// Radius of the largest circle for which the changed wall was last laid out, m.
-    laid_m: f64,
-    window: Window,
-    tiles: Vec<Tile>,
+    pub(super) laid_m: f64,
+    pub(super) window: Window,
+    pub(super) tiles: Vec<Tile>,
     division: Division,
 }
 
@@ -383,7 +362,7 @@ fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Res
 }
 
 /// Cell size that suits a search radius, m.
-fn cell_m(reach_m: f64) -> f64 {
+pub(super) fn cell_m(reach_m: f64) -> f64 {
     (reach_m / 3.0).clamp(0.05, 0.5)
 }
 

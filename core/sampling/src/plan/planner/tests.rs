@@ -1,6 +1,7 @@
 use super::*;
 use crate::fixtures;
 use crate::head::{Basis, Turn};
+use crate::plan::Question;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::shapes;

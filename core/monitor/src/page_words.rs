@@ -2,14 +2,16 @@
 //!
 //! Allocates: tests only.
 
-use super::{
+use crate::alert_list::json::NoteJson;
+use crate::alert_list::kind::{AlertClass, Priority};
+use crate::console::command::{NoteText, Who};
+use crate::live_state::condition::Condition;
+use crate::live_state::state::{PositionDoubt, SensorState};
+use crate::notes::{Note, Spoken};
+use crate::words::{
     NOT_INSPECTED, STAND_STILL, STARTING, UNSEEN, condition_words, doubt_words, limit_words, missing_words,
     priority_word, sensor_words, verdict_words,
 };
-use crate::alert_list::{AlertClass, NoteJson, Priority};
-use crate::console::{NoteText, Who};
-use crate::live_state::{Condition, PositionDoubt, SensorState};
-use crate::notes::{Note, Spoken};
 use headrace_coverage::{Unsure, Verdict};
 use headrace_fusion::NoFix;
 use headrace_geometry::time::{DurNs, MonoNs};

@@ -1,5 +1,5 @@
-use super::super::store::{Kept, StoreLayout, WallSample};
 use super::*;
+use crate::store::{Kept, StoreLayout, WallSample};
 use headrace_support::hard_cases::found;
 use proptest::prelude::*;
 

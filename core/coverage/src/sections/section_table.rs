@@ -1,22 +1,20 @@
-//! All sections of the tunnel: statistics, hole, verdict and flag of each.
-
-mod due;
+//! The sections, how they are judged, and the runs of those that are flagged.
 
 use core::ops::Range;
 
-use super::cause::{Cause, Causes};
-use super::evidence::Evidence;
-use super::explain::{Case, explain};
-use super::frontier::{Outlook, Reach, clear_of};
-use super::hole::{Hole, HoleFinder};
-use super::missing_samples::MissingSamples;
-use super::openings::Opening;
-use super::passage::PassError;
-use super::runs::{Run, RunChange, RunId, Runs, Telling};
-use super::section::{Judgement, Metres, Section, Verdict};
-use super::store::SampleStore;
-use super::unsure::{Driven, Stretch};
-use super::visits::Visit;
+use crate::cause::{Cause, Causes};
+use crate::evidence::Evidence;
+use crate::explain::{Case, explain};
+use crate::frontier::{Outlook, Reach, clear_of};
+use crate::hole::{Hole, HoleFinder};
+use crate::missing_samples::MissingSamples;
+use crate::openings::Opening;
+use crate::passage::PassError;
+use crate::runs::{Run, RunChange, RunId, Runs, Telling};
+use crate::section::{Judgement, Metres, Section, Verdict};
+use crate::store::SampleStore;
+use crate::unsure::{Driven, Stretch};
+use crate::visits::Visit;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
@@ -57,6 +55,9 @@ impl Ended {
         self.0.is_none_or(|all| hole.x_m - radius_m < all.from_m || hole.x_m + radius_m > all.to_m)
     }
 }
+
+/// Initial check positions. Every finite reach is beyond them, so the first movement causes a check.
+pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Request {
     /// Returns a function that makes a request to judge a section, with the outlook's time and stretches.
@@ -101,8 +102,8 @@ pub struct Judging<'a> {
 /// All sections of the stretch of tunnel that the store covers, and the runs of flagged sections.
 #[derive(Debug, Clone)]
 pub struct Sections {
-    section_m: f64,
-    target: Target,
+    pub(super) section_m: f64,
+    pub(super) target: Target,
     /// Distance from the start of a missed stretch at which the vehicle's origin should turn round, m.
     run_up_m: f64,
     first: i64,
@@ -115,7 +116,7 @@ pub struct Sections {
     /// Ends of the heads' reach at which sections are checked next, as chainages, m.
     ///
     /// The first applies to sections behind the heads, the second to sections ahead.
-    next_look_m: [f64; 2],
+    pub(super) next_look_m: [f64; 2],
 }
 
 stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target, run_up_m, first; });
@@ -137,7 +138,7 @@ impl Sections {
             judged: [0; 5],
             sections: vec![Section::default(); count],
             runs,
-            next_look_m: due::LOOK_AT_ONCE,
+            next_look_m: LOOK_AT_ONCE,
         }
     }
 
@@ -390,7 +391,7 @@ impl Sections {
     /// Returns the error of a section's passes.
     ///
     /// If no head pinged in the section, the result is the largest error within half the target.
-    fn pass_error(&self, index: i64) -> PassError {
+    pub(super) fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
         }
@@ -513,7 +514,7 @@ impl Sections {
 /// - `open` otherwise while D may change, and `cannot_say` afterwards.
 ///
 /// A verdict holds for both bounds of D.
-pub(super) fn verdict(hole: &Hole, sd_m: f64, target: Target, clear_m: f64) -> Verdict {
+pub(crate) fn verdict(hole: &Hole, sd_m: f64, target: Target, clear_m: f64) -> Verdict {
     let (target_m, error_m) = (target.max_hole_m, target.error_m(sd_m));
     debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");
     debug_assert!(
@@ -537,7 +538,7 @@ pub fn back_to_m(start_m: f64, run_up_m: f64) -> f64 {
     math::floor_to_i64((start_m - run_up_m) * 10.0 + 1e-6) as f64 / 10.0
 }
 
-fn clamp(range: Range<i64>, within: &Range<i64>) -> Range<i64> {
+pub(super) fn clamp(range: Range<i64>, within: &Range<i64>) -> Range<i64> {
     range.start.max(within.start)..range.end.min(within.end)
 }
 

@@ -1,27 +1,13 @@
-//! A tunnel's design profile: a closed curve of straight lines and arcs, with exact ray casting.
+//! The closed curve of a profile: checks, ray casting, and places on the wall.
 
+use super::element::{Element, Piece, Shape, build};
+use super::plane::{Yz, cross, dot, norm, sub};
+use super::support::Support;
+use super::tree::{Bounds, Tree};
 use crate::math::{self, TAU};
 
-mod element;
-mod nearest;
-mod plane;
-mod polygon;
-mod support;
-#[cfg(test)]
-mod tests;
-mod tree;
-
-use element::{Element, Shape, build};
-use plane::{cross, dot, norm, sub};
-use support::Support;
-use tree::{Bounds, Tree};
-
-pub use element::Piece;
-pub use nearest::Nearest;
-pub use plane::Yz;
-
 /// Distance below which two points count as equal, m.
-const SAME_POINT_M: f64 = 1e-9;
+pub(super) const SAME_POINT_M: f64 = 1e-9;
 /// Number of elements above which a polygon has a table of its extent by direction.
 const MANY: usize = 256;
 /// Number of equidistant wall places that [`Profile::places`] returns.
@@ -30,12 +16,12 @@ const PLACES: u32 = 64;
 /// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    elements: Vec<Element>,
-    tree: Tree,
+    pub(super) elements: Vec<Element>,
+    pub(super) tree: Tree,
     /// Table of the profile's extent by direction, present only for many elements.
     support: Option<Support>,
-    perimeter_m: f64,
-    reference: Yz,
+    pub(super) perimeter_m: f64,
+    pub(super) reference: Yz,
     /// Equidistant places on the wall, starting at the floor's centre.
     places: Vec<Yz>,
 }
@@ -340,3 +326,6 @@ fn check_star_shaped<'a>(
     let turns = math::round_to_i64(turned / TAU);
     if turns == 1 { Ok(()) } else { Err(ProfileError::Winding { turns, reference }) }
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,7 +10,7 @@ use core::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ClockReport, DeviceClock};
+use crate::device_clock::{ClockReport, DeviceClock};
 use crate::reading::Reading;
 use headrace_geometry::time::{DurNs, MonoNs};
 

@@ -1,45 +1,16 @@
-//! List of alerts with the life cycle of IMO MSC.302(87): raised, acknowledged, silenced, rectified, cleared.
-//!
-//! Each situation has one alert, whose number never changes. Conditions are checked at each update. Missed
-//! stretches are added when their sections are judged. Commands take effect at their place in the packet
-//! stream. The list is therefore the same in a replay, however the stream was cut into ticks. The list holds
-//! figures, no texts: [`texts`] makes the texts for display. `docs/reference/alerts.md` has the table.
+//! An alert: its state, changes and figures.
 
-use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
-use super::console::Who;
-pub use super::observations::{Occurrence, Occurrences};
-use super::pilot_text::{AdviceFigures, CauseFigures};
+use super::kind::{ListKind, Priority};
+use crate::console::command::Who;
+use crate::observations::Occurrences;
+use crate::pilot_text::{AdviceFigures, CauseFigures};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::setting_check::SettingDoubt;
-use headrace_geometry::snapshot::stateful;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::SourceId;
-use headrace_vehicle::{AlertTiming, LimitsConfig};
-
-mod conditions;
-pub mod json;
-mod kind;
-mod life_cycle;
-mod runs;
-pub mod texts;
-mod timer;
-
-pub(super) use conditions::Beat;
-pub use json::{AlertCountsJson, LeftJson, ListedAlertJson, NoteJson, SettingJson, SpokenJson};
-pub use kind::{AlertClass, ListKind, Priority};
-pub(super) use life_cycle::Telling;
-pub(super) use runs::RunInput;
-pub use texts::TextContext;
-use timer::Timer;
-
-/// Maximum number of alerts kept. Beyond this number the oldest cleared alerts are dropped, and neighbouring
-/// missed stretches share an alert.
-pub const MOST_LISTED: usize = 256;
-/// Time for which a sound is silenced. Source: MSC.302(87).
-pub const SILENCE: DurNs = DurNs(30_000_000_000);
 
 /// State of an alert in its life cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -189,103 +160,3 @@ impl ListedAlert {
         (rank, core::cmp::Reverse(self.number))
     }
 }
-
-/// All alerts of a dive.
-#[derive(Debug, Resource)]
-pub struct AlertList {
-    /// Alerts in order of their numbers.
-    alerts: Vec<ListedAlert>,
-    /// Number of alerts raised so far.
-    raised: u32,
-    /// Number of cleared alerts no longer kept.
-    dropped: u64,
-    /// For each run of flagged sections: number of its alert, or zero.
-    by_run: Vec<u32>,
-    /// Timers that raise and end alerts, by situation.
-    timers: Vec<Timer>,
-    /// Time of the first advice update.
-    begun: Option<MonoNs>,
-    /// Record of the data and positions that have arrived so far.
-    had: conditions::Had,
-    /// Largest speed advised at the last advice update, m/s; zero if none.
-    v_max_mps: f64,
-    /// Chainage of the vehicle at the last advice update, m.
-    x_m: Option<f64>,
-    recording_fails: bool,
-    battery_pct: Option<f64>,
-    timing: AlertTiming,
-    limits: LimitsConfig,
-}
-
-stateful!(AlertList {
-    state: raised, dropped, begun, had, v_max_mps, x_m, recording_fails, battery_pct;
-    lists: alerts, by_run;
-    slots: timers;
-    fixed: timing, limits;
-});
-
-impl AlertList {
-    /// Creates an empty list. `sections` is the number of sections, and so the largest possible number of
-    /// runs.
-    ///
-    /// Allocates: at startup, all memory of the list.
-    pub(super) fn new(timing: AlertTiming, limits: LimitsConfig, sections: usize) -> Self {
-        Self {
-            alerts: Vec::with_capacity(MOST_LISTED),
-            raised: 0,
-            dropped: 0,
-            by_run: Vec::with_capacity(sections),
-            timers: vec![Timer::default(); timer::COUNT],
-            begun: None,
-            had: conditions::Had::default(),
-            v_max_mps: 0.0,
-            x_m: None,
-            recording_fails: false,
-            battery_pct: None,
-            timing,
-            limits,
-        }
-    }
-
-    /// All alerts kept, in order of their numbers.
-    pub fn iter(&self) -> impl DoubleEndedIterator<Item = &ListedAlert> + Clone {
-        self.alerts.iter()
-    }
-
-    /// Alert with this number.
-    pub fn get(&self, number: u32) -> Option<&ListedAlert> {
-        self.alerts.get(self.place_of(number)?)
-    }
-
-    /// Number of alerts raised so far.
-    pub fn raised(&self) -> u32 {
-        self.raised
-    }
-
-    /// Number of cleared alerts no longer kept.
-    pub fn dropped(&self) -> u64 {
-        self.dropped
-    }
-
-    /// Last reported charge of the vehicle's battery, percent.
-    pub fn battery_pct(&self) -> Option<f64> {
-        self.battery_pct
-    }
-
-    /// Chainage of the vehicle at the last advice update, m.
-    pub(super) fn x_m(&self) -> Option<f64> {
-        self.x_m
-    }
-
-    fn place_of(&self, number: u32) -> Option<usize> {
-        self.alerts.binary_search_by_key(&number, |alert| alert.number).ok()
-    }
-
-    fn get_mut(&mut self, number: u32) -> Option<&mut ListedAlert> {
-        let place = self.place_of(number)?;
-        self.alerts.get_mut(place)
-    }
-}
-
-#[cfg(test)]
-mod tests;

@@ -1,5 +1,5 @@
-use super::super::hole::FARTHEST_M;
 use super::*;
+use crate::hole::FARTHEST_M;
 use crate::store::{StoreLayout, WallSample};
 use headrace_fusion::relative::Relative;
 use headrace_geometry::tunnel::shapes;

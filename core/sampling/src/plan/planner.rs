@@ -1,29 +1,18 @@
-//! Planning before a dive: coverage by heads, modes, layout and speed in a tunnel, without measurements.
+//! The planner: speed and spacing of each mode, over all tolerated poses of the vehicle.
 
-mod answer;
-mod briefing;
-mod mounts;
-mod started;
-mod wall;
-
-use super::error::{SamplingError, not_negative, positive};
-use super::head::{HeadMode, HeadSet, HeadSpec};
-use super::layout::{self, HeadLayout};
-use super::margin::{self, APART_SHARE, ExpectedErrors, Margins};
-use super::occlusion::{self, AngleRange, Obstacle};
-use super::passes::{self, Passes};
-use super::ring::{Ring, Standing};
-use super::schedule::Schedule;
-use super::strips::{Arc, Going, Sector, Strips, View};
-use super::target::Target;
+use crate::error::{SamplingError, not_negative, positive};
+use crate::head::{HeadMode, HeadSet, HeadSpec};
+use crate::layout::{self, HeadLayout};
+use crate::margin::{self, APART_SHARE, ExpectedErrors, Margins};
+use crate::occlusion::{self, AngleRange, Obstacle};
+use crate::passes::{self, Passes};
+use crate::ring::{Ring, Standing};
+use crate::schedule::Schedule;
+use crate::strips::{Arc, Going, Sector, Strips, View};
+use crate::target::Target;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math::TAU;
 use headrace_geometry::tunnel::{Profile, Yz};
-
-pub use answer::{Answer, Question, Spacing};
-pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
-pub use mounts::InLine;
-pub use wall::{PatternSample, WallPlace};
 
 /// Share of the largest speed for which heads should be started.
 ///
@@ -31,7 +20,7 @@ pub use wall::{PatternSample, WallPlace};
 /// speed. See docs/why/field.md.
 pub const HELD_SHARE: f64 = 0.95;
 /// Number of ray-cast soundings per turn: soundings 0.1 degrees apart cover many start angles of each head step.
-const RING: u32 = 3600;
+pub(super) const RING: u32 = 3600;
 
 /// Maximum number of iterations until the speed converges.
 ///
@@ -65,7 +54,7 @@ pub struct Inspection {
 
 /// A vehicle at one of the tolerated positions and headings.
 #[derive(Debug, Clone)]
-struct Stance {
+pub(super) struct Stance {
     strips: Strips,
     farthest_m: f64,
     parallax_rad: f64,
@@ -94,11 +83,11 @@ pub struct PlannedMode {
 /// Answers planning questions about an inspection.
 #[derive(Debug, Clone)]
 pub struct Planner {
-    inspection: Inspection,
+    pub(super) inspection: Inspection,
     hidden: Vec<Vec<AngleRange>>,
     stances: Vec<Stance>,
-    modes: Vec<PlannedMode>,
-    errors: Option<ExpectedErrors>,
+    pub(super) modes: Vec<PlannedMode>,
+    pub(super) errors: Option<ExpectedErrors>,
 }
 
 impl Planner {
@@ -193,19 +182,19 @@ impl Planner {
     }
 
     /// Returns the margin for position errors in a mode at a speed, m.
-    fn margin_m(&self, planned: &PlannedMode, target_m: f64, speed_mps: f64) -> f64 {
+    pub(super) fn margin_m(&self, planned: &PlannedMode, target_m: f64, speed_mps: f64) -> f64 {
         let target = self.target(target_m);
         margin::position_margin_m(target, self.pass_error_m(planned, speed_mps), planned.t_y2_m)
     }
 
     /// Target with the confidence of the expected errors; without them, the confidence is zero.
-    fn target(&self, max_hole_m: f64) -> Target {
+    pub(super) fn target(&self, max_hole_m: f64) -> Target {
         let confidence_sd = self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd);
         Target { max_hole_m, confidence_sd }
     }
 
     /// Standard deviation of a hole's size between two passes in a mode at a speed, m; zero if unknown.
-    fn pass_error_m(&self, planned: &PlannedMode, speed_mps: f64) -> f64 {
+    pub(super) fn pass_error_m(&self, planned: &PlannedMode, speed_mps: f64) -> f64 {
         let Some(errors) = &self.errors else { return 0.0 };
         let passes_per_s = self.inspection.heads.len() as f64 / planned.mode.turn.period_s();
         let apart_m = self.stances.first().map_or(0.0, |stance| stance.apart_m);
@@ -429,7 +418,7 @@ fn stride(mode: &HeadMode) -> usize {
     stride_of(mode.turn.step_rad())
 }
 
-fn stride_of(step_rad: f64) -> usize {
+pub(super) fn stride_of(step_rad: f64) -> usize {
     Ring::stride(step_rad, RING)
 }
 

@@ -1,15 +1,9 @@
-//! The live state: the present state of the dive, as one structure by value. `docs/reference/live-state.md`
-//! describes it.
-//!
-//! Every update makes a live state, and every tick publishes the latest one. The terminal and the lines of
-//! `--json-lines` show it. All fields except [`LiveState::now`] are as of the last update, in data time, and
-//! so the same in a replay. [`LiveState::now`] belongs to the tick: a loop without data keeps ticking, and
-//! ages are measured up to `now`.
+//! The state itself, and the states of position and sensors in it.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
-use super::observations::{MOST_OBSERVATIONS, ObservedKind, Occurrences};
+use crate::observations::{MOST_OBSERVATIONS, ObservedKind, Occurrences};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::pose_sd::PoseSd;
@@ -19,13 +13,6 @@ use headrace_sampling::Target;
 use headrace_sampling::advice::{Advice, Reason};
 use headrace_sampling::head::HeadSet;
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
-
-mod condition;
-pub mod json;
-
-#[cfg(test)]
-pub(crate) use condition::test_state;
-pub use condition::{Condition, Lamp};
 
 /// Version of the live state and of its JSON.
 pub const LIVE_STATE_VERSION: u32 = 2;
@@ -75,7 +62,7 @@ impl PositionState {
     }
 
     /// Number used for the availability in published data.
-    pub(super) fn number(self) -> u64 {
+    pub(crate) fn number(self) -> u64 {
         match self {
             Self::Ok => 0,
             Self::Doubtful(doubt) => 1 + doubt as u64,
@@ -219,7 +206,7 @@ stateful!(LiveState {
 
 impl LiveState {
     /// State before the first update, in a tunnel of unlimited length.
-    pub(super) fn new(target: Target, heads: u64, sources: u16) -> Self {
+    pub(crate) fn new(target: Target, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
             at: None,
@@ -253,11 +240,6 @@ impl LiveState {
         let beyond = x_m > self.length_m + self.heads_reach_m;
         let before = x_m < -self.heads_reach_m;
         if beyond { Some(self.length_m) } else { before.then_some(0.0) }
-    }
-
-    /// Whether the pilot is advised to stay stationary for the gyros' bias, rather than to keep a speed.
-    pub fn asks_to_stand(&self) -> bool {
-        self.condition() == Condition::CannotSay(PositionDoubt::Spread) && self.stand_s > 0
     }
 
     /// Age of the state; `None` before the first update.
@@ -326,14 +308,14 @@ impl LiveState {
     }
 
     /// Bitmask of the kinds of observations that hold now.
-    pub(super) fn observation_bits(&self) -> u64 {
+    pub(crate) fn observation_bits(&self) -> u64 {
         self.observations.iter().flatten().fold(0, |bits, known| bits | 1 << known.kind as u64)
     }
 }
 
 /// Bitmask of the sources that belong to a set of heads. `sources` lists the source of each head, in order of
 /// head number.
-pub(super) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
+pub(crate) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
     let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
     numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))
 }

@@ -1,0 +1,20 @@
+//! The live state: the present state of the dive, as one structure by value. `docs/reference/live-state.md`
+//! describes it.
+//!
+//! Every update makes a live state, and every tick publishes the latest one. The terminal and the lines of
+//! `--json-lines` show it. All fields except [`LiveState::now`] are as of the last update, in data time, and
+//! so the same in a replay. [`LiveState::now`] belongs to the tick: a loop without data keeps ticking, and
+//! ages are measured up to `now`.
+
+pub(crate) mod condition;
+pub mod json;
+pub(crate) mod state;
+
+#[cfg(test)]
+pub(crate) use condition::test_state;
+pub use condition::{Condition, Lamp};
+pub(crate) use state::{ActiveObservation, ActiveObservations, source_bits};
+pub use state::{
+    LEAST_MPS, LIVE_STATE_VERSION, LiveMetres, LiveState, OLD_AFTER, PositionDoubt, PositionState,
+    SensorState,
+};

@@ -1,0 +1,66 @@
+//! Results of a dive in the simulated world.
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_ports::LineHistory;
+use headrace_replay::log::Summary;
+
+use super::disk::LeftFile;
+use super::plan::Plan;
+
+/// Result of a dive in a simulated world.
+pub struct DiveResult {
+    /// Faults planned for the dive.
+    pub plan: Plan,
+    /// Packets that the loop took during the dive, in order.
+    pub consumed: Vec<Consumed>,
+    /// Digest of the results.
+    pub digest: u64,
+    /// Results of the lines between devices and loop, one for each device.
+    pub lines: Vec<Line>,
+    /// Summary of the recorder; `None` if it was killed.
+    pub summary: Option<Summary>,
+    /// Number of failed disk operations.
+    pub disk_failures: usize,
+    /// Files of the recording that are left on the disk.
+    pub left: Vec<LeftFile>,
+    /// Number of consumed packets that must be in the log, whichever way the dive ends.
+    pub certain: usize,
+    /// Longest time for which packets waited to be taken although the loop ran.
+    pub longest_wait: DurNs,
+}
+
+/// Result of a replay of the remaining files.
+pub struct Replayed {
+    /// Packets that the loop took.
+    pub consumed: Vec<Consumed>,
+    /// Digest of the results.
+    pub digest: u64,
+    /// Losses that the replay reported.
+    pub losses: Vec<String>,
+}
+
+/// Result of the line of one device.
+#[derive(Debug)]
+pub struct Line {
+    /// Whether the plan has no fault for the device.
+    pub untouched: bool,
+    /// Whether the cable only splits and delays frames.
+    pub lossless: bool,
+    /// Number of frames sent whole.
+    pub whole: u64,
+    /// Number of good frames that the loop found.
+    pub good: u64,
+    /// Counts of openings, losses and dropped packets of the line, and its last status.
+    pub history: LineHistory,
+}
+
+/// A packet that the loop has taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Consumed {
+    /// Source of the packet.
+    pub source: u16,
+    /// Receive time of the packet.
+    pub received: MonoNs,
+    /// Content of the packet.
+    pub bytes: Vec<u8>,
+}
