@@ -94,14 +94,15 @@ impl Adviser {
         if keeps_results {
             stream.keep();
         }
-        part.insert_resource(PlacedTick::default());
+        let nothing = Arc::default();
+        part.insert_resource(PlacedTick(Arc::clone(&nothing)));
         part.insert_resource(AdviceList::default());
         part.insert_state("advisor", advisor);
         part.insert_state("history of advice", AdviceLog::default());
         part.insert_state("stream of advice", AdviceStream(stream));
         part.add_systems(AdviseStage::Advise, advise);
         part.initialize()?;
-        Ok(Self { part, nothing: Arc::default() })
+        Ok(Self { part, nothing })
     }
 
     /// Computes the advice of a tick. Must be called once for each tick, in order.

@@ -64,7 +64,8 @@ impl Surveyor {
             digests.judgements.keep();
         }
         part.insert_state("streams of the surveyor", digests);
-        part.insert_resource(PlacedTick::default());
+        let nothing = Arc::default();
+        part.insert_resource(PlacedTick(Arc::clone(&nothing)));
         part.insert_resource(Classified::with_room());
         part.insert_resource(Cursor::default());
         part.insert_resource(Requests(Vec::with_capacity(sections + MAX_TICK_PACKETS)));
@@ -83,7 +84,7 @@ impl Surveyor {
         part.add_systems(SurveyStage::Judge, judge::judge_due);
         part.add_systems(SurveyStage::Report, standing::report_standing);
         part.initialize()?;
-        Ok(Self { part, nothing: Arc::default() })
+        Ok(Self { part, nothing })
     }
 
     /// Processes the placed pings of a tick. Allocates: never.

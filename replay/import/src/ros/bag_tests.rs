@@ -133,7 +133,7 @@ proptest! {
 }
 
 #[test]
-fn chunks_whose_unpacked_length_differs_from_the_stated_one_are_refused() {
+fn chunks_with_a_false_unpacked_length_are_refused() {
     assert_eq!(unpack(b"none", b"abc", 3, false), Unpacked::Whole(b"abc".to_vec()));
     assert!(matches!(unpack(b"none", b"abc", 4, false), Unpacked::Bad(_)));
     assert_eq!(unpack(b"none", b"abc", 4, true), Unpacked::Cut(b"abc".to_vec()));
