@@ -245,15 +245,16 @@ fn joint<const N: usize>(
     problem(material, scan, &scan.heads, mirrored, 1).fit(start, ROUNDS)
 }
 
-/// Heads that turn the opposite way to the file, and the extra cost of each head's other sense of rotation.
+/// Direction of rotation of each head: whether it is opposite to the direction in the vehicle file, and by how much the
+/// cost of the fit rises if the head turns the other way.
 struct Senses {
     mirrored: Vec<bool>,
     margins: Vec<f64>,
 }
 
 impl Senses {
-    /// Chooses the senses of rotation that fit best, one head at a time. If none is clearly better, keeps the
-    /// file's.
+    /// Chooses the directions of rotation that fit best, one head at a time. Keeps the directions in the vehicle
+    /// file unless others fit clearly better.
     ///
     /// In a symmetric section, there is a second solution: the vehicle is on the other side, and all heads
     /// turn the opposite way. This second solution is tried, too.

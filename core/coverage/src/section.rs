@@ -154,7 +154,8 @@ pub struct Section {
     pub deviation: Deviation,
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// Whether samples have landed within the target T of the section since it was last judged.
+    /// Whether the section must be judged again: since its last judgement, a sample has landed on it or less than
+    /// the target T away from it, or the section became suspect.
     pub(super) stale: bool,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,

@@ -302,7 +302,7 @@ mod tests {
     /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, the rear one of
     /// two heads 0.8 m apart reaches a place 8 s after the front one.
     #[test]
-    fn vehicle_rotation_spans_the_time_between_passes_and_between_heads_along_the_hull() {
+    fn rotation_is_counted_over_the_time_between_passes_and_the_delay_between_heads() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();

@@ -102,8 +102,8 @@ pub(crate) fn advice(of: &Situation) -> Advice {
     Advisor::new(&pipe(), task(), &[], &[]).advise(of, Swing::default(), None)
 }
 
-/// A placed ping with a return after a single step, from a head in the pipe's centre. The angle counts from
-/// the pipe's floor.
+/// A georeferenced ping with a return, from a head in the pipe's centre that has moved one angular step since its
+/// previous ping. The head's angle counts from the pipe's floor.
 pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     let origin = pose(x_m).position;
     let (sin, cos) = math::sin_cos(angle_rad);
@@ -112,7 +112,7 @@ pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     PlacedPing { outcome: Outcome::Sample { point, arc_m }, ..pinged(x_m, angle_rad) }
 }
 
-/// A placed ping without a return, aimed at wall within range, from a head in the pipe's centre.
+/// A georeferenced ping without a return, aimed at wall within range, from a head in the pipe's centre.
 pub(crate) fn pinged(x_m: f64, angle_rad: f64) -> PlacedPing {
     PlacedPing {
         head: 0,

@@ -1,9 +1,9 @@
-//! Returns lost by chance, and the number of passes over a place that makes up for these losses.
+//! Random loss of sonar returns, and the number of passes over a place that makes up for it.
 //!
-//! The model: along a turn, a head loses pings in runs. After Gilbert (1960), the model has two parameters: the share
-//! of lost pings, and their share among the pings after a lost one. Passes lose pings independently of each other. A
-//! run of lost pings widens the circle that fits between two passes. A run as wide as the target removes the pass at
-//! that place.
+//! The model: along a turn, a head loses the returns of several successive pings at a time. After Gilbert (1960), the
+//! model has two parameters: the share of pings that are lost, and the probability that the ping after a lost ping is
+//! lost too. Passes lose pings independently of each other. A run of lost pings widens the largest circle without
+//! samples between two passes. If a run is as wide as the target, the pass counts as missing at that place.
 //!
 //! A return that is lost at the same angle in every turn is not lost by chance, and a slower speed does not restore
 //! it. The caller excludes such losses.

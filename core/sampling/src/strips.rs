@@ -393,9 +393,10 @@ impl Strips {
             .filter(|limit| limit.t_y_m < self.perimeter_m)
     }
 
-    /// Returns the distance between the samples on either side of the thin strips around strip `k`, m.
+    /// Returns the width of the gap that strip `k` and its thin neighbours form, m.
     ///
-    /// Also returns whether these strips are thin only because they lie between sectors.
+    /// The width is the distance between the samples on the gap's two sides. Also returns whether the strips are
+    /// thin only because they lie between the heads' sectors.
     fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> (f64, bool) {
         let count = self.strips.len();
         let thin = |number: usize| {

@@ -109,8 +109,10 @@ fn outline_arc_lengths_match_the_profile() {
     }
 }
 
-/// Whether a section is at least 1.5 m beyond the start, where the position estimate has converged, and its true hole
-/// is below 0.7 m, so that it isn't at the dive's end.
+/// Whether a section can be judged in this test.
+///
+/// It must be at least 1.5 m beyond the start, because the position estimate has converged by then. Its true hole must
+/// be below 0.7 m; a larger hole means that the section is at the end of the dive.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }

@@ -45,7 +45,7 @@ fn golden_logs_replay_to_their_reports_and_printed_text() {
 }
 
 #[test]
-fn every_golden_log_has_scene_report_and_text_and_is_small() {
+fn every_golden_log_is_small_and_has_a_scene_a_report_and_a_text() {
     let logs = names(".mcap");
     assert!(logs.len() >= 10, "{logs:?}");
     for ending in [".scene.toml", ".json", ".snap"] {

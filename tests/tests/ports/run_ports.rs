@@ -167,7 +167,7 @@ fn terminal_blocked_from_the_start_does_not_keep_a_dive_from_ending() {
 }
 
 #[test]
-fn terminal_blocked_within_a_page_does_not_keep_a_dive_from_ending() {
+fn dive_ends_even_if_the_terminal_blocks_in_the_middle_of_a_screen() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let mut terminal = Terminal::open(100);

@@ -268,7 +268,7 @@ fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
 }
 
 #[test]
-fn advice_for_a_swinging_vehicle_is_lower_and_meets_the_target() {
+fn advised_speed_is_lower_for_a_swinging_vehicle_and_meets_the_target() {
     let mut broken = Vec::new();
     for case in &SWINGING {
         let followed = case.followed();

@@ -99,8 +99,8 @@ fn run(event: usize, at_beat: bool) -> RunInput {
     RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
 }
 
-/// Test inputs of a tick: one changed run, a command that acknowledges all alerts, and readings at ten
-/// events.
+/// Alerter with its inputs in one tick: a changed run of flagged sections, a command that acknowledges all
+/// alerts, and ten events, each with one reading.
 struct Bench {
     alerter: Alerter,
     run: RunInput,

@@ -12,7 +12,7 @@ pub enum LogError {
     Create {
         /// Path of the log file.
         path: PathBuf,
-        /// Error of the system.
+        /// Error from the operating system.
         source: io::Error,
     },
     /// The log file could not be opened.
@@ -20,7 +20,7 @@ pub enum LogError {
     Open {
         /// Path of the log file.
         path: PathBuf,
-        /// Error of the system.
+        /// Error from the operating system.
         source: io::Error,
     },
     /// Reading the log fails with an I/O error.
@@ -30,7 +30,7 @@ pub enum LogError {
         name: String,
         /// Offset in the log at which reading failed, bytes.
         offset: u64,
-        /// Error of the system.
+        /// Error from the operating system.
         source: io::Error,
     },
     /// Writing fails with an I/O error: the medium is full, removed or read-only.
@@ -38,7 +38,7 @@ pub enum LogError {
     Write {
         /// Item that was being written.
         what: &'static str,
-        /// Error of the system.
+        /// Error from the operating system.
         source: io::Error,
     },
     /// MCAP can't represent the content.
@@ -130,7 +130,7 @@ pub enum LogError {
     /// The recorder's thread can't be started.
     #[error("could not start the recorder's thread: {source}")]
     Thread {
-        /// Error of the system.
+        /// Error from the operating system.
         source: io::Error,
     },
     /// At the end of a recording, the medium neither accepts data nor fails.

@@ -60,13 +60,13 @@ pub(super) struct State {
 impl State {
     /// Stores the time of a tick that the loop has recorded or skipped.
     pub(super) fn hand(&self, now: MonoNs) {
-        // The dive's time begins with the first tick. Earlier data doesn't count as unsynced.
+        // Dive time that isn't synced to disk yet is counted from the first tick. Data queued earlier is left out.
         if self.handed_ns.swap(now.0, Ordering::Relaxed) == 0 {
             self.certain_ns.fetch_max(now.0, Ordering::Relaxed);
         }
     }
 
-    /// Returns the dive time that may not be on the medium yet.
+    /// Returns the length of the last part of the dive that may not be on the disk yet.
     pub(super) fn unsafe_for(&self) -> DurNs {
         let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
         DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))

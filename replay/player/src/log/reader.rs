@@ -101,7 +101,7 @@ pub struct LogPlace {
     latest: u64,
     late: u64,
     losses: Vec<Loss>,
-    /// Message numbers of the pieces read so far.
+    /// Runs of message numbers in the chunks read so far; `None` if they aren't checked.
     numbering: Option<Numbering>,
     /// Channels whose definitions were found among the messages so far.
     defined: Vec<Definition>,
@@ -152,7 +152,8 @@ pub struct LogReader<R = File> {
     latest: u64,
     late: u64,
     finished: bool,
-    /// Message numbers of the pieces read so far. Only for this program's logs, and only if read from the beginning.
+    /// Runs of message numbers in the chunks read so far, which show missing messages. `None` if another program wrote
+    /// the log, or if reading didn't begin at the log's start.
     numbering: Option<Numbering>,
     /// For each channel, the number of the first message that the next part repeats.
     repeated: BTreeMap<u16, u32>,

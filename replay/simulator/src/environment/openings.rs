@@ -17,9 +17,9 @@ const INSIDE_M: f64 = 1e-6;
 /// Step along a hollow at which the hollow's length is sampled, m.
 const STEP_M: f64 = 0.5;
 
-/// Reads a ditch across the floor: an upright box.
+/// Reads a rock trap from the scene: a ditch across the floor, modelled as an upright box.
 ///
-/// Errors: a key is missing or out of range, or the trap is wider than the tunnel.
+/// Errors: a key is missing or out of range, or the rock trap is wider than the tunnel.
 pub(super) fn rock_trap(
     table: &Section<'_>,
     ground: Ground<'_>,

@@ -280,7 +280,7 @@ fn within(
 }
 
 #[test]
-fn filling_disk_keeps_small_messages_and_records_omissions() {
+fn recorder_on_a_nearly_full_disk_keeps_small_messages_and_records_omissions() {
     let (medium, flushed) = slow(0);
     let mut header = header(true);
     header.results.push(ResultChannel {
