@@ -1,4 +1,4 @@
-//! Dives whose placed pings are copied out of the loop, as input of coverage oracles.
+//! Dives whose georeferenced pings are copied out of the loop, as input of coverage oracles.
 
 use headrace_geometry::frames::{Mount, Pose};
 use headrace_geometry::math::TAU;

@@ -23,7 +23,7 @@ pub struct Evidence {
     /// All heads are assumed to turn as scheduled. The value is the planned speed if this speed meets the target, and
     /// zero if no speed does.
     pub fits_mps: f64,
-    /// `fits_mps` reduced for lost returns, m/s; never above `fits_mps`.
+    /// Largest speed that would have met the target despite lost returns, m/s; never above `fits_mps`.
     ///
     /// The speed leaves time for the additional passes that replace lost returns.
     pub with_losses_mps: f64,

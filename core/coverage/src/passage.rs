@@ -50,19 +50,21 @@ pub struct Drive {
     pub planned_mps: f64,
     /// Longest time between two passes of the heads that turned, seconds.
     pub gap_s: f64,
-    /// Time `gap_s` if the heads that turned were evenly spread, seconds.
+    /// Longest time between two passes if the heads that turned were evenly spread, seconds.
     pub even_gap_s: f64,
-    /// Time `gap_s` if all heads were turning, with none silent or stalled, seconds.
+    /// Longest time between two passes if all heads were turning, with none silent or stalled, seconds.
     pub healthy_gap_s: f64,
-    /// Time `gap_s` if all heads' angles were as scheduled, at the present speed, seconds.
+    /// Longest time between two passes if all heads' angles were as scheduled, at the present speed, seconds.
     pub planned_gap_s: f64,
-    /// Time `gap_s` if all configured heads were turning and evenly spread, seconds.
+    /// Longest time between two passes if all configured heads were turning and evenly spread, seconds.
     pub all_gap_s: f64,
-    /// Time `gap_s` at the planned speed, or at this speed if none is planned, seconds.
+    /// Longest time between two passes at the planned speed, or at the driven speed if none is planned,
+    /// seconds.
     pub gap_at_plan_s: f64,
-    /// Time `healthy_gap_s` at the planned speed, seconds.
+    /// Longest time between two passes at the planned speed if all heads were turning, seconds.
     pub healthy_at_plan_s: f64,
-    /// Time `gap_s` at the planned speed for the heads that turn and never stalled, seconds.
+    /// Longest time between two passes at the planned speed of the heads that turn and never stalled,
+    /// seconds.
     ///
     /// Their angles are as scheduled.
     pub left_at_plan_s: f64,

@@ -13,7 +13,7 @@ use headrace_geometry::time::MonoNs;
 /// Across a wider gap, the speed that one section needs is no evidence for the next section.
 const JOIN_M: f64 = 0.5;
 
-/// Number of a run. It is never used for another run.
+/// Number of a run of failed sections. It is never used for another run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
@@ -49,7 +49,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether an open run's figures agree: its ends, the counts of its sections, and its largest hole.
+    /// Whether the figures of a run that isn't cleared agree: its ends, the counts of its sections, and its
+    /// largest hole.
     fn is_consistent(&self) -> bool {
         let Self { from, to, failed, .. } = *self;
         let is_counted = self.counts.iter().all(|count| *count <= failed) && self.tally.is_of(failed);
@@ -126,10 +127,10 @@ impl Run {
     }
 }
 
-/// Kind of change of a run.
+/// Kind of change of a run of failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunChange {
-    /// The run is new.
+    /// The run of failed sections is new.
     Raised,
     /// The ends, the causes or the largest hole of the run have changed.
     Changed,
@@ -139,7 +140,7 @@ pub enum RunChange {
     Merged,
 }
 
-/// All runs of a dive.
+/// All runs of failed sections in a dive.
 #[derive(Debug, Clone)]
 pub struct Runs {
     first: i64,
@@ -147,7 +148,7 @@ pub struct Runs {
     runs: Vec<Run>,
     /// For each section: number of its run plus one, or zero.
     member: Vec<u32>,
-    /// Causes and required speed of each section that belongs to a run.
+    /// Causes of the fail, and required speed, of each section that belongs to a run.
     failing: Vec<Failing>,
 }
 
@@ -173,12 +174,12 @@ impl Runs {
         Self { first, join, runs: Vec::with_capacity(count), member, failing }
     }
 
-    /// Returns all runs so far, by number.
+    /// Returns all runs of failed sections so far, by number.
     pub fn all(&self) -> &[Run] {
         &self.runs
     }
 
-    /// Returns a run by its number.
+    /// Returns the run of failed sections with this number.
     pub fn get(&self, id: RunId) -> Option<&Run> {
         self.runs.get(id.0 as usize)
     }
@@ -360,7 +361,7 @@ impl Runs {
         }
     }
 
-    /// Updates a run for a section that was just added.
+    /// Updates a run's figures for a section that was just added to it.
     fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let (hole, failing) = ((telling.hole)(section), self.failing_at(section));
         if let Some(run) = self.runs.get_mut(id.0 as usize) {

@@ -161,7 +161,8 @@ pub struct Section {
     pub doubtful: u32,
     /// Whether the section holds samples of a head that was distrusted soon after.
     pub suspect: bool,
-    /// Number of the newest visit at the time when this head became distrusted.
+    /// Number of the vehicle's newest visit to the section at the time when a head with samples there became
+    /// distrusted.
     suspected_in: u32,
     /// Visits of the vehicle with samples within the target T of the section.
     pub(super) visits: Visits,

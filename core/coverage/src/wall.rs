@@ -64,17 +64,17 @@ struct Run {
 }
 
 impl Run {
-    /// Number of waiting returns.
+    /// Number of the run's returns that wait for classification.
     fn count(&self) -> u32 {
         u32::from(self.waits)
     }
 
-    /// Returns the waiting returns of the run.
+    /// Returns the run's returns that wait for classification.
     fn returns(&self) -> impl Iterator<Item = &PlacedReturn> {
         self.waiting.iter().take(usize::from(self.waits))
     }
 
-    /// Adds a waiting return to the run.
+    /// Adds a return that waits for classification to the run.
     fn add(&mut self, placed: &PlacedReturn, limits: &WallLimits) {
         debug_assert!(!self.is_full(), "a run is given up when {MOST_WAITING} returns wait: {}", self.waits);
         let first = *self.first.get_or_insert(*placed);

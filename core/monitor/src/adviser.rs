@@ -29,7 +29,7 @@ const SLOWEST_MPS: f64 = 0.05;
 /// Part of the loop that computes the advice.
 pub struct Adviser {
     part: Part<AdviseStage>,
-    /// Empty tick for the placer's values. The adviser keeps it as a placeholder between ticks.
+    /// Empty placer results. The adviser holds them between two ticks, in place of the results of a tick.
     nothing: Arc<Placed>,
 }
 

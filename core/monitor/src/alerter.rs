@@ -22,7 +22,7 @@ use headrace_sensor::reading::SourceId;
 
 /// Largest share of the target that position errors may use up. Above it, the position is doubtful.
 const SPREAD_SHARE: f64 = 0.2;
-/// Maximum notices per alert in the list and tick. An alert may change several times in a tick.
+/// Maximum number of notices in a tick per alert in the list. An alert may change several times in a tick.
 const NOTICES_PER_ALERT: usize = 4;
 
 /// Alerts, notes and the live state.
@@ -45,7 +45,7 @@ pub struct Alerter {
 impl Alerter {
     /// Creates the alerter. `keeps_results` says whether its streams keep the contents of each tick.
     ///
-    /// `runs` is the maximum number of runs that change in a tick. Allocates: all memory.
+    /// `runs` is the maximum number of runs of missed sections that change in a tick. Allocates: all memory.
     pub(super) fn new(
         list: AlertList,
         state: &LiveState,
@@ -94,7 +94,7 @@ impl Alerter {
         self.state.now = now;
     }
 
-    /// Applies the changes of runs that were judged at the end of a dive.
+    /// Applies the changes of runs of missed sections that were judged at the end of a dive.
     pub(super) fn take_runs_at_end(&mut self, runs: &[RunInput]) {
         self.notices.clear();
         for run in runs {
@@ -207,13 +207,13 @@ struct Inputs<'a> {
     runs: &'a [RunInput],
     commands: &'a [ReceivedCommand],
     events: &'a [Event],
-    /// Number of runs, commands and events applied so far.
+    /// Number of the tick's changed runs of missed sections, commands and events applied so far.
     taken: (usize, usize, usize),
 }
 
 impl Alerter {
-    /// Applies everything that was consumed before an advice update. `event` is the index of the first event
-    /// after the update.
+    /// Applies all inputs of the tick that came before an advice update. `event` is the index of the first
+    /// event after the update.
     fn take_before(&mut self, event: usize, inputs: &mut Inputs<'_>) {
         self.take_until(Some(event), inputs);
         self.hear(inputs, event);
@@ -247,7 +247,7 @@ impl Alerter {
         inputs.taken.2 = until.max(inputs.taken.2);
     }
 
-    /// Applies changed runs and commands up to an advice update, or all of them.
+    /// Applies changed runs of missed sections, and commands, up to an advice update, or all of them.
     ///
     /// A command comes before the results of the event that follows it.
     fn take_until(&mut self, beat: Option<usize>, inputs: &mut Inputs<'_>) {

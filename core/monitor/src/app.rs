@@ -24,9 +24,9 @@ pub trait Plugin {
 /// Builder of the loop. [`App::arm`] makes it ready to run.
 pub struct App {
     pub(super) mission: Mission,
-    /// World that converts packets to placed pings.
+    /// World that converts packets to georeferenced pings.
     pub placer: Part<PlaceStage>,
-    /// World that converts placed pings to verdicts.
+    /// World that converts georeferenced pings to verdicts on tunnel sections.
     pub surveyor: Part<SurveyStage>,
     /// World that computes the speed advice.
     pub adviser: Part<AdviseStage>,

@@ -1,7 +1,7 @@
 //! Traits of a byte ring with one writer and one reader. Each push becomes visible as a whole.
 //!
-//! The rings are those of the crate ringbuf. The protocols use only these traits. The same code therefore
-//! runs on a ring that explores every interleaving (feature `model`).
+//! The loop's rings come from the crate ringbuf. Code that reads or writes packets uses only these traits, so
+//! it also runs on a ring that explores every interleaving (feature `model`).
 
 use ringbuf::traits::{Consumer, Producer};
 

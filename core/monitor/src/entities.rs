@@ -216,7 +216,7 @@ pub(super) struct LastSample {
     pub(super) point: Point3<Tunnel>,
     /// Arc length of the sample, m.
     pub(super) arc_m: f64,
-    /// Whether each ping since this sample has been a single step with a return.
+    /// Whether, at each ping since this sample, the head has moved a single angular step and got a return.
     pub(super) unbroken: bool,
 }
 

@@ -12,12 +12,12 @@ const SAME_ANGLE_RAD: f64 = 1e-6;
 /// Minimum angle over which the turn rate is measured, radians. Until the head has turned that far, the whole
 /// angle so far is used.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
-/// Multiple of the usual step between pings. A longer step counts as several steps, because pings were
-/// skipped.
+/// Multiple of the usual angular step between pings. A longer step counts as several steps, because pings
+/// were skipped.
 const LONG_STEP: f64 = 1.5;
 
-/// Multiples of the usual step, and of the angle expected at the turn rate. A step that exceeds both shows
-/// that the head has restarted at another angle.
+/// Multiples of the usual angular step between pings, and of the angle expected at the turn rate. A step that
+/// exceeds both shows that the head has restarted at another angle.
 ///
 /// A head that lags behind its programmed angle catches up in steps of at most eight times the usual step.
 const ELSEWHERE_STEPS: f64 = 10.0;
@@ -29,7 +29,7 @@ const STANDING: DurNs = DurNs(1_000_000_000);
 /// Classification of a ping by the head's motion since the previous ping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turned {
-    /// Whether the head has moved a single step since the previous ping.
+    /// Whether the head has moved a single angular step since the previous ping.
     pub single_step: bool,
     /// Whether a new sweep begins: the head has reversed, or its motion is unknown.
     pub new_sweep: bool,
@@ -41,7 +41,7 @@ pub struct Turned {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct MeasuredMotion {
     last: Option<(MonoNs, f64)>,
-    /// Signed angle of the last step, radians.
+    /// Signed angle by which the head moved last, radians.
     last_step_rad: f64,
     /// Unsigned angle turned through since the last turning point or start, radians.
     since_turning_rad: f64,

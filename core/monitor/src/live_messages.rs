@@ -21,15 +21,15 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Interval of the messages on coverage extent and metres by verdict, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
-/// Minimum length of a run with an unreported cause before that cause is reported, m.
+/// Minimum length of missed sections, m, for which a cause that wasn't reported before is reported.
 const LASTS_M: f64 = 1.0;
 
 /// A live message. The field names are the contract of `--json-lines`. Lengths are in m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum LiveMessage {
-    /// Sections were missed. If a run continues with another cause, the message is repeated from the first
-    /// section with that cause.
+    /// Sections were missed. If a run of missed sections continues with another cause, the message is
+    /// repeated from the first section with that cause.
     Flag {
         /// Number of the run of flagged sections.
         run: u32,
@@ -43,20 +43,20 @@ pub enum LiveMessage {
         #[serde(skip)]
         missed: Missed,
     },
-    /// The end of the most recently flagged run is known.
+    /// The end of the run of sections that was most recently flagged as missed is known.
     FlagEnds {
         /// Number of the run of flagged sections.
         run: u32,
-        /// Beginning of the run.
+        /// Beginning of the run of missed sections.
         from_m: f64,
-        /// End of the run.
+        /// End of the run of missed sections.
         to_m: f64,
-        /// Metres of the run that fail.
+        /// Metres of the run's sections that fail at present.
         failed_m: f64,
     },
     /// The vehicle has driven through a missed stretch again, and none of its sections fails any more.
     Cleared {
-        /// Number of the run that was flagged.
+        /// Number of the run of sections that was flagged as missed.
         run: u32,
         /// Beginning of the cleared stretch.
         from_m: f64,
@@ -95,15 +95,17 @@ pub enum LiveMessage {
 /// A dive has one converter. All readers share its messages.
 #[derive(Debug, Default)]
 pub struct LiveMessages {
-    /// Most recently flagged run with its reported causes, until its end is reported.
+    /// Run of sections that was most recently flagged as missed, with its reported causes, until its end is
+    /// reported.
     run: Option<(RunId, Causes)>,
     /// Stretches reported as missed, as long as any of their sections fails.
     missed: Vec<ReportedMiss>,
-    /// Last reported unsure stretch, until its end is reported.
+    /// Last reported stretch without a verdict, until its end is reported.
     unsure: Option<Stretch>,
-    /// Whether the unsure stretch was reported as one in which the error matters more than the hole.
+    /// Whether the stretch without a verdict was reported as one in which the hole's error, rather than its
+    /// size, prevents a verdict.
     told_as_error: bool,
-    /// Unsure stretches whose ends were reported.
+    /// Stretches without a verdict whose ends were reported.
     told: Vec<Stretch>,
     /// Sections at an end of the coverage extent. Their message is held back until the vehicle is well away
     /// from them.
@@ -252,7 +254,8 @@ impl LiveMessages {
         if let Some(last) = &mut self.unsure
             && (is_told(last) || last.join(&here, section_m))
         {
-            // The first sections of an unsure stretch may have a different reason than most of its sections.
+            // The first sections of a stretch without a verdict may lack it for another reason than most of
+            // the sections.
             if self.told_as_error && !last.is_mostly_error() {
                 self.told_as_error = false;
                 tell(LiveMessage::CannotSay(UnsureStretch::of(last, sections)));
@@ -271,10 +274,10 @@ impl LiveMessages {
         }
     }
 
-    /// Reports the end of the most recently flagged run once a section beyond the run has a verdict other
-    /// than fail.
+    /// Reports the end of the most recently flagged run of sections once a section beyond the run has a
+    /// verdict other than fail.
     fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
-        // An open section, which may still get samples, may still join the run.
+        // An open section, which may still get samples, may still join the run of missed sections.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|(id, _)| sections.runs().get(id));
@@ -295,7 +298,7 @@ impl LiveMessages {
         let sections = &dive.view().coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
         match change {
-            // A run within a reported stretch is not a new stretch.
+            // A run of missed sections within a reported stretch is not a new stretch.
             RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
             RunChange::Raised => {
                 self.close_run(sections, tell);
@@ -319,7 +322,7 @@ impl LiveMessages {
         }
     }
 
-    /// Merges a grown run into the reported stretches that it meets.
+    /// Merges a run of missed sections that has grown into the reported stretches that it touches.
     fn widen(&mut self, run: &Run) {
         let mut met = self.missed.iter().filter(|told| told.meets(run));
         let Some(mut whole) = met.next().copied() else { return };
@@ -348,7 +351,7 @@ impl LiveMessages {
         self.close_unsure(sections, tell);
     }
 
-    /// Reports a run again if at least a metre of it fails for a cause that was not reported yet.
+    /// Reports a run of missed sections again if at least a metre of it fails for a cause not reported yet.
     ///
     /// A pilot who follows only the earlier advice may miss that wall again.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
@@ -372,9 +375,10 @@ fn alert_change(change: AlertChange, alert: &ListedAlert, at: MonoNs, dive: &Loo
     LiveMessage::AlertChange { change, alert: Box::new(alert.json(&dive.view().surroundings(), at)) }
 }
 
-/// The reported unsure stretch with the present state of its sections, but with the ends that were reported.
+/// The reported stretch without a verdict, with the present state of its sections, but with the ends that
+/// were reported.
 ///
-/// If no section is unsure any more, returns the stretch as it was reported.
+/// If every section has a verdict by now, returns the stretch as it was reported.
 fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     let each = (told.from..told.to).filter_map(|index| sections.unsure(index));
     let mut each = each.filter(|here| here.why == told.why);
@@ -389,7 +393,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     now
 }
 
-/// Message that reports a run as missed, beginning at one of its sections.
+/// Message that reports a run of sections as missed, beginning at one of these sections.
 fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> LiveMessage {
     let sections = &dive.view().coverage().sections;
     let from_m = sections.bounds_m(section).0;

@@ -87,7 +87,7 @@ pub struct PlacedPing {
     pub fix: Option<Fix>,
     /// Chainages at which the head places samples at this attitude; `None` without a fix.
     pub reach: Option<Reach>,
-    /// Whether the head has moved a single step since its previous ping.
+    /// Whether the head has moved a single angular step since its previous ping.
     pub single_step: bool,
     /// Whether a new sweep of the head has begun with this ping.
     pub new_sweep: bool,
@@ -99,7 +99,7 @@ pub struct PlacedPing {
     pub angle_rad: f64,
     /// Whether the vehicle occludes the beam at this angle.
     pub hidden: Hidden,
-    /// Longest range at the head's setting, m.
+    /// Longest range that the head can measure at its range setting, m.
     pub longest_m: f64,
     /// Source of the ping's packet.
     pub source: SourceId,
@@ -123,17 +123,17 @@ pub struct Update {
     pub sd: Option<PoseSd>,
 }
 
-/// A ping or an advice update, placed in the tunnel.
+/// A ping or an advice update, with its position in the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "the list is filled once and read once per tick")]
 pub enum Placement {
-    /// A placed ping.
+    /// A georeferenced ping.
     Ping(PlacedPing),
     /// An advice update.
     Update(Update),
 }
 
-/// A placed ping or update, and its position among the tick's readings.
+/// A georeferenced ping or an advice update, and its position among the tick's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedItem {
     /// Index of the ping's reading. For an update: index of the first reading after it.

@@ -1,4 +1,4 @@
-//! Predicted effect of alternative head settings: a finer step or a longer range.
+//! Predicted effect of alternative head settings: a finer angular step or a longer range.
 //!
 //! With either, a turn takes longer. The prediction of a section's hole allows for that.
 
@@ -18,7 +18,7 @@ use headrace_vehicle::Mission;
 
 /// Longest range setting that the search tries, m. Settings are tried in whole metres.
 const LONGEST_M: u32 = 200;
-/// Steps that differ by at most this angle count as equal, radians.
+/// Angular steps of a head that differ by at most this angle count as equal, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
 
 impl HeadSpecification {
@@ -86,8 +86,8 @@ fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(
     longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
-/// Largest ratios of step and turn period, alternative to present setting. The head with the largest change
-/// decides for the vehicle.
+/// Largest ratios of a head's angular step and turn period with the alternative setting to those with the
+/// present one. The head with the largest change decides for the vehicle.
 pub(super) fn of_heads(world: &mut World, profile: &Profile, target_m: f64) -> OtherSettings {
     let mut heads = world.query::<&HeadSpecification>();
     let farthest_m = profile.farthest_m(profile.reference());

@@ -1,6 +1,6 @@
-//! The placer: the world that converts packets to readings, fixes and placed pings.
+//! The placer: the world that converts packets to readings, fixes and georeferenced pings.
 //!
-//! Its entities are the vehicle and its sensors. No result of another part reaches it.
+//! Its entities are the vehicle and its sensors. It uses no results of the loop's other parts.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -36,7 +36,7 @@ use sound_speed::SoundSpeed;
 /// Capacity for the readings of one tick. The shortest frame of any device has over ten bytes.
 pub(super) const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
 
-/// Part of the loop that converts packets to placed pings.
+/// Part of the loop that converts packets to georeferenced pings.
 pub struct Placer {
     part: Part<PlaceStage>,
     readers: Vec<PortReader>,
@@ -51,7 +51,7 @@ pub struct Placed {
     pub inbox: Inbox,
     /// Readings of the tick, in order.
     pub events: Vec<Event>,
-    /// Placed pings and updates of the tick, in order.
+    /// Georeferenced pings and advice updates of the tick, in order.
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
     pub(super) commands: Commands,
@@ -66,7 +66,7 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// Placed pings of the tick, in order.
+    /// Georeferenced pings of the tick, in order.
     pub fn pings(&self) -> impl Iterator<Item = &PlacedPing> {
         self.items.iter().filter_map(|item| match &item.placement {
             Placement::Ping(ping) => Some(ping),
@@ -74,7 +74,7 @@ impl Placed {
         })
     }
 
-    /// Updates of the tick, in order.
+    /// Advice updates of the tick, in order.
     pub fn updates(&self) -> impl Iterator<Item = &Update> {
         self.items.iter().filter_map(|item| match &item.placement {
             Placement::Update(update) => Some(update),

@@ -103,7 +103,7 @@ impl Stateful for Finder {
 /// Result streams of the surveyor.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
-    /// Result stream of the placed pings.
+    /// Result stream of the georeferenced pings.
     pub pings: ResultStream,
     /// Result stream of the section judgements.
     pub judgements: ResultStream,

@@ -19,7 +19,7 @@ pub enum RecordKind {
     NoSample = 2,
     /// A judged section.
     Section = 3,
-    /// A changed run of sections.
+    /// A changed run of sections that are flagged as missed.
     Run = 4,
     /// Speed advice.
     Advice = 5,
@@ -92,7 +92,7 @@ const POSE: [(&str, WordKind); 13] = [
     ("j", WordKind::Number),
     ("k", WordKind::Number),
     ("speed_mps", WordKind::Number),
-    // Present only if navigation provides standard deviations.
+    // The standard deviations are present only if the navigation method provides them.
     ("along_sd_m", WordKind::Number),
     ("place_sd_m", WordKind::Number),
     ("tilt_sd_rad", WordKind::Number),
@@ -126,7 +126,7 @@ const ALERT: [(&str, WordKind); 5] = [
     ("kind", WordKind::Integer),
     ("x_m", WordKind::Number),
     ("off_m", WordKind::Number),
-    // Present only if the observation names a source.
+    // The source is present only if the observation names one.
     ("source", WordKind::Integer),
 ];
 /// Names and types of the words in a judged section's record.
@@ -140,7 +140,7 @@ const SECTION: [(&str, WordKind); 17] = [
     ("cause", WordKind::Integer),
     ("hole_x_m", WordKind::Number),
     ("hole_arc_m", WordKind::Number),
-    // The following words are present only if the section has a cause.
+    // The following words are present only if the section has evidence for the cause of a fail.
     ("speed_mps", WordKind::Number),
     ("t_y_m", WordKind::Number),
     ("middle_t_y_m", WordKind::Number),
@@ -148,7 +148,7 @@ const SECTION: [(&str, WordKind); 17] = [
     ("swing_m", WordKind::Number),
     ("silent_heads", WordKind::Integer),
     ("causes", WordKind::Integer),
-    // Present only if lost returns reduce the speed.
+    // Records of earlier program versions lack this word.
     ("with_losses_mps", WordKind::Number),
 ];
 

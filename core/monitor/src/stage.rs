@@ -10,7 +10,7 @@ pub trait Stage: SystemSet + Copy + PartialEq {
     const ALL: &'static [Self];
 }
 
-/// Stages of the placer: from packets to placed pings.
+/// Stages of the placer: from packets to georeferenced pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum PlaceStage {
     /// Converts the bytes of sensor packets to readings.
@@ -25,20 +25,22 @@ impl Stage for PlaceStage {
     const ALL: &'static [Self] = &[Self::Decode, Self::Navigate, Self::Georeference];
 }
 
-/// Stages of the surveyor: from placed pings to verdicts.
+/// Stages of the surveyor: from georeferenced pings to verdicts.
 ///
-/// Verdicts decide which sections are due next. The stages from [`Self::Walk`] to [`Self::Report`] therefore
-/// run once per stop. A stop is a ping that makes sections due, or an update. [`Self::Classify`] runs once
-/// per tick with pings or updates, [`Self::Surveyed`] once per tick.
+/// Verdicts decide which sections are due for judging next. The stages from [`Self::Walk`] to
+/// [`Self::Report`] therefore run once per stop. A stop is a ping that makes sections due, or an advice
+/// update. [`Self::Classify`] runs once per tick with pings or updates, [`Self::Surveyed`] once per tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum SurveyStage {
     /// Decides which returns are wall.
     Classify,
-    /// Converts pings to samples and passes, up to the next ping that makes sections due or the next update.
+    /// Converts pings to samples and passes, up to the next ping that makes sections due for judging, or the
+    /// next advice update.
     Walk,
     /// Judges the sections that are due.
     Judge,
-    /// Reports metres by verdict and the observations that hold, if the stop is an update.
+    /// Reports metres by verdict and the observations that hold, if the surveyor has stopped at an advice
+    /// update.
     Report,
     /// Reserved for plugins that read the verdicts.
     Surveyed,

@@ -1,4 +1,5 @@
-//! The surveyor: the world that converts placed pings to samples, passes, sections, verdicts and runs.
+//! The surveyor: the world that converts georeferenced pings to samples, passes, verdicts on sections, and
+//! runs of missed sections.
 //!
 //! Its entities are the heads.
 
@@ -40,10 +41,10 @@ use headrace_geometry::time::MonoNs;
 pub use survey::Found;
 use survey::{Cursor, Requests};
 
-/// Part of the loop from placed pings to verdicts.
+/// Part of the loop that converts georeferenced pings to verdicts.
 pub struct Surveyor {
     part: Part<SurveyStage>,
-    /// Empty tick for the placer's values. The surveyor keeps it as a placeholder between ticks.
+    /// Empty placer results. The surveyor holds them between two ticks, in place of the results of a tick.
     nothing: Arc<Placed>,
 }
 
@@ -87,7 +88,7 @@ impl Surveyor {
         Ok(Self { part, nothing })
     }
 
-    /// Processes the placed pings of a tick. Allocates: never.
+    /// Processes the georeferenced pings of a tick. Allocates: never.
     pub(super) fn tick(&mut self, placed: &Arc<Placed>) {
         let Self { part, nothing } = self;
         part.world.resource_mut::<Found>().clear();

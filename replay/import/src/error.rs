@@ -13,7 +13,7 @@ pub enum ImportError {
         name: String,
         /// Offset in the file at which reading failed, bytes.
         offset: u64,
-        /// Error of the system.
+        /// Error from the operating system.
         source: std::io::Error,
     },
     /// The file to import contains no entry.

@@ -44,10 +44,10 @@ pub enum SmoothError {
         folder: PathBuf,
         /// Length of the temporary file, bytes.
         bytes: u64,
-        /// Error of the system.
+        /// Error from the operating system.
         source: std::io::Error,
     },
-    /// Steps were lost, because the filter produced them faster than they were stored.
+    /// Filter steps were lost, because the filter produced them faster than they were stored.
     #[error("keeping the filter's steps: {lost} steps of a tick were lost; a tick may have up to {queued}")]
     Lost {
         /// Number of lost filter steps.

@@ -17,7 +17,8 @@ use headrace_monitor::run::Loop;
 
 use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 
-/// Maximum number of threads for one loop: one for placing pings, one for advising, and one for all remaining work.
+/// Maximum number of threads for one loop: one for georeferencing pings, one for the speed advice,
+/// and one for all remaining work.
 pub const MOST_THREADS: usize = 3;
 
 /// Number of ticks in a batch. One queue operation then passes some milliseconds of work.
@@ -27,7 +28,7 @@ const MOST_WAITING: usize = 4;
 /// Capacity of the queue of used batches. It fits the batches of two queues, and the batches being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 
-/// A tick, with its placed pings and its advice.
+/// A tick, with its georeferenced pings and its speed advice.
 #[derive(Default)]
 struct Tick {
     /// Time at the end of the tick.
@@ -45,14 +46,15 @@ struct Batch {
 }
 
 impl Batch {
-    /// Runs the placer of pings for the next tick.
+    /// Runs the placer, which georeferences pings, for the next tick.
     fn place(&mut self, placer: &mut Placer, now: MonoNs) {
         if self.len == self.ticks.len() {
             self.ticks.push(Tick::default());
         }
         let tick = &mut self.ticks[self.len];
         tick.now = now;
-        // A loop may still hold the placed pings of its last tick. Those of all other ticks can be overwritten.
+        // A loop may still hold the georeferenced pings of its last tick. Those of all other ticks can be
+        // overwritten.
         if Arc::get_mut(&mut tick.placed).is_none() {
             tick.placed = Arc::default();
         }
@@ -138,7 +140,7 @@ fn drive_parts(
     })
 }
 
-/// Runs the steps of a tick that follow placing and advising. Waits while an outlet is too slow.
+/// Runs the steps of a tick that follow georeferencing and speed advice. Waits while an outlet is too slow.
 fn run_tick(dive: &mut Loop, tick: &mut Tick, after_tick: &mut dyn FnMut(&Loop)) {
     while !dive.tick_placed(tick.now, &tick.placed, &mut tick.advised) {
         after_tick(dive);
@@ -147,8 +149,8 @@ fn run_tick(dive: &mut Loop, tick: &mut Tick, after_tick: &mut dyn FnMut(&Loop))
     after_tick(dive);
 }
 
-/// Places the pings of a packet source until the source ends or no receiver takes batches any more. `unused` returns
-/// batches for reuse.
+/// Georeferences the pings of a packet source until the source ends or no receiver takes batches any more.
+/// `unused` returns batches for reuse.
 fn place(
     placer: &mut Placer,
     mut driver: Driver,
@@ -189,8 +191,8 @@ fn place(
 
 /// Runs several loops until the source ends, with the navigation of the first loop.
 ///
-/// Packets are decoded and pings are placed only once. Each loop gives the results that it would give alone. The
-/// loops must be armed with the same navigation, which can't be checked.
+/// Packets are decoded and pings are georeferenced only once. Each loop gives the results that it would give
+/// alone. The loops must be armed with the same navigation, which can't be checked.
 ///
 /// Errors: see [`DriveError`]; loops differ in more than the target, the sections and the requirements on them.
 pub fn drive_together(
@@ -269,7 +271,8 @@ fn drive_all(
     })
 }
 
-/// For each loop, runs advice (for the loop's own target) and judging of all ticks in a batch of placed pings.
+/// For each loop, runs advice (for the loop's own target) and judging of all ticks in a batch of
+/// georeferenced pings.
 fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
     let mut own = Tick::default();
     for (dive, adviser) in dives {

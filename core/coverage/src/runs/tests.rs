@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs under test, together with the section states that they must match.
+/// Runs of failed sections under test, together with the section states that they must match.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -49,7 +49,7 @@ impl Rig {
         runs.set(section, failing, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
-    /// Checks every open run against the sections.
+    /// Checks every run that isn't cleared against the states of its sections.
     fn check(&self) {
         let failing = |index: i64| self.failing[usize::try_from(index + 5).unwrap()];
         let causes = |index: i64| failing(index).map(|failing| failing.causes);
@@ -137,7 +137,7 @@ fn most_frequent_cause_of_a_run_is_its_main_cause() {
         rig.say(section, Some(Cause::TooFast), 1.0);
     }
     assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "a cause of one section in 22 isn't named");
-    // All sections but the first are judged again.
+    // All failed sections except the first are judged again, with another cause.
     for section in 1..22 {
         rig.say(section, Some(Cause::HeadSilent), 1.0);
     }
@@ -161,7 +161,7 @@ fn run_splits_when_its_middle_sections_pass_and_the_first_part_keeps_the_number(
 }
 
 proptest! {
-    /// Runs match the section states after any sequence of updates.
+    /// Runs of failed sections match the section states after any sequence of updates.
     #[test]
     fn runs_match_the_section_states(
         said in proptest::collection::vec((-5..COUNT - 5, 0_u8..4, 0.1_f64..3.0), 1..300),

@@ -35,10 +35,10 @@ impl Node {
     }
 }
 
-/// A cell of an open brick.
+/// A cell of an open brick, which is a stretch of wall whose samples are unpacked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CellAt {
-    /// Slot of the open brick.
+    /// Index of the slot that holds the cell's brick.
     pub slot: usize,
     /// Row of the cell within the brick.
     pub row: usize,
@@ -60,7 +60,8 @@ struct Chain {
     last: Link,
 }
 
-/// A fixed number of open bricks with a common pool of samples.
+/// A fixed number of open bricks (stretches of wall near the vehicle), with a common pool of unpacked
+/// samples.
 #[derive(Debug, Clone)]
 pub(super) struct OpenBricks {
     rows: usize,

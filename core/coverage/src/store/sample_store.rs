@@ -10,11 +10,11 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::head::MAX_HEADS;
 
-/// Number of bricks open at a time.
+/// Number of bricks (stretches of wall) that are open at a time, which means that their samples are unpacked.
 ///
 /// Each brick is at least a metre long, so the open bricks extend beyond any search radius on either side.
 const OPEN_BRICKS: usize = 64;
-/// Minimum length of a brick, m.
+/// Minimum length of a brick, a stretch of wall whose samples are packed together, m.
 const BRICK_M: f64 = 1.0;
 /// Maximum number of rows per brick, because an open brick has a bit for each row in a `u32`.
 const MOST_ROWS: usize = 32;

@@ -8,25 +8,27 @@ use crate::pilot_text::CauseFigures;
 use headrace_coverage::{RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;
 
-/// A changed run of flagged sections, with its figures at the time of the change.
+/// A changed run of neighbouring sections that are flagged as missed, with its figures at the time of the
+/// change.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunInput {
     /// Index of the event at which the run was judged. If it was judged at an advice update: index of the
     /// event after the update.
     pub(crate) event: usize,
-    /// Whether the run was judged at an update before that event.
+    /// Whether the run was judged at an advice update before the event with the index `event`.
     pub(crate) at_beat: bool,
     pub(crate) at: MonoNs,
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
     pub(super) stretch: (i64, i64),
-    /// Causes of the missed run, and arc length of its largest hole, m.
+    /// Causes for which the run of sections was missed, and arc length of the run's largest hole, m.
     pub(super) causes: Option<(CauseFigures, f64)>,
     pub(super) merged_into: Option<RunId>,
 }
 
 impl RunInput {
-    /// Alert input for a run that a judgement changed; `None` if there is no such run.
+    /// Alert input for a run of flagged sections that a judgement has changed; `None` if there is no such
+    /// run.
     pub(crate) fn of(
         (event, at_beat): (usize, bool),
         at: MonoNs,
@@ -77,8 +79,8 @@ impl AlertList {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
-        // A run that a later pass has split off from a missed stretch is covered by the alert of that
-        // stretch.
+        // If a later pass has split this run off from a missed stretch of sections, the alert of that stretch
+        // covers it.
         let (from, until) = input.stretch;
         let has = |alert: &&ListedAlert| {
             alert.kind == ListKind::Missed
@@ -99,7 +101,8 @@ impl AlertList {
         self.set_alert_of(input.id, number);
     }
 
-    /// Adapts an alert to a run that has grown, or that has shrunk if it is the alert's only run.
+    /// Adapts an alert to a run of flagged sections that has grown, or that has shrunk if it is the alert's
+    /// only run.
     ///
     /// If a later pass splits a run in two, one alert covers both runs.
     fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {
@@ -131,13 +134,14 @@ impl AlertList {
         }
     }
 
-    /// Merges the alerts of two merged runs. The alert with the lower number represents both runs.
+    /// Merges the alerts of two runs of flagged sections that have been merged. The alert with the lower
+    /// number represents both runs.
     fn merge_runs(&mut self, input: &RunInput, to: &mut Telling<'_>) {
         let Some(into) = input.merged_into else { return };
         let (other, kept) = (self.alert_of(input.id), self.alert_of(into));
         self.set_alert_of(input.id, 0);
         if other == kept {
-            // Both runs already had the same alert.
+            // Both runs of flagged sections already had the same alert.
             if let Some(alert) = self.get_mut(kept) {
                 alert.open_runs = alert.open_runs.saturating_sub(1);
             }

@@ -288,7 +288,7 @@ fn higher_priority_needs_a_new_acknowledgement() {
     beat(&mut bench, 4, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, true)));
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(5), to));
-    // The charge varies within the dead band.
+    // The battery charge varies within the dead band of its alert.
     beat(&mut bench, 6, 11.0);
     beat(&mut bench, 7, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, false)));
@@ -343,7 +343,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
     bench.run(0, RunChange::Changed, (40, 64), None);
     bench.run(0, RunChange::Changed, (40, 52), None);
     assert_eq!(stretch(&bench), Some((40, 52)), "the far end was passed again");
-    // A second pass covers the middle of the missed stretch. The alert then has two runs.
+    // A second pass covers the middle of the missed stretch. The alert then has two runs of missed sections.
     bench.run(1, RunChange::Raised, (48, 52), None);
     bench.run(0, RunChange::Changed, (40, 44), None);
     assert_eq!((stretch(&bench), bench.list.iter().count()), (Some((40, 52)), 1));
@@ -363,8 +363,8 @@ fn alert_of_merged_runs_keeps_the_lower_number_and_stays_unacknowledged() {
     let [kept, gone] = [1, 2].map(|number| *bench.list.get(number).unwrap());
     assert_eq!((kept.stretch, kept.count, kept.needs_acknowledgement()), (Some((10, 15)), 2, true));
     assert_eq!((gone.state, gone.merged_into), (AlertState::Cleared, Some(1)));
-    // A later pass covers the middle of the missed stretch, so its alert has two runs. Then both runs are
-    // covered.
+    // A later pass covers the middle of the missed stretch, so its alert has two runs of missed sections.
+    // Then a pass covers both runs.
     bench.run(2, RunChange::Raised, (13, 15), None);
     bench.run(0, RunChange::Changed, (10, 12), None);
     assert_eq!(bench.list.raised(), 2);
@@ -379,8 +379,9 @@ fn alert_of_merged_runs_keeps_the_lower_number_and_stays_unacknowledged() {
 }
 
 proptest! {
-    /// Runs in a tunnel of 7 km are raised and cleared at random. Every unacknowledged missed stretch stays
-    /// in an alert, and the list never exceeds its capacity. No alert is active once every run is cleared.
+    /// Runs of missed sections in a tunnel of 7 km are flagged and cleared at random. Every unacknowledged
+    /// missed stretch stays in an alert, and the list never exceeds its capacity. No alert is active once
+    /// every run is cleared.
     #[test]
     fn full_list_loses_no_missed_stretch(
         events in proptest::collection::vec((0u8..10, 0u32..2000), 800..2500),

@@ -70,8 +70,8 @@ fn position_is_doubtful_if_the_pass_error_is_large_or_the_cable_counter_is_distr
 
 const NOW: MonoNs = MonoNs(9_000_000_000);
 
-/// The run of a section without samples. It is raised at event number `event`, or, with `at_beat`, at the
-/// advice update before that event.
+/// Run of missed sections that consists of a single section without samples. It is flagged at the event with
+/// the index `event` or, if `at_beat` is true, at the advice update before that event.
 fn run(event: usize, at_beat: bool) -> RunInput {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();

@@ -30,7 +30,7 @@ type HeadParts = (
     &'static HiddenAngles,
 );
 
-/// Pings and updates of this tick, in order.
+/// Georeferenced pings and advice updates of this tick, in order.
 #[derive(Debug, Default, Resource)]
 pub(super) struct PlacedList(pub(super) Vec<PlacedItem>);
 

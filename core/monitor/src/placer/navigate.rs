@@ -23,7 +23,7 @@ pub(super) enum Positioned {
     Beat { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
 }
 
-/// Pings and updates of this tick with their fixes, in order.
+/// Sonar pings and advice updates of this tick with their fixes, in order.
 #[derive(Debug, Resource)]
 pub(super) struct PositionedList(pub(super) Vec<Positioned>);
 

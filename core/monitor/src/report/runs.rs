@@ -9,10 +9,10 @@ use headrace_coverage::{Action, Again, Cause, Run, RunId, Runs, Sections, Verdic
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
-/// A run of neighbouring flagged sections.
+/// A run of neighbouring sections that are flagged as missed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
-    /// Number of the run, which never changes.
+    /// Number of the run of missed sections, which never changes.
     pub id: u32,
     /// Main cause: the one that applies to most sections of the run.
     pub cause: Cause,
@@ -24,11 +24,11 @@ pub struct RunReport {
     /// Source ids of the heads that were silent in the section with the largest hole, or in the section that
     /// represents silence as a cause.
     pub silent_sources: Vec<String>,
-    /// Beginning of the run, m.
+    /// Beginning of the run of missed sections, m.
     pub start_m: f64,
-    /// End of the run, m.
+    /// End of the run of missed sections, m.
     pub end_m: f64,
-    /// Metres of the run that fail.
+    /// Metres of the run's sections that fail at present.
     pub failed_m: f64,
     /// Diameter of the run's largest hole, m. For a cleared run, the diameter before it was cleared.
     pub hole_m: f64,

@@ -29,18 +29,18 @@ impl Stateful for NearWall {
     }
 }
 
-/// Classification of a placed ping or update.
+/// Classification of a georeferenced ping or of an advice update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Class {
-    /// A ping without a placed return.
+    /// A ping without a return that could be georeferenced.
     NoReturn,
     /// A return, and whether its head is distrusted afterwards.
     Return(Sorted, bool),
-    /// An update: the reason for distrusting each head at that time.
+    /// An advice update: for each head, the reason for distrusting it at that time, if any.
     Update([Option<Distrust>; MAX_HEADS]),
 }
 
-/// Classification of each placed ping and update of the tick, in order.
+/// Classification of each georeferenced ping and advice update of the tick, in order.
 #[derive(Debug, Resource)]
 pub(crate) struct Classified(pub(crate) Vec<Class>);
 

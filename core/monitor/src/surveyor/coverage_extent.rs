@@ -129,7 +129,7 @@ mod tests {
         // The second head is silent from 1 s on. The first one keeps pinging.
         let mut bench = Bench::new([Some(9), Some(1)]);
         assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");
-        // From 3.5 m to 4.5 m.
+        // Sections 14 to 18 contain the wall from 3.5 m to 4.5 m, which the silent head has passed.
         assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=18).collect()));
         assert_eq!(bench.beat(11, Some(5.6)), [Some(4.5), Some(5.1)]);
         assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=20).collect()));

@@ -1,4 +1,4 @@
-//! Query for the heads, shared by the systems that process placed pings.
+//! Query for the heads, shared by the systems that process georeferenced pings.
 
 use bevy_ecs::prelude::Query;
 

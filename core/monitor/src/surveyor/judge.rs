@@ -1,4 +1,4 @@
-//! Judges the sections that are due: verdict, flag and run.
+//! Judges the sections that are due: updates the verdict, flag and run of missed sections of each.
 
 use bevy_ecs::prelude::{Res, ResMut};
 

@@ -88,7 +88,8 @@ mod tests {
             assert_eq!(note_sample(&mut coverage, &mut sweep, &tunnel, ping), Ok(()));
             let section = coverage.sections.get(20).unwrap();
             let (samples, steps, t_y_m) = (section.samples, section.t_y_m.count, section.t_y_m.max);
-            // Centres of the steps. A pass is a single step that crosses an arc length.
+            // Looks for a pass at the centre of each angular step. A pass is a single step that crosses an
+            // arc length.
             let passes = [0.5, 1.5, 2.5, 3.5].map(|middle| {
                 let Outcome::Sample { arc_m, .. } = heard(5.1, 0.1 * middle, 3.0).outcome else { panic!() };
                 coverage.store.nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 1.0).is_some()
@@ -99,16 +100,18 @@ mod tests {
         assert_eq!((samples, steps), (1, 0));
         let (samples, steps, t_y_m, passes) = note(&at(1));
         assert_eq!((samples, steps, passes), (2, 1, [true, false, false, false]));
-        // A step is the chord of a tenth of a radian at 3 m, and a centimetre along the tunnel.
+        // The samples of one angular step are apart by the chord of a tenth of a radian at 3 m, and by a
+        // centimetre along the tunnel.
         let chord_m = 2.0 * 3.0 * math::sin(0.05);
         assert!((t_y_m - math::hypot(chord_m, 0.01)).abs() < 1e-9, "{t_y_m}");
-        // After a lost ping the next step isn't single, but the spacing is still measured.
+        // After a lost ping, the next sample is two angular steps away. That isn't a pass, but the spacing is
+        // still measured.
         note(&pinged(5.07, 0.2));
         let (samples, steps, t_y_m, passes) = note(&at(3));
         assert_eq!((samples, steps, passes), (3, 2, [true, false, false, false]));
         assert!((t_y_m - math::hypot(6.0 * math::sin(0.1), 0.02)).abs() < 1e-9, "{t_y_m}");
-        // The first sample ends a step that isn't single. The second one begins a new sweep, so it has no
-        // previous sample.
+        // Before the first of these two samples, the head has moved several angular steps at once. The second
+        // sample begins a new sweep, so it has no previous sample.
         let (samples, steps, _, passes) = note(&PlacedPing { single_step: false, ..at(4) });
         assert_eq!((samples, steps, passes), (4, 3, [true, false, false, false]));
         let (samples, steps, ..) = note(&PlacedPing { new_sweep: true, ..at(5) });

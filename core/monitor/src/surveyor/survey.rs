@@ -1,4 +1,4 @@
-//! State that changes while the surveyor processes the placed pings of a tick, and the results.
+//! State that changes while the surveyor processes the georeferenced pings of a tick, and the results.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
@@ -14,16 +14,17 @@ use headrace_coverage::Request;
 /// Maximum number of runs of flagged sections that change when one section is judged: its own run and two
 /// neighbours.
 const RUNS_EACH: usize = 3;
-/// Notices per judged section: one for the section, and one for each changed run.
+/// Maximum number of notices per judged section: one for the section, and one for each changed run of missed
+/// sections.
 const NOTICES_EACH: usize = 1 + RUNS_EACH;
 
-/// Position of the surveyor in the tick's list of placed pings and updates.
+/// Position of the surveyor in the tick's list of georeferenced pings and advice updates.
 #[derive(Debug, Clone, Copy, Default, Resource)]
 pub(super) struct Cursor {
-    /// Index of the next ping or update to process.
+    /// Index of the next ping or advice update to process.
     pub(super) next: usize,
-    /// Index of the reading at which processing has stopped, and whether it stopped at an update before that
-    /// reading.
+    /// Index of the reading at which processing has stopped, and whether it stopped at an advice update
+    /// before that reading.
     pub(super) stop: (usize, bool),
 }
 
@@ -61,7 +62,7 @@ impl Found {
     }
 }
 
-/// The wall's coverage, and all other state that changes while placed pings are processed.
+/// The wall's coverage, and all other state that changes while georeferenced pings are processed.
 #[derive(SystemParam)]
 pub(super) struct Survey<'w> {
     pub(super) coverage: ResMut<'w, Coverage>,

@@ -1,5 +1,5 @@
-//! Processes the placed pings and updates of a tick, up to the next stop: an update, or a ping that makes
-//! sections due for judging.
+//! Processes the georeferenced pings and advice updates of a tick, up to the next advice update or the next
+//! ping that makes sections due for judging.
 
 use bevy_ecs::prelude::Res;
 use bevy_ecs::system::SystemParam;

@@ -303,7 +303,7 @@ mod tests {
         assert_eq!(found[0], (1, 0), "the first return waits");
         assert_eq!(found.last(), Some(&(20, 0)), "{found:?}");
         assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
-        // All samples are one step apart, so a pass crosses each of them.
+        // All samples are one angular step apart, so the head's pass covers the arc length of each sample.
         let crossed = |number: f64| {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
                 panic!()

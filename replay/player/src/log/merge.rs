@@ -22,7 +22,7 @@ pub(super) struct Entry {
     end: usize,
 }
 
-/// Batch with the messages of one piece.
+/// Batch with the messages of one piece of the log: a chunk, or a run of messages outside chunks.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     bytes: Vec<u8>,
@@ -56,7 +56,7 @@ impl Batch {
 /// the first three are zero.
 type Key = (u64, u32, u32, usize, usize);
 
-/// Pieces in memory, whose messages are being merged.
+/// Pieces of the log in memory, whose messages are being merged.
 #[derive(Debug)]
 pub(super) struct Merge {
     by_time: bool,
@@ -108,7 +108,7 @@ impl Merge {
         batch
     }
 
-    /// Adds the messages of the piece with index `span`, beginning with the message with index `next`.
+    /// Adds the messages of the log's piece with index `span`, beginning with the message with index `next`.
     pub(super) fn add(&mut self, span: usize, mut batch: Batch, next: usize) {
         if self.by_time {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));

@@ -14,10 +14,11 @@ use super::merge::Entry;
 use super::part::{PART_END, Part};
 use super::scan::{Scan, Span};
 
-/// Maximum number of runs kept per channel. An intact log has one run, or a few while pieces are read out of order.
+/// Maximum number of runs of consecutive message numbers kept per channel. An intact log has one run, or a
+/// few while its pieces are read out of order.
 const MAX_RUNS: usize = 64;
 
-/// A run of consecutive message numbers of a channel: first and last piece, first and last number.
+/// A run of consecutive message numbers of a channel: first and last piece of the log, first and last number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 struct Run {
     pieces: (usize, usize),
@@ -51,7 +52,7 @@ enum Fault {
     Disordered,
 }
 
-/// A place between pieces at which the numbers of a channel are not consecutive.
+/// A place between two pieces of the log at which the message numbers of a channel are not consecutive.
 #[derive(Debug)]
 struct Break {
     fault: Fault,
@@ -62,7 +63,7 @@ struct Break {
 }
 
 impl Numbering {
-    /// Creates the numbering of a log with these channels. `end` is the length of the log.
+    /// Creates the check of the message numbers in a log with these channels. `end` is the length of the log.
     ///
     /// Returns `None` for logs of other writers, which may number messages in any way.
     ///
@@ -83,7 +84,7 @@ impl Numbering {
         Some(Self { channels, messages: 0, wanted })
     }
 
-    /// Adds the message numbers of a piece, in file order.
+    /// Adds the message numbers of a piece of the log, in file order.
     pub(super) fn add(&mut self, piece: usize, entries: &[Entry]) {
         for head in entries.iter().map(|entry| entry.head) {
             self.messages += 1;
@@ -151,8 +152,8 @@ impl Break {
         self.fault == other.fault && first <= last
     }
 
-    /// Merges a break in another channel into this one, and narrows the range of pieces to the common part. A channel
-    /// with few messages has a wide range.
+    /// Merges a break in the numbers of another channel into this one, and narrows the range of pieces to the
+    /// common part. A channel with few messages has a wide range.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
@@ -211,13 +212,13 @@ impl Count {
         }
     }
 
-    /// Whether a run that ends in piece `from` may continue in piece `to`. Piece `to` must not be earlier, and no other
-    /// run may lie between the two.
+    /// Whether a run of message numbers that ends in piece `from` of the log may continue in piece `to`.
+    /// Piece `to` must not be earlier, and no other run may lie between the two.
     fn is_clear(&self, from: usize, to: usize) -> bool {
         from <= to && !self.runs.iter().any(|run| from < run.pieces.1 && run.pieces.0 <= to)
     }
 
-    /// Returns the places where numbers are missing or repeated, or continue elsewhere in the file.
+    /// Returns the places where message numbers are missing or repeated, or continue elsewhere in the file.
     fn breaks(&self) -> Vec<Break> {
         let mut runs = self.runs.clone();
         runs.sort_by_key(|run| (run.first, run.pieces));

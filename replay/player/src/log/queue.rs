@@ -73,7 +73,7 @@ impl State {
     }
 }
 
-/// A stretch of ticks that a recorder skipped.
+/// Successive ticks that a recorder skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Gap {
     /// Times of the first and last skipped tick.

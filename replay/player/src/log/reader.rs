@@ -92,11 +92,12 @@ pub struct LogMessage<'a> {
 /// A position in a log, from which reading can be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogPlace {
-    /// Number of pieces of the log read so far.
+    /// Number of the log's pieces (chunks, and runs of messages outside chunks) read so far.
     read: usize,
-    /// Pieces with messages left: piece number, and number of messages taken.
+    /// Pieces of the log from which messages are left: number of the piece, and number of messages taken from
+    /// it.
     open: Vec<(usize, usize)>,
-    /// True times of pieces whose chunk headers had wrong times.
+    /// True times of the chunks whose headers state wrong times, with the chunk's piece number.
     corrected: Vec<(usize, (u64, u64))>,
     latest: u64,
     late: u64,
@@ -139,11 +140,12 @@ pub struct LogReader<R = File> {
     channels: Channels,
     schemas: BTreeMap<u16, String>,
     losses: Losses,
-    /// Pieces of the log, in file order.
+    /// Pieces of the log (chunks, and runs of messages outside chunks), in file order.
     spans: Vec<Span>,
-    /// Times stated by chunk headers, by piece, where they differ from those of the messages.
+    /// Times that chunk headers state, where they differ from those of the messages. The key is the number of
+    /// the piece.
     stated: BTreeMap<usize, (u64, u64)>,
-    /// Numbers of the pieces, in reading order.
+    /// Numbers of the log's pieces, in reading order.
     plan: Vec<u32>,
     /// Number of pieces read so far, in the order of `plan`.
     read: usize,
@@ -155,7 +157,7 @@ pub struct LogReader<R = File> {
     /// Runs of message numbers in the chunks read so far, which show missing messages. `None` if another program wrote
     /// the log, or if reading didn't begin at the log's start.
     numbering: Option<Numbering>,
-    /// For each channel, the number of the first message that the next part repeats.
+    /// For each channel, the number of the first message that the recording's next part repeats.
     repeated: BTreeMap<u16, u32>,
 }
 
@@ -297,7 +299,7 @@ impl<R: Read + Seek> LogReader<R> {
         self.late
     }
 
-    /// Reads pieces until a message is available. Returns `false` at the end.
+    /// Reads pieces of the log until a message is available. Returns `false` at the end.
     pub(super) fn has_next(&mut self) -> Result<bool, LogError> {
         while self.must_read() {
             self.read_piece()?;
@@ -400,7 +402,7 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(())
     }
 
-    /// Sets the times of a piece. The times that its header states are stored separately.
+    /// Sets the times of a piece of the log. The times that a chunk's header states are stored separately.
     fn correct(&mut self, number: usize, times: (u64, u64)) {
         let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
             return;
@@ -415,14 +417,15 @@ impl<R: Read + Seek> LogReader<R> {
         self.read_span(number, 0)
     }
 
-    /// Reads a piece from which `next` messages have already been taken.
+    /// Reads a piece of the log from which `next` messages have already been taken.
     fn read_span(&mut self, number: usize, next: usize) -> Result<(), LogError> {
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
         let Some(span) = self.spans.get(number).copied() else { return Ok(()) };
         self.fill(&span, &mut batch, &mut found)?;
         if self.file.medium().has_failed_within(&(span.at..span.end)) {
-            // Checksums don't cover everything, so none of the piece's messages is used.
+            // The medium couldn't read all bytes of this piece. Checksums don't cover everything, so none of
+            // the piece's messages is used.
             batch.clear();
             found = vec![LossKind::Unreadable(self.file.medium().error().to_owned())];
         }
@@ -441,7 +444,7 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(())
     }
 
-    /// Reads the messages of a piece into a batch.
+    /// Reads the messages of a piece of the log into a batch.
     fn fill(&mut self, span: &Span, batch: &mut Batch, found: &mut Vec<LossKind>) -> Result<(), LogError> {
         match &span.chunk(&mut self.file)? {
             Some(place) => read_chunk(&mut self.file, place, batch, &mut self.channels, found)?,

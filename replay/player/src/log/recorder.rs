@@ -270,8 +270,8 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Ends a stretch of skipped ticks. If there is no room to record the stretch, it is recorded together with the
-    /// next one.
+    /// Ends a series of skipped ticks. If there is no room to record the series, it is recorded together with
+    /// the next one.
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();

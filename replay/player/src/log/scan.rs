@@ -27,7 +27,7 @@ use super::search::find_records;
 /// Approximate size of a piece of messages outside chunks, bytes.
 const RUN_BYTES: u64 = 1 << 20;
 
-/// Kind of piece. A piece is the unit in which a log is read.
+/// Kind of piece of a log. A piece is the unit in which a log is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Piece {
     /// A chunk. Its header is read again when needed, because a long dive has a hundred thousand chunks.
@@ -36,7 +36,8 @@ pub(super) enum Piece {
     Run,
 }
 
-/// A piece, with its range of bytes and its time span.
+/// A piece of the log (a chunk, or a run of messages outside chunks), with its range of bytes and its time
+/// span.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Span {
     pub(super) at: u64,
@@ -74,7 +75,7 @@ pub(super) struct Scan {
     stated: Vec<Loss>,
     /// Range of the footer, and the start of the summary that it states, if the last record was a footer.
     footer: Option<(core::ops::Range<u64>, u64)>,
-    /// Whether the next message may be added to the last run.
+    /// Whether the next message may be added to the last run of messages outside chunks.
     run_open: bool,
     attachment_bytes: u64,
     /// Number of bytes that the chunks so far unpack to.
@@ -250,7 +251,7 @@ impl Scan {
         }
     }
 
-    /// Adds a piece. Returns `false` if there are too many.
+    /// Adds a piece of the log. Returns `false` if the log has too many pieces.
     fn add_span(&mut self, span: Span) -> bool {
         let fits = self.spans.len() < MAX_PIECES;
         if fits {
@@ -480,7 +481,7 @@ impl Scan {
     }
 }
 
-/// Sets the times of losses from the pieces around them.
+/// Sets the times of losses from the pieces of the log around them.
 ///
 /// If `read` is true, all pieces have been read, and their times are those of their messages. Before that, the times
 /// come from chunk headers, which may be wrong.
@@ -527,7 +528,7 @@ impl Span {
         })
     }
 
-    /// Whether the piece has times. A chunk without messages has none: both are 0.
+    /// Whether the piece of the log has times. A chunk without messages has none: both times are 0.
     pub(super) fn is_dated(&self) -> bool {
         (self.from, self.to) != (0, 0)
     }

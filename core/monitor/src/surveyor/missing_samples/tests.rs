@@ -251,8 +251,8 @@ fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
 }
 
-/// For pings without a fix, the missing position is an additional cause. The pings are placed along the track
-/// as soon as there is a fix again.
+/// For pings without a fix, the missing position is an additional cause. The pings are assigned positions
+/// along the track as soon as there is a fix again.
 #[test]
 fn simulated_pings_without_a_fix_are_placed_at_the_next_fix() {
     let mut dive = Dive::new();
