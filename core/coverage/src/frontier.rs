@@ -27,7 +27,7 @@ pub struct HeadReach {
     heard: Option<MonoNs>,
     /// Reach at the head's last ping with a fix.
     ///
-    /// For a silent head, this is the reach at the last update with a fix.
+    /// For a silent head, this is the reach at the last advice update with a fix.
     latest: Reach,
     /// Chainages that the head's reach has covered; `None` before the first ping with a fix.
     swept: Option<Reach>,
@@ -88,13 +88,13 @@ pub struct Frontier {
     through: Option<Reach>,
     /// Zone: index range of the sections within reach of the heads that sections wait for, plus a margin.
     zone: Option<Range<i64>>,
-    /// Time of the zone's last change.
+    /// Time at which the zone of sections within reach last changed.
     zone_moved: Option<MonoNs>,
     /// Time of the last ping of any head.
     heard: Option<MonoNs>,
     /// Time of the latest ping that ended a silence of all heads, or of the first ping.
     ///
-    /// Before the first ping, this is the time of the first update.
+    /// Before the first ping, this is the time of the first advice update.
     woken: Option<MonoNs>,
     course: Option<Course>,
     /// Number of times that the vehicle has turned back.
@@ -107,7 +107,7 @@ struct Course {
     /// Farthest centre of the heads' combined reach on this course, as chainage, m.
     farthest_m: f64,
     astern: bool,
-    /// Number of heads in the combined reach.
+    /// Number of heads that make up the combined reach.
     heads: usize,
 }
 
@@ -156,12 +156,13 @@ pub struct Outlook {
     pub still_zone: Option<Range<i64>>,
 }
 
-/// Change of the frontier by one ping or update.
+/// Change of the frontier by one ping or one advice update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections that the zone has newly left behind.
+    /// Sections that have just left the zone within reach of the heads, behind the vehicle.
     pub left_behind: Range<i64>,
-    /// Sections newly ahead of the zone, because the vehicle moves backwards.
+    /// Sections that have just left the zone within reach of the heads, ahead of the vehicle, because it
+    /// moves backwards.
     pub left_ahead: Range<i64>,
     /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
@@ -201,7 +202,7 @@ impl Frontier {
         }
     }
 
-    /// Returns the zone if the vehicle is nearly stationary.
+    /// Returns the zone of sections within reach of the heads if the vehicle is nearly stationary.
     ///
     /// `None` within [`SILENT_AFTER`] of the first ping, because the live heads are not known yet.
     fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
@@ -253,7 +254,7 @@ impl Frontier {
         })
     }
 
-    /// Records the combined reach of all heads, pinging or not, at an update.
+    /// Records the combined reach of all heads, pinging or not, at an advice update.
     pub fn pass(&mut self, all: Reach) {
         debug_assert!(all.is_ordered(), "a reach begins before it ends: {all:?}");
         let through = self.through.unwrap_or(Reach { from_m: all.to_m, to_m: all.from_m });
@@ -301,7 +302,8 @@ impl Frontier {
         self.move_zone(heads, now, section_m, margin_m)
     }
 
-    /// Updates the frontier for an update at `now`. `span` covers the vehicle and its heads, pinging or not.
+    /// Updates the frontier for an advice update at `now`. `span` covers the vehicle and its heads, pinging
+    /// or not.
     ///
     /// `heads` are the reaches of all heads; silent heads are at the places where they would ping. While a
     /// head is alive, only pings move the zone.
@@ -370,7 +372,7 @@ impl Frontier {
 }
 
 impl Moved {
-    /// Whether a section has just left the zone.
+    /// Whether a section has just left the zone within reach of the heads.
     pub(super) fn has_left(&self, section: i64) -> bool {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }

@@ -68,17 +68,18 @@ pub struct Stretch {
     pub from: i64,
     /// Index after the stretch's last section.
     pub to: i64,
-    /// The stretch's unsure sections in two groups.
+    /// The stretch's sections without a verdict, in two groups.
     ///
-    /// In the first group, a section is unsure mainly because of its hole's size. In the second group, it is
-    /// unsure mainly because of the hole's error.
+    /// In the first group, a section lacks a verdict mainly because of its hole's size. In the second
+    /// group, it lacks one mainly because of the hole's error.
     of: [Largest; 2],
 }
 
-/// Count of a group of unsure sections, and the figures of the one with the largest hole.
+/// Number of sections in a group that neither pass nor fail, and the figures of the one with the largest
+/// hole.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Largest {
-    /// Number of unsure sections in the group.
+    /// Number of sections in the group.
     pub sections: u32,
     /// Diameter of the group's largest hole, and its standard deviation, m.
     pub hole_m: [f64; 2],
@@ -127,7 +128,7 @@ const MOSTLY_ERROR: f64 = 0.2;
 const JOIN_M: f64 = 2.0;
 
 impl Stretch {
-    /// Creates the stretch of one section.
+    /// Creates a stretch without a verdict from one section.
     ///
     /// The figures are its hole, the error of this hole, and the standard deviation of the hole, m.
     pub fn one(why: Unsure, index: i64, [hole_m, error_m, sd_m]: [f64; 3], driven: Driven) -> Self {
@@ -137,12 +138,13 @@ impl Stretch {
         Self { why, from: index, to: index + 1, of }
     }
 
-    /// Number of the stretch's unsure sections.
+    /// Number of the stretch's sections that neither pass nor fail.
     pub fn sections(&self) -> u32 {
         self.of.iter().map(|of| of.sections).sum()
     }
 
-    /// Whether the error matters more than the hole in most of the stretch's sections.
+    /// Whether the error of the hole, rather than its size, prevents a verdict in most of the stretch's
+    /// sections.
     pub fn is_mostly_error(&self) -> bool {
         self.of[1].sections > self.of[0].sections
     }
@@ -154,13 +156,14 @@ impl Stretch {
         &self.of[usize::from(self.is_mostly_error())]
     }
 
-    /// Whether sections are too far away to belong to the stretch.
+    /// Whether sections are too far away to belong to this stretch without a verdict.
     pub fn is_beyond(&self, sections: Range<i64>, section_m: f64) -> bool {
         let apart = (sections.start - self.to).max(self.from - sections.end);
         apart as f64 * section_m > JOIN_M + 1e-9
     }
 
-    /// Adds a section; returns false if it is unsure for another reason, or too far away.
+    /// Adds a section to the stretch; returns false if the section lacks a verdict for another reason, or is
+    /// too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
         if self.why != other.why || self.is_beyond(other.from..other.to, section_m) {

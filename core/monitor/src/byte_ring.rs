@@ -28,10 +28,10 @@ pub trait ByteConsumer {
     /// Copies waiting bytes without removing them. Returns their number.
     fn peek(&self, into: &mut [u8]) -> usize;
 
-    /// Discards waiting bytes.
+    /// Discards this many of the bytes that wait in the ring.
     fn skip(&mut self, count: usize);
 
-    /// Removes waiting bytes. Returns their number.
+    /// Copies the bytes that wait in the ring, and removes them. Returns their number.
     fn pop(&mut self, into: &mut [u8]) -> usize;
 }
 

@@ -56,10 +56,10 @@ impl Stateful for Navigator {
     }
 }
 
-/// Fix of the vehicle at the last update, and its standard deviations.
+/// Fix of the vehicle at the last advice update, and its standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Component, Serialize, Deserialize)]
 pub struct VehicleState {
-    /// Time of the last update; `None` before the first one.
+    /// Time of the last advice update; `None` before the first one.
     pub at: Option<MonoNs>,
     /// Pose and speed of the vehicle, or the reason for which there is no fix.
     pub fix: Result<Fix, NoFix>,

@@ -18,7 +18,7 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Interval of the messages on coverage extent and metres by verdict, in data time.
+/// Time between two messages on the coverage extent and its metres by verdict, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
 /// Minimum length of missed sections, m, for which a cause that wasn't reported before is reported.
@@ -168,7 +168,7 @@ impl LiveMessages {
         let Some(at) = state.at else { return };
         self.tell_other_setting(at, dive, tell);
         let sections = &dive.view().coverage().sections;
-        // The interval begins at the first update, when there is nothing to report.
+        // The interval begins at the first advice update, when there is nothing to report.
         let since = *self.way_told.get_or_insert(at);
         if at.since(since).0.abs() >= WAY_EVERY.0 && state.metres.way_m() > 0.0 {
             self.way_told = Some(at);

@@ -21,7 +21,7 @@ const USUAL: f64 = 50.0;
 /// successive turns.
 const NEARLY_ALL: f64 = 0.75;
 
-/// Number of pings, and how many of them gave no return.
+/// Number of pings, and number of those that gave no return.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Count {
     all: u32,
@@ -42,7 +42,7 @@ impl Count {
     }
 }
 
-/// One bit per angle bin.
+/// Set of angle bins of a turn: one bit per bin.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Angles([u64; WORDS]);
 

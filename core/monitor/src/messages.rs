@@ -33,7 +33,7 @@ pub struct Event {
     pub reading: Reading,
 }
 
-/// Doubts about sensors and settings that navigation reports at an update.
+/// Doubts about sensors and settings that navigation reports at an advice update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Doubts {
     /// Doubt about the cable counter; `None` while the counter is trusted.
@@ -111,13 +111,13 @@ pub struct PlacedPing {
 /// [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Update {
-    /// Time of the update.
+    /// Time of the advice update.
     pub at: MonoNs,
-    /// Situation of the vehicle and its heads at the update.
+    /// Situation of the vehicle and its heads at the advice update.
     pub situation: Situation,
     /// Doubts that navigation reports.
     pub doubts: Doubts,
-    /// Fix at the update, or the reason for which there is none.
+    /// Fix at the advice update, or the reason for which there is none.
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the vehicle's pose.
     pub sd: Option<PoseSd>,
@@ -136,13 +136,13 @@ pub enum Placement {
 /// A georeferenced ping or an advice update, and its position among the tick's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedItem {
-    /// Index of the ping's reading. For an update: index of the first reading after it.
+    /// Index of the ping's reading. For an advice update: index of the first reading after it.
     pub event: usize,
     /// The ping or update.
     pub placement: Placement,
 }
 
-/// Judged metres and the observations that hold at an update.
+/// Judged metres and the observations that hold at an advice update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
     /// Metres of the coverage extent by verdict.
@@ -154,7 +154,7 @@ pub struct Standing {
     /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
     /// way there.
     pub back_to_m: Option<f64>,
-    /// Observations about the dive that hold at the update.
+    /// Observations about the dive that hold at the advice update.
     pub(crate) observations: ActiveObservations,
 }
 

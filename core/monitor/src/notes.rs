@@ -32,7 +32,7 @@ pub struct Note {
     pub text: NoteText,
     /// Recording of a voice note, which has no text.
     pub voice: Option<Spoken>,
-    /// Chainage of the vehicle at the last update, m; `None` without a position.
+    /// Chainage of the vehicle at the last advice update, m; `None` without a position.
     pub chainage_m: Option<f64>,
 }
 

@@ -55,13 +55,13 @@ pub struct Placed {
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
     pub(super) commands: Commands,
-    /// Fix of the vehicle at the last update.
+    /// Fix of the vehicle at the last advice update.
     pub vehicle: VehicleState,
     /// Traffic of each sensor so far, in the order of sources.
     pub health: Vec<SensorHealth>,
     /// Traffic of the operator's input so far.
     pub(super) console: ConsoleCounts,
-    /// Result stream of the vehicle's poses at the updates.
+    /// Result stream of the vehicle's poses at the advice updates.
     pub(super) poses: ResultStream,
 }
 

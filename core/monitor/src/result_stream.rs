@@ -23,15 +23,15 @@ pub enum RecordKind {
     Run = 4,
     /// Speed advice.
     Advice = 5,
-    /// A pose of the vehicle at an update.
+    /// A pose of the vehicle at an advice update.
     Pose = 6,
-    /// An update without a fix.
+    /// An advice update without a fix.
     NoPose = 7,
     /// First occurrence of an observation about the dive as a whole.
     Alert = 8,
     /// A ping whose return was not accepted as wall.
     Doubtful = 9,
-    /// The live state at an update.
+    /// The live state at an advice update.
     State = 10,
     /// A change of an alert of the list.
     AlertChange = 11,

@@ -30,7 +30,7 @@ use headrace_vehicle::Mission;
 /// next batch.
 const FINISHED_AT_ONCE: usize = 256;
 
-/// The worlds and the alerter of which a loop consists.
+/// The three worlds (placer, adviser, surveyor) and the alerter of which a loop consists.
 pub(super) struct Parts {
     pub(super) placer: Placer,
     pub(super) surveyor: Surveyor,
@@ -202,7 +202,7 @@ impl Loop {
         self.ticks
     }
 
-    /// Number and end time of the last tick.
+    /// Number and end time of the loop's last tick.
     pub fn time(&self) -> TickTime {
         self.time
     }

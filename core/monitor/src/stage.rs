@@ -47,7 +47,8 @@ pub enum SurveyStage {
 }
 
 impl SurveyStage {
-    /// Stages that run each time the surveyor stops to judge sections or to process an update, in order.
+    /// Stages that run each time the surveyor stops to judge sections or to process an advice update, in
+    /// order.
     pub(super) const OF_STOP: [Self; 3] = [Self::Walk, Self::Judge, Self::Report];
 }
 

@@ -14,7 +14,7 @@ pub struct UnsureStretch {
     pub from_m: f64,
     /// End of the stretch, m.
     pub to_m: f64,
-    /// Metres of the stretch that are unsure.
+    /// Metres of the stretch's sections that neither pass nor fail.
     pub metres_m: f64,
     /// Diameter of the stretch's largest hole, m.
     pub hole_m: f64,
@@ -31,7 +31,7 @@ pub struct UnsureStretch {
 }
 
 impl UnsureStretch {
-    /// Creates an unsure stretch from a stretch of sections.
+    /// Creates the stretch, in metres, from a stretch of sections without a verdict.
     pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
         let section_m = sections.section_m();
         let [hole_m, hole_sd_m] = stretch.largest().hole_m;
@@ -69,7 +69,7 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
 /// Between the two ratios, the speed counts as equal to the fitting speed.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
-/// Text of the remedy for an unsure stretch; empty if there is none.
+/// Text of the remedy for a stretch without a verdict; empty if there is none.
 pub fn helps_text(stretch: &UnsureStretch) -> String {
     let surer = "pass it again with a more certain position";
     let helps = match stretch.why {

@@ -79,7 +79,7 @@ impl<'a> DiveView<'a> {
         self.advised
     }
 
-    /// Fix of the vehicle at the last update, and its standard deviations.
+    /// Fix of the vehicle at the last advice update, and its standard deviations.
     pub fn vehicle(&self) -> &'a VehicleState {
         &self.placed.vehicle
     }
@@ -142,7 +142,7 @@ impl<'a> DiveView<'a> {
         TextContext::of(sources, &mission.profile, &self.coverage().sections, descriptions)
     }
 
-    /// Live state as of the last update.
+    /// Live state as of the last advice update.
     pub fn live_state(&self) -> &'a LiveState {
         &self.alerter.state
     }

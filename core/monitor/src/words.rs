@@ -10,7 +10,7 @@ use headrace_coverage::Verdict;
 use headrace_fusion::NoFix;
 use headrace_sampling::advice::Reason;
 
-/// Name of the condition after sensors have begun to deliver data and before the first update.
+/// Name of the condition after sensors have begun to deliver data and before the first advice update.
 pub const STARTING: &str = "STARTING";
 /// Action for finding the gyros' bias. The number of seconds follows in the text.
 pub const STAND_STILL: &str = "stand still";

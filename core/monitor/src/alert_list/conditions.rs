@@ -1,4 +1,4 @@
-//! Conditions checked at each update, by situation.
+//! Conditions checked at each advice update, by situation.
 
 use super::alert::{AlertChange, AlertState, Figures};
 use super::kind::{ListKind, Priority};
@@ -16,7 +16,8 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Grace period after the first update. Data or positions that haven't arrived by its end count as missing.
+/// Grace period after the first advice update. Data or positions that haven't arrived by its end count as
+/// missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
 /// Time for which the alert `CannotSay` stays active after its stretch without a verdict last grew.
 const GROWS: DurNs = DurNs(10_000_000_000);
@@ -34,7 +35,7 @@ const MORE_PCT: f64 = 2.0;
 /// An advice update, with the live state at that time.
 pub(crate) struct Beat<'a> {
     pub(crate) at: MonoNs,
-    /// Live state whose `now` is the time of the update.
+    /// Live state whose `now` is the time of the advice update.
     pub(crate) state: &'a LiveState,
     pub(crate) setting: Option<SettingDoubt>,
 }
@@ -54,7 +55,7 @@ impl Seen {
 }
 
 impl AlertList {
-    /// Checks all conditions at an update.
+    /// Checks all conditions at an advice update.
     pub(crate) fn beat(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, .. } = *beat;
         let begun = *self.begun.get_or_insert(at);
@@ -75,7 +76,7 @@ impl AlertList {
 
     /// Checks sensors and remaining resources while no sensor delivers data.
     ///
-    /// `state` is the live state of the last update, with `now` set to `at`.
+    /// `state` is the live state of the last advice update, with `now` set to `at`.
     pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
         let Some(begun) = self.begun else { return };
         self.take_sensors(at, state, to);

@@ -1,9 +1,9 @@
 //! List of alerts with the life cycle of IMO MSC.302(87): raised, acknowledged, silenced, rectified, cleared.
 //!
-//! Each situation has one alert, whose number never changes. Conditions are checked at each update. Missed
-//! stretches are added when their sections are judged. Commands take effect at their place in the packet
-//! stream. The list is therefore the same in a replay, however the stream was cut into ticks. The list holds
-//! figures, no texts: [`texts`] makes the texts for display. `docs/reference/alerts.md` has the table.
+//! Each situation has one alert, whose number never changes. Conditions are checked at each advice update.
+//! Missed stretches are added when their sections are judged. Commands take effect at their place in the
+//! packet stream. The list is therefore the same in a replay, however the stream was cut into ticks. The list
+//! holds figures, no texts: [`texts`] makes the texts for display. `docs/reference/alerts.md` has the table.
 
 pub(crate) mod alert;
 mod conditions;

@@ -16,7 +16,7 @@ use headrace_vehicle::{AlertTiming, LimitsConfig};
 
 const AT: MonoNs = MonoNs(9_000_000_000);
 
-/// Live state after an update with this position error between passes.
+/// Live state after an advice update with this position error between passes.
 ///
 /// The target is half a metre, and the confidence is two standard deviations.
 fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {

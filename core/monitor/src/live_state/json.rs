@@ -20,7 +20,7 @@ pub struct LiveStateJson {
     pub version: u32,
     /// Time of publication, seconds on the log's clock.
     pub now_s: f64,
-    /// Time of the update that made the state; `None` before the first update.
+    /// Time of the advice update that made the state; `None` before the first update.
     pub at_s: Option<f64>,
     /// Age of the state at publication, seconds.
     pub age_s: Option<f64>,

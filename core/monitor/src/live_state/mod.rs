@@ -1,10 +1,10 @@
 //! The live state: the present state of the dive, as one structure by value. `docs/reference/live-state.md`
 //! describes it.
 //!
-//! Every update makes a live state, and every tick publishes the latest one. The terminal and the lines of
-//! `--json-lines` show it. All fields except [`LiveState::now`] are as of the last update, in data time, and
-//! so the same in a replay. [`LiveState::now`] belongs to the tick: a loop without data keeps ticking, and
-//! ages are measured up to `now`.
+//! Every advice update makes a live state, and every tick publishes the latest one. The terminal and the
+//! lines of `--json-lines` show it. All fields except [`LiveState::now`] are as of the last update, in data
+//! time, and so the same in a replay. [`LiveState::now`] belongs to the tick: a loop without data keeps
+//! ticking, and ages are measured up to `now`.
 
 pub(crate) mod condition;
 pub mod json;

@@ -148,7 +148,7 @@ impl SensorState {
 pub struct LiveState {
     /// End of the tick that published the state. Ages are measured up to this time.
     pub now: MonoNs,
-    /// Time of the update that made the state; `None` before the first update.
+    /// Time of the advice update that made the state; `None` before the first update.
     pub at: Option<MonoNs>,
     /// Availability of a position.
     pub position: PositionState,
@@ -205,7 +205,7 @@ stateful!(LiveState {
 });
 
 impl LiveState {
-    /// State before the first update, in a tunnel of unlimited length.
+    /// State before the first advice update, in a tunnel of unlimited length.
     pub(crate) fn new(target: Target, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
@@ -242,7 +242,7 @@ impl LiveState {
         if beyond { Some(self.length_m) } else { before.then_some(0.0) }
     }
 
-    /// Age of the state; `None` before the first update.
+    /// Age of the state; `None` before the first advice update.
     pub fn age(&self) -> Option<DurNs> {
         self.at.map(|at| DurNs(self.now.since(at).0.max(0)))
     }

@@ -137,7 +137,7 @@ fn unsure_stretch_is_shown_with_reason_and_remedy() {
     insta::assert_snapshot!(text);
 }
 
-/// Alert for an observation, as raised at the first update.
+/// Alert for an observation, as raised at the first advice update.
 fn raised(kind: ObservedKind) -> ListedAlertJson {
     let mut state = test_state();
     let occurrences = Occurrences { count: 3, first_m: 12.5, worst_m: 0.4 };

@@ -276,8 +276,8 @@ mod tests {
         assert!(matches!(heard(None, false), Outcome::Lost(Loss::Missing, Some(_))));
     }
 
-    /// Angles are extrapolated to the update, even if the head hasn't pinged at that time. A head silent for
-    /// over two seconds is left out.
+    /// Angles are extrapolated to the advice update, even if the head hasn't pinged at that time. A head
+    /// silent for over two seconds is left out.
     #[test]
     fn head_angles_are_extrapolated_to_the_update() {
         const RATE_RADPS: f64 = 0.785;

@@ -27,7 +27,7 @@ pub(super) enum Positioned {
 #[derive(Debug, Resource)]
 pub(super) struct PositionedList(pub(super) Vec<Positioned>);
 
-/// Result stream of the vehicle's poses at the updates.
+/// Result stream of the vehicle's poses at the advice updates.
 #[derive(Debug, Default, Resource)]
 pub(crate) struct Poses(pub(crate) ResultStream);
 
@@ -53,7 +53,7 @@ pub(super) fn navigate(
     let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
-        // Time may stall or go back. Each update is emitted once. After a gap, only the last update is
+        // Time may stall or go back. Each advice update is emitted once. After a gap, only the last update is
         // emitted.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
@@ -96,7 +96,7 @@ impl Navigator {
     }
 }
 
-/// Time of the last update at or before `now`; `None` if this update was already emitted.
+/// Time of the last advice update at or before `now`; `None` if this update was already emitted.
 fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     let period = ADVICE_PERIOD.0.unsigned_abs();
     let last = MonoNs(now.0 - now.0 % period);

@@ -115,8 +115,8 @@ fn head_ids(dive: &Loop) -> Vec<String> {
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// Stretches to pass again according to the present verdicts: all runs not yet cleared, from the far end to
-/// the portal.
+/// Stretches to pass again according to the present verdicts: all runs of missed sections not yet cleared,
+/// from the far end to the portal.
 pub fn go_back(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());

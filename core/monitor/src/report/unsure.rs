@@ -15,13 +15,13 @@ pub struct NoVerdictReport {
     pub start_m: f64,
     /// End of the stretch, m.
     pub end_m: f64,
-    /// Metres of the stretch that are unsure.
+    /// Metres of the stretch's sections that neither pass nor fail.
     pub no_verdict_m: f64,
     /// Diameter of the stretch's largest hole, m.
     pub hole_m: f64,
     /// Standard deviation of that diameter, m.
     pub hole_sd_m: f64,
-    /// The unsure stretch, for the report as text.
+    /// The stretch without a verdict, for the report as text.
     #[serde(skip)]
     pub stretch: UnsureStretch,
 }

@@ -10,7 +10,7 @@ use headrace_coverage::{HeadReach, Reach};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::passes::Situation;
 
-/// Extends the coverage extent at an update with a fix.
+/// Extends the coverage extent at an advice update with a fix.
 ///
 /// If no head works, requests judging of the sections that the vehicle has left.
 pub(super) fn note_beat(
@@ -105,7 +105,7 @@ mod tests {
             Self { world, coverage, requests: Requests(Vec::new()) }
         }
 
-        /// Assumed chainages of the heads, m, after an update with the vehicle at chainage `x_m`.
+        /// Assumed chainages of the heads, m, after an advice update with the vehicle at chainage `x_m`.
         fn beat(&mut self, seconds: u64, x_m: Option<f64>) -> [Option<f64>; 2] {
             let tunnel = tunnel();
             let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);

@@ -1,5 +1,5 @@
-//! Driving figures of the vehicle and its heads at each update. They are stored with the passage of each
-//! section.
+//! Driving figures of the vehicle and its heads at each advice update. They are stored with the passage of
+//! each section.
 
 use bevy_ecs::prelude::Resource;
 
@@ -39,7 +39,7 @@ const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
-/// Driving figures at the last update, and the data kept to compute the next ones.
+/// Driving figures at the last advice update, and the data kept to compute the next ones.
 #[derive(Debug, Clone, Default, Resource)]
 pub(crate) struct Driving {
     pub(super) now: Drive,
@@ -326,7 +326,7 @@ mod tests {
         let most_mps = along_m / 2.02;
         let fits_mps = |planned_mps: f64| {
             let mut driving = Driving::default();
-            // The steps along the wall are known only after the first update.
+            // The steps along the wall are known only after the first advice update.
             noted(&mut driving, EVEN, -0.1, planned_mps);
             let now = noted(&mut driving, EVEN, -0.1, planned_mps);
             assert!((now.fits_along_m - along_m).abs() < 1e-6 && (now.speed_mps - 0.1).abs() < 1e-12);

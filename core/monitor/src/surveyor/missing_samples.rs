@@ -1,9 +1,9 @@
 //! Finds missing samples: lost pings, pings that silent and stalled heads would have made, and pings without
 //! a fix.
 //!
-//! A silent or stalled head is assumed to turn on at its last rate. At each update, the points are recorded
-//! at which its pings would have met the design. Pings without a fix are recorded as soon as there is a fix
-//! again. They are placed along the straight line between the two fixes.
+//! A silent or stalled head is assumed to turn on at its last rate. At each advice update, the points are
+//! recorded at which its pings would have met the design. Pings without a fix are recorded as soon as there
+//! is a fix again. They are placed along the straight line between the two fixes.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,8 +32,8 @@ const ROOM: usize = 1 << 15;
 /// State of a head as last seen turning.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Turning {
-    /// Time of the last update at which the head turned, and the head's angle, radians, rate, rad/s, and
-    /// step, radians, at that time.
+    /// Time of the last advice update at which the head turned, and the head's angle, radians, rate, rad/s,
+    /// and step, radians, at that time.
     seen: Option<(MonoNs, f64, f64, f64)>,
     /// Time of the last ping, and of the last ping at a new angle.
     pinged: Option<MonoNs>,
@@ -96,14 +96,14 @@ struct Away {
 #[derive(Debug, Clone)]
 pub(crate) struct MissingSampleFinder {
     heads: [Turning; MAX_HEADS],
-    /// Time and pose of the last update with a fix.
+    /// Time and pose of the last advice update with a fix.
     pose: Option<(MonoNs, Pose)>,
     away: Vec<Away>,
     /// Whether pings without a fix were dropped for lack of room.
     forgot: bool,
     /// Heads that have stalled and have not been in phase since.
     pub(super) stalled: HeadSet,
-    /// Deaf heads as of the last update: heads that turn and ping without detecting the wall.
+    /// Deaf heads as of the last advice update: heads that turn and ping without detecting the wall.
     deaf: HeadSet,
 }
 
@@ -219,8 +219,8 @@ fn note_deaf(lacking: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Co
     }
 }
 
-/// Records missing samples at an update: simulated pings of silent and stalled heads, and pings without a
-/// fix.
+/// Records missing samples at an advice update: simulated pings of silent and stalled heads, and pings
+/// without a fix.
 ///
 /// Allocates: never.
 pub(super) fn note_beat(

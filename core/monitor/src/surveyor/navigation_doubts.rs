@@ -8,7 +8,7 @@ use headrace_fusion::filter::cable::CableDoubt;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::passes::Situation;
 
-/// Records the doubts reported at an update.
+/// Records the doubts reported at an advice update.
 pub(super) fn note(at: MonoNs, situation: &Situation, doubts: &Doubts, outputs: &mut OutputRefs<'_>) {
     let OutputRefs { digests, observations, .. } = outputs;
     if let Some(CableDoubt { since, from_m, differs_m, log }) = doubts.cable {

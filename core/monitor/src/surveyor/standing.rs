@@ -1,4 +1,4 @@
-//! Reports metres by verdict and the observations that hold at an update.
+//! Reports metres by verdict and the observations that hold at an advice update.
 
 use bevy_ecs::prelude::{Query, Res};
 

@@ -28,14 +28,14 @@ pub(super) struct Cursor {
     pub(super) stop: (usize, bool),
 }
 
-/// Sections to be judged, in order.
+/// Requests for sections to be judged, in order.
 #[derive(Debug, Resource)]
 pub(super) struct Requests(pub(super) Vec<Request>);
 
 /// Results of the surveyor in a tick.
 #[derive(Debug, Resource)]
 pub struct Found {
-    /// Metres by verdict and observations that hold, at each update, in order.
+    /// Metres by verdict and observations that hold, at each advice update, in order.
     pub standings: Vec<Standing>,
     /// Changed runs of flagged sections, in order.
     pub(crate) runs: Vec<RunInput>,
@@ -73,7 +73,7 @@ pub(super) struct Survey<'w> {
     pub(super) plan: Res<'w, Plan>,
 }
 
-/// Destinations of the surveyor's results.
+/// Lists and streams to which the surveyor adds its results.
 #[derive(SystemParam)]
 pub(super) struct Outputs<'w> {
     pub(super) found: ResMut<'w, Found>,

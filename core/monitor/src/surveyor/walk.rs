@@ -21,7 +21,7 @@ pub(super) struct Site<'w> {
     entities: Res<'w, HeadEntities>,
 }
 
-/// Processes pings until sections are due for judging, or until an update has been processed.
+/// Processes pings until sections are due for judging, or until an advice update has been processed.
 pub(super) fn walk(
     placed: Res<'_, PlacedTick>,
     classified: Res<'_, Classified>,

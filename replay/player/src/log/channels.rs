@@ -83,7 +83,7 @@ impl Channels {
         channels
     }
 
-    /// Returns the limit that the initial definitions exceeded, if any.
+    /// Returns the limit that the channel definitions known at opening exceeded, if any.
     pub(super) fn refused(&self) -> Option<Many> {
         self.refused
     }

@@ -257,7 +257,8 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Excludes all messages after these totals. Call it before reading the first message.
+    /// Excludes all messages that come after these totals of the recording. Call it before reading the first
+    /// message.
     pub(super) fn pass_over(&mut self, after: &Progress) {
         let number = |topic: &str| after.sequences.get(topic).copied().unwrap_or_default();
         self.repeated = self.channels.all().map(|channel| (channel.id, number(&channel.topic))).collect();

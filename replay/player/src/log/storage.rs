@@ -73,7 +73,8 @@ impl Storage for Disk {
     }
 }
 
-/// Change by another program to a recording's file. The file's content is then gone, or no longer at its path.
+/// Kind of change that another program has made to a recording's file. The content is then gone, or no longer
+/// at the file's path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Taken {
     #[error("another program has deleted the file")]

@@ -18,7 +18,7 @@ pub const TRIMMED: &str = "trimmed";
 /// message.
 pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 
-/// Content of a log to keep, and changes to it.
+/// Content that is kept of a log, and changes to this content.
 pub struct Trim<'a> {
     /// Spans of log time to keep, in order and without overlap. An empty list keeps everything.
     pub spans: Vec<(MonoNs, MonoNs)>,

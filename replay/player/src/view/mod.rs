@@ -70,7 +70,7 @@ pub struct View {
     points: Points,
     wall: Wall,
     sections: Sections,
-    /// Chainage, m, and speed, m/s, at the last known position.
+    /// Chainage, m, and speed, m/s, of the vehicle at its last known position.
     last: Option<(f64, f64)>,
     v_max_mps: f64,
     told: Option<LastAdvice>,

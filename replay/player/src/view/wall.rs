@@ -75,7 +75,7 @@ impl Wall {
         }
     }
 
-    /// Stores the verdict of a section.
+    /// Stores the verdict of a tunnel section for the grid of the wall.
     pub(super) fn judge(&mut self, section: i64, verdict: Verdict) {
         if let Some(column) = self.column(section)
             && column.verdict != verdict

@@ -68,8 +68,8 @@ fn any_speed_is_fine_over_wall_with_the_verdict_pass() {
     assert_eq!(mute.condition(), Condition::NoSonar);
 }
 
-/// The vehicle passes a missed stretch again from the turning point on. It also covers wall on its way back,
-/// if it is slow enough.
+/// The vehicle goes back, and passes a missed stretch again from the turning point on. It also covers wall on
+/// its way back, if it is slow enough.
 #[test]
 fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
     let back = LiveState { back_to_m: Some(8.2), speed_mps: Some(-0.3), ..state() };

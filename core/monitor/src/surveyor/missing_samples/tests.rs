@@ -197,7 +197,7 @@ impl Dive {
         Self { world, coverage: coverage(), profile, lacking }
     }
 
-    /// Missing samples recorded by an update with or without a fix.
+    /// Missing samples recorded by an advice update with or without a fix.
     fn beat(&mut self, seconds: f64, has_fix: bool) -> Vec<MissingSample> {
         let [y_m, z_m] = self.profile.reference();
         let position = Point3::new(1.0 + 0.1 * seconds, y_m, z_m);
@@ -281,7 +281,7 @@ fn simulated_pings_without_a_fix_are_placed_at_the_next_fix() {
     );
 }
 
-/// After a gap in a log, the work of an update stays bounded, and the dropped pings are recorded.
+/// After a gap in a log, the work of an advice update stays bounded, and the dropped pings are recorded.
 #[test]
 fn gap_in_the_log_keeps_only_the_latest_simulated_pings() {
     for (owed, is_forgotten) in [(ROOM, false), (ROOM + 1, true)] {

@@ -68,7 +68,8 @@ fn slow_medium_loses_nothing_if_the_loop_waits_for_the_queue() {
     }
 }
 
-/// A medium whose flushes each wait for a release. After the sender is dropped no flush waits.
+/// A medium on which each flush waits until the test releases it. After the test has dropped its sender, no
+/// flush waits.
 struct Held(mpsc::Receiver<()>);
 
 impl Write for Held {
@@ -293,7 +294,7 @@ fn recorder_on_a_nearly_full_disk_keeps_small_messages_and_records_omissions() {
     let (mut port, handle) = within(Some(5_000_000), medium, &header, None);
     for tick in 1..=100_u64 {
         let at = MonoNs(tick * 1_000_000_000);
-        // All of these messages fit in the queue.
+        // All messages of this test fit in the recorder's queue.
         port.raw(0, at, at, &noise(tick, 265)).unwrap();
         port.raw(2, at, at, &noise(tick, 140)).unwrap();
         port.tick(tick, at, &[0, 2]).unwrap();
@@ -339,7 +340,8 @@ fn messages_beyond_the_queue_capacity_are_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
-/// Runs the recorder at the given times, with packets dropped before each. Returns the losses that the log states.
+/// Runs the recorder's steps at the given times. Connections drop packets before each step. Returns the
+/// losses that the log states.
 fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
     let (medium, flushed) = slow(0);
     let storage = Box::new(Within(None, Some(medium)));

@@ -44,7 +44,7 @@ struct World {
     files: BTreeMap<PathBuf, Content>,
     ops: u64,
     plan: Plan,
-    /// Whether a failed sync loses the data that it should have saved.
+    /// Whether a sync that fails loses the data that it should have written to the disk.
     forgets: bool,
 }
 
@@ -284,7 +284,7 @@ fn backlog_overflow_loses_and_counts_the_oldest_messages() {
     storage.store(false);
     let (seen, losses) = read_back(&folder);
     assert_eq!(seen.len() as u64, summary.messages);
-    // The messages have one gap. The statement of the loss names the two ends of that gap.
+    // The messages have one gap. The log's statement of the loss gives the times at the two ends of that gap.
     let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
     let gaps: Vec<_> = times.windows(2).filter(|pair| pair[1] - pair[0] > 100_000_000).collect();
     let stated = losses.iter().find(
