@@ -134,7 +134,9 @@ impl<S: Stage> Part<S> {
             let why = |error| PluginError::Schedule { why: format!("stage {stage:?}: {error:?}") };
             built.map(|_| ()).map_err(why)
         })?;
-        S::ALL.iter().for_each(|stage| self.run(*stage));
+        for stage in S::ALL {
+            self.run(*stage);
+        }
         Ok(())
     }
 

@@ -8,6 +8,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 
 /// One section with its verdict and figures.
+#[expect(clippy::struct_excessive_bools, reason = "the flags are independent of one another")]
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SectionRow {
     /// Chainage of the section's start, as a multiple of the section length.
@@ -139,7 +140,7 @@ fn verdict_word<S: Serializer>(verdict: &Verdict, to: S) -> Result<S::Ok, S::Err
     to.serialize_str(verdict.as_str())
 }
 
-#[expect(clippy::ref_option, reason = "serde's signature")]
+#[expect(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
 fn reason_word<S: Serializer>(reason: &Option<Unsure>, to: S) -> Result<S::Ok, S::Error> {
     reason.filter(|reason| *reason != Unsure::NotInspected).map(Unsure::as_str).serialize(to)
 }

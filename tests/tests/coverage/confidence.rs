@@ -34,7 +34,7 @@ fn keeps_clear(report: &Report, section: &SectionRow) -> bool {
         Verdict::Pass => passes,
         Verdict::Fail => fails,
         Verdict::CannotSay => !passes && !fails,
-        _ => true,
+        Verdict::Open => true,
     }
 }
 
