@@ -40,7 +40,8 @@ pub(crate) fn plan_json(
         let mut inspection = config.inspection().map_err(wrong)?;
         (inspection.drift_m, inspection.yaw_rad) = (drift_m, yaw_rad);
         inspection.yaw_rate_radps = yaw_rate_radps;
-        let question = Question { target_m: question.target_m.or(Some(config.target.max_hole_m)), ..question };
+        let question =
+            Question { target_m: question.target_m.or(Some(config.target.max_hole_m)), ..question };
         let answers = Planner::new(inspection)?.with_errors(errors).answers(&question, None)?;
         serde_json::to_string(&answers).map_err(|error| wrong(error.to_string()))
     })

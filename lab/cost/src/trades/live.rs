@@ -1,6 +1,7 @@
 //! Cost of finer settings in the live loop: the rays that the advice casts in a ring around each head, the length of
 //! a tick, and the vertices of a surveyed profile.
 
+use headrace_coverage::Verdict;
 use std::fmt::Write as _;
 
 use headrace_config::Document;
@@ -45,7 +46,7 @@ struct Setting {
 struct Ran {
     /// Advised speed at each update, m/s; zero if no speed was advised.
     v_max_mps: Vec<f64>,
-    verdicts: Vec<(i64, &'static str)>,
+    verdicts: Vec<(i64, Verdict)>,
     /// CPU time of each tick, s.
     ticks_s: Vec<f64>,
     digest: String,

@@ -2,6 +2,7 @@
 
 mod effects;
 
+use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_simulator::environment::What;
 use headrace_simulator::{Scene, Simulation};
@@ -46,7 +47,7 @@ struct Stage {
 /// Results of a simulated dive.
 struct Figures {
     /// D and verdict of each section, by the section's start in millimetres.
-    sections: Vec<(i64, Option<f64>, &'static str)>,
+    sections: Vec<(i64, Option<f64>, Verdict)>,
     /// Numbers of the features that beams hit.
     features_hit: Vec<u16>,
 }
@@ -380,9 +381,9 @@ fn compare(whole: &Figures, other: &Figures, differences: &mut Differences) {
             continue;
         };
         changes_m.extend(hole_m.zip(*hole_before_m).map(|(now_m, before_m)| now_m - before_m));
-        let is = |word: &str, is: &str| f64::from(u8::from(word == is));
+        let passes = |verdict: &Verdict| f64::from(u8::from(*verdict == Verdict::Pass));
         count += 1.0;
-        passed += is(verdict, "pass") - is(before, "pass");
+        passed += passes(verdict) - passes(before);
         differing += f64::from(u8::from(verdict != before));
     }
     if changes_m.is_empty() {
