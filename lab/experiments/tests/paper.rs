@@ -246,12 +246,12 @@ fn missing_command_prints_the_available_ones() {
     let Output { status, stdout, stderr } = answer(&[]);
     assert_eq!((status.code(), stdout.as_slice()), (Some(2), &[][..]));
     insta::assert_snapshot!(String::from_utf8(stderr).unwrap(), @"
-    The paper that headrace's sampling theory is from, computed anew
+    Recompute the results of the paper on which headrace's sampling theory is based
 
     Usage: headrace_experiments <COMMAND>
 
     Commands:
-      tables       Tables 1 to 5: each printed number, ours beside it, and where the fault is the paper's
+      tables       Tables 1 to 5: each printed number next to the recomputed one, with notes on errors in the paper
       experiments  The simulated and real experiments (§8 and §9); takes a minute or two
       help         Print this message or the help of the given subcommand(s)
 
