@@ -1,4 +1,4 @@
-//! Two hundred dives with one broken device each. No section passes with a true hole far over the target.
+//! Sixty dives with one broken device each. No section passes with a true hole far over the target.
 //!
 //! The seeds rotate through all senses and faults. Start, duration and size of a fault are random.
 
@@ -8,7 +8,7 @@ use headrace_tests::field_table::breaking::DeviceFault;
 use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, VEHICLES};
 use headrace_tests::random_dives::Draw;
 
-const SEEDS: u64 = 200;
+const SEEDS: u64 = 60;
 const LENGTH_M: f64 = 7.0;
 
 /// Largest allowed share of passes among the sections with D_true over T.
@@ -82,7 +82,7 @@ fn no_section_far_over_the_target_passes_with_a_broken_device() {
     let total = |of: fn(&Figures) -> u32| all.iter().map(|(_, figures)| f64::from(of(figures))).sum::<f64>();
     let (over, passed_over) = (total(|figures| figures.over), total(|figures| figures.passed_over));
     println!("{passed_over} of {over} over the target passed; far over it in {} dives: {far:?}", far.len());
-    assert!(over > 1000.0, "{over}");
+    assert!(over > 300.0, "{over}");
     assert!(far.is_empty(), "{far:?}");
     assert!(passed_over <= MOST_OVER * over, "{passed_over} of {over}");
 }

@@ -1,9 +1,9 @@
-//! Repeats dives without the reported causes, and checks that the failed sections then pass. Uses a tenth of the dives
-//! of the bench `causes`.
+//! Repeats dives without the reported causes, and checks that the failed sections then pass. Uses a twentieth of the
+//! dives of the bench `causes`.
 
 use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
 
-const DIVES: u64 = 50;
+const DIVES: u64 = 25;
 
 #[test]
 fn section_passes_after_removing_the_reported_cause() {
@@ -32,8 +32,8 @@ fn section_passes_after_removing_the_reported_cause() {
     }
     let text = format!("{}runs cleared by the displayed remedy: {cleared} of {runs}\n", matrix.text());
     println!("{text}");
-    assert!(runs >= 20 && 10 * cleared >= 9 * runs, "remedies\n{text}");
-    assert!(matrix.sections[0].all > 300 && matrix.stretches[1].all > 25, "too few fails\n{text}");
+    assert!(runs >= 10 && 10 * cleared >= 9 * runs, "remedies\n{text}");
+    assert!(matrix.sections[0].all > 150 && matrix.stretches[1].all > 10, "too few fails\n{text}");
     assert!(matrix.sections[0].share() >= 0.95, "sections, one cause\n{text}");
     assert!(matrix.stretches[1].share() >= 0.65, "stretches, two causes\n{text}");
     assert!(matrix.pairs.share() >= 0.4, "sets of two\n{text}");

@@ -8,10 +8,10 @@ use headrace_simulator::{START, Simulation};
 use headrace_tests::scenes;
 use headrace_vehicle::Mission;
 
-/// A minute of motion, followed by an hour in which the vehicle is stationary and its sensors have noise.
+/// A minute of motion, followed by half an hour in which the vehicle is stationary and its sensors have noise.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoints\"\n\
     [[trajectory.waypoints]]\nchainage_m = 5\n\
-    [[trajectory.waypoints]]\nchainage_m = 17\nspeed_mps = 0.2\nstay_s = 3600\n\
+    [[trajectory.waypoints]]\nchainage_m = 17\nspeed_mps = 0.2\nstay_s = 1800\n\
     [[trajectory.waypoints]]\nchainage_m = 17.1\nspeed_mps = 0.2\n\
     [effects]\nrange_noise = { sd_m = 0.02 }\n";
 

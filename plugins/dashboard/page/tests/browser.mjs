@@ -24,6 +24,12 @@ export async function closeAll() {
   for (const started of opened) await started.close();
 }
 
+/** An `init` of `open`: the page draws no wall. Drawn in software, its frames delay clicks and clocks on a busy machine. */
+export const withoutWebGl = (page) => page.addInitScript(() => {
+  const get = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind === "webgl2" ? null : get.call(this, kind, ...rest); };
+});
+
 /** A page in its own context; `problems` collects its messages and errors. */
 export async function open(chromium, url, { width = 1280, height = 800, palette = "dusk", init, ...more } = {}) {
   const context = await chromium.newContext({ viewport: { width, height }, ...more });

@@ -5,18 +5,19 @@ import { clock } from "../text/format";
 import { MOST_S } from "./lack";
 import { discard, lacks, next, voice, voiceTopic } from "./record";
 
-/** A recording whose button is held longer than this ends on release. */
+/** A recording whose button is held longer than this ends on release. Both times are those of the input, because a busy
+ * page handles it late. */
 const HELD_MS = 700;
 let down_ms: number | null = null;
 
 function press(event: PointerEvent): void {
   if (event.button !== 0) return;
-  down_ms = voice.phase === "idle" ? performance.now() : null;
+  down_ms = voice.phase === "idle" ? event.timeStamp : null;
   next();
 }
 
-function release(): void {
-  if (down_ms !== null && voice.phase === "recording" && performance.now() - down_ms > HELD_MS) next();
+function release(event: PointerEvent): void {
+  if (down_ms !== null && voice.phase === "recording" && event.timeStamp - down_ms > HELD_MS) next();
   down_ms = null;
 }
 
