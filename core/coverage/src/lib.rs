@@ -32,6 +32,7 @@ pub mod frontier;
 pub mod hole;
 pub mod missing_samples;
 pub mod openings;
+mod origin;
 pub mod other_target;
 pub mod passage;
 pub mod relief;

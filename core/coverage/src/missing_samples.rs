@@ -26,6 +26,8 @@ pub struct MissingSample {
     pub head: u8,
     /// Causes of the missing sample. It would exist only if all of them had been absent.
     pub why: Causes,
+    /// Whether there was a doubtful return, which may be wall.
+    pub may_be_wall: bool,
 }
 
 /// List of the most recent missing samples.
@@ -120,7 +122,7 @@ mod tests {
     #[test]
     fn full_list_drops_the_oldest_missing_samples() {
         let mut lacks = MissingSamples::default();
-        let lack = |x_m: f64| MissingSample { x_m, arc_m: 1.0, head: 0, why: Causes::of(Cause::HeadSilent) };
+        let lack = |x_m: f64| MissingSample { x_m, arc_m: 1.0, head: 0, why: Causes::of(Cause::HeadSilent), may_be_wall: false };
         for k in 0..2 * ROOM + 10 {
             lacks.add(lack(k as f64));
         }
@@ -136,7 +138,7 @@ mod tests {
         let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
         for k in 0..ROOM + 100 {
             let (head, why) = (u8::from(k % 2 == 1), if k % 5 == 0 { Cause::Occluded } else { missing });
-            lacks.add(MissingSample { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why) });
+            lacks.add(MissingSample { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why), may_be_wall: false });
         }
         let last = (ROOM + 99) as f64;
         // Head 1 should have made five of ten samples in a row. The last of them is occluded.
@@ -157,7 +159,7 @@ mod tests {
         for k in 0..ROOM + 5 * BLOCK + 77 {
             let along_m = (k % 9000) as f64 * 0.01;
             let x_m = if (k / 9000).is_multiple_of(2) { along_m } else { 90.0 - along_m };
-            lacks.add(MissingSample { x_m, arc_m: k as f64, head: 0, why: Causes::of(Cause::HeadSilent) });
+            lacks.add(MissingSample { x_m, arc_m: k as f64, head: 0, why: Causes::of(Cause::HeadSilent), may_be_wall: false });
             if k % 977 == 0 || k >= ROOM && k % 101 == 0 {
                 let [from_m, to_m] = [x_m - 0.3, x_m + 0.1 * (k % 7) as f64];
                 let all = lacks.ring.iter().filter(|lack| (from_m..=to_m).contains(&lack.x_m));

@@ -18,14 +18,39 @@ const BINS: i64 = 128;
 /// In a tunnel of 6 m radius, all bins together are 9 m long, which exceeds the distance between heads.
 const SLABS: i64 = 32;
 
+/// The head that met something, and the angle by which it had turned by then since the start of the dive, rad.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Pass {
+    pub(super) head: u8,
+    pub(super) turned_rad: f64,
+}
+
+impl Pass {
+    /// Whether two passes differ: by the head, or by half a turn of it.
+    fn is_other(&self, other: &Self) -> bool {
+        self.head != other.head || (self.turned_rad - other.turned_rad).abs() > math::TAU / 2.0
+    }
+}
+
+/// A return that deviates from the design, as support for later passes.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Found {
+    pub(super) placed: PlacedReturn,
+    /// Whether the return was classified as wall.
+    pub(super) is_wall: bool,
+    /// Number of passes that met the same thing here, with this one.
+    pub(super) passes: u8,
+    pub(super) pass: Pass,
+}
+
 /// Recent returns in one bin of the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Cell {
     /// Number of the bin's slab (row of bins) since chainage zero. A bin with the number of another slab is
     /// outdated.
     slab: i64,
-    /// The latest return that deviates from the design, and whether it was classified as wall.
-    off: Option<(PlacedReturn, bool)>,
+    /// The latest return that deviates from the design.
+    off: Option<Found>,
     /// Bitmasks of the heads whose returns in this bin agree with the design, and of those whose returns
     /// contradict it.
     as_designed: u8,
@@ -118,32 +143,43 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 }
 
 impl Relief {
-    /// Whether earlier returns near this return have the same deviation from the design.
+    /// Whether wall found near this return has the same deviation from the design.
+    pub(super) fn is_wall(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
+        self.near(placed, limits, 1.0).any(|found| found.is_wall)
+    }
+
+    /// Number of earlier passes that met the same thing near this return, whether it is wall or not.
+    pub(super) fn confirmed(&self, placed: &PlacedReturn, pass: &Pass, limits: &WallLimits) -> u8 {
+        let others = self.near(placed, limits, 0.5).filter(|found| found.pass.is_other(pass));
+        others.map(|found| found.passes).max().unwrap_or(0)
+    }
+
+    /// Earlier returns near this return with the same deviation from the design.
     ///
-    /// Two limits apply: the reach along the tunnel and the tolerance of the deviation. An earlier wall
-    /// return must be within both limits, a doubtful one within half of each.
-    pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
+    /// `share` reduces the limits: the reach along the tunnel, and the tolerance of the deviation.
+    fn near(
+        &self,
+        placed: &PlacedReturn,
+        limits: &WallLimits,
+        share: f64,
+    ) -> impl Iterator<Item = &Found> + use<'_> {
         let (slab, bin) = place(placed, limits);
-        (slab - 2..=slab + 2).any(|slab| {
-            (bin - 1..=bin + 1).any(|bin| {
-                let Some((other, is_wall)) = self.cell(slab, bin).and_then(|cell| cell.off) else {
-                    return false;
-                };
-                let share = if is_wall { 1.0 } else { 0.5 };
-                (other.x_m - placed.x_m).abs() <= share * limits.reach_m
-                    && (other.off_m - placed.off_m).abs() <= share * limits.tolerance_m
-            })
+        let (placed, reach_m, tolerance_m) = (*placed, share * limits.reach_m, share * limits.tolerance_m);
+        let cells = (slab - 2..=slab + 2).flat_map(move |slab| (bin - 1..=bin + 1).map(move |bin| (slab, bin)));
+        let found = cells.filter_map(move |(slab, bin)| self.cell(slab, bin)?.off.as_ref());
+        found.filter(move |Found { placed: other, .. }| {
+            (other.x_m - placed.x_m).abs() <= reach_m && (other.off_m - placed.off_m).abs() <= tolerance_m
         })
     }
 
     /// Stores a return that deviates from the design as support for later passes.
-    pub(super) fn remember(&mut self, placed: &PlacedReturn, is_wall: bool, limits: &WallLimits) {
-        if limits.is_design(placed) {
+    pub(super) fn remember(&mut self, found: &Found, limits: &WallLimits) {
+        if limits.is_design(&found.placed) {
             return;
         }
-        let (slab, bin) = place(placed, limits);
+        let (slab, bin) = place(&found.placed, limits);
         if let Some(cell) = self.cell_mut(slab, bin) {
-            cell.off = Some((*placed, is_wall));
+            cell.off = Some(*found);
         }
     }
 
@@ -161,7 +197,7 @@ impl Relief {
             debug_assert!(false, "bin {bin} of slab {slab} has a place");
             return;
         };
-        if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
+        if as_designed && cell.off.is_some_and(|found| !found.is_wall) {
             // This head agrees with the design here, so the unconfirmed object that earlier returns showed
             // here is gone.
             cell.off = None;
@@ -172,7 +208,7 @@ impl Relief {
         }
         *seen |= me;
         let Cell { as_designed: agreeing, contradicting, off, .. } = *cell;
-        let off = off.map_or(*placed, |(off, _)| off);
+        let off = off.map_or(*placed, |found| found.placed);
         let others_agree = agreeing & !me & !distrusted != 0;
         if !as_designed {
             if others_agree && agreeing & me == 0 {
@@ -269,7 +305,7 @@ mod tests {
     /// A head that contradicts another head is outvoted, unless the other head is itself distrusted.
     #[test]
     fn distrusted_head_does_not_outvote_other_heads() {
-        let limits = WallLimits::new(20.0, 0.3);
+        let limits = WallLimits::new(20.0, 0.3, 2.0);
         let of = |off_m: f64| PlacedReturn { x_m: 7.0, arc_m: 3.0, off_m };
         let outvoted = |believed: bool| {
             let mut relief = Relief::default();

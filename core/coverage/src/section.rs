@@ -159,6 +159,8 @@ pub struct Section {
     pub(super) stale: bool,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,
+    /// Whether doubtful returns would fill every hole over the target if they were wall.
+    pub(super) filled_by_doubtful: bool,
     /// Whether the section holds samples of a head that was distrusted soon after.
     pub suspect: bool,
     /// Number of the vehicle's newest visit to the section at the time when a head with samples there became
@@ -234,7 +236,8 @@ impl Section {
     pub(super) fn doubt(&self) -> Option<Unsure> {
         let of_heads = self.suspect.then_some(Unsure::DistrustedHead);
         let of_places = self.visits.are_unrelated().then_some(Unsure::SeveralStretches);
-        self.wall_doubt().or(of_heads).or(of_places)
+        let of_returns = self.filled_by_doubtful.then_some(Unsure::DoubtfulReturns);
+        self.wall_doubt().or(of_returns).or(of_heads).or(of_places)
     }
 
     /// Returns the reason why most of the returns accepted as wall may come from something else; `None` if

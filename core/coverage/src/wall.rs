@@ -1,17 +1,17 @@
 //! Decides which returns are wall: those near the design profile, and those with which other returns agree.
 //!
-//! A return within the tolerance of the design is wall. Another return needs a neighbour along the turn that is wall,
-//! or an earlier pass nearby with the same deviation from the design. Successive returns that agree only with one
-//! another are a *run*. A run is wall if it is wide for its distance from the design, or if it ends in a slope to the
-//! wall.
+//! A return within the tolerance of the design is wall. So is a return with the deviation of wall that an earlier pass
+//! found nearby. Other successive returns that agree with one another are a *run*, which has odds of being wall, see
+//! `origin`.
 //!
-//! An isolated return is *doubtful*. So is a run that hangs in front of the wall: a fish, a cloud of bubbles, an echo
-//! off two walls. A return waits for the head's next returns before it counts as doubtful, since a boulder begins
-//! with a single return.
+//! A return waits for the head's next returns before it is decided, since a boulder begins with a single return.
 
 use serde::{Deserialize, Serialize};
 
-use super::relief::Relief;
+use headrace_geometry::math;
+
+use super::origin::{Experience, Extent};
+use super::relief::{Found, Pass, Relief};
 use super::trust::{Beam, Disagreement, Distrust, HeadTrust, Others};
 use super::wall_limits::{PlacedReturn, WallLimits};
 
@@ -22,6 +22,8 @@ pub enum Taken {
     Wall,
     /// Uncertain: wall, or something in the water.
     Doubtful,
+    /// The return came from something in the water, or by a second path.
+    Other,
     /// Pending: the head's next returns decide.
     Waits,
 }
@@ -40,16 +42,6 @@ pub struct Sorted {
 
 /// Maximum number of a head's returns that wait for classification.
 pub const MOST_WAITING: usize = 24;
-/// A run is no wall if its distance from the wall is more than this multiple of its width, and if it has a
-/// jump to the wall on both sides.
-///
-/// Such a run hangs in the water, or is an echo off two walls. Rocks, heaps, niches and caves are about as
-/// wide as they are high or deep. Side tunnels appear as deep as they are wide.
-///
-/// Tuned on the condition `murk` of the field table: its clusters of returns are at least 12 times as far
-/// from the wall as they are wide.
-const SLENDER: f64 = 4.0;
-
 /// A run: successive returns that agree only with one another.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Run {
@@ -61,6 +53,14 @@ struct Run {
     /// Largest distance of the run from the design, and its width, m.
     off_m: f64,
     width_m: f64,
+    /// Sum of the numbers of earlier passes that met the same thing at each return.
+    confirmed: u32,
+    /// These numbers for each waiting return.
+    confirmed_each: [u8; MOST_WAITING],
+    /// Number of the run's ends that slope to the wall.
+    slopes: u8,
+    /// Whether the run is certain to be wall. Its next returns then don't wait.
+    is_wall: bool,
 }
 
 impl Run {
@@ -69,29 +69,37 @@ impl Run {
         u32::from(self.waits)
     }
 
-    /// Returns the run's returns that wait for classification.
-    fn returns(&self) -> impl Iterator<Item = &PlacedReturn> {
-        self.waiting.iter().take(usize::from(self.waits))
+    /// Returns the run's returns that wait for classification, with the number of earlier passes that met the same thing.
+    fn returns(&self) -> impl Iterator<Item = (&PlacedReturn, u8)> {
+        self.waiting.iter().zip(self.confirmed_each).take(usize::from(self.waits))
     }
 
     /// Adds a return that waits for classification to the run.
-    fn add(&mut self, placed: &PlacedReturn, limits: &WallLimits) {
+    fn add(&mut self, placed: &PlacedReturn, confirmed: u8, limits: &WallLimits) {
         debug_assert!(!self.is_full(), "a run is given up when {MOST_WAITING} returns wait: {}", self.waits);
         let first = *self.first.get_or_insert(*placed);
         self.all += 1;
+        self.confirmed += u32::from(confirmed);
         self.off_m = self.off_m.max(placed.off_m.abs());
         // Each return represents one step of width: half a step on either side.
         let steps = f64::from(self.all.max(2)) / f64::from(self.all.max(2) - 1);
-        self.width_m = self.width_m.max(steps * limits.width_m(&first, placed));
-        if let Some(slot) = self.waiting.get_mut(usize::from(self.waits)) {
-            *slot = *placed;
+        self.width_m = self.width_m.max(steps * limits.width_m(&first, placed)).max(limits.step_m(placed));
+        let at = usize::from(self.waits);
+        if let (Some(slot), Some(each)) = (self.waiting.get_mut(at), self.confirmed_each.get_mut(at)) {
+            (*slot, *each) = (*placed, confirmed);
             self.waits += 1;
         }
     }
 
-    /// Whether the run is wide enough to be wall.
-    fn is_broad(&self) -> bool {
-        self.all > 1 && SLENDER * self.width_m >= self.off_m
+    /// Size of the run, with the mean number of passes that confirmed its returns.
+    fn extent(&self) -> Extent {
+        let confirmed = f64::from(self.confirmed) / f64::from(self.all.max(1));
+        Extent { width_m: self.width_m, off_m: self.off_m, confirmed, slopes: self.slopes }
+    }
+
+    /// Whether the run is behind the design profile.
+    fn is_behind(&self) -> bool {
+        self.first.is_some_and(|first| first.off_m > 0.0)
     }
 
     /// Whether there is no room for another waiting return.
@@ -101,8 +109,8 @@ impl Run {
 
     /// Removes all waiting returns except the last one.
     fn give_up(&mut self, last: &PlacedReturn) {
-        self.waiting[0] = *last;
-        self.waits = 1;
+        let confirmed = self.waits.checked_sub(1).and_then(|at| self.confirmed_each.get(usize::from(at)).copied());
+        (self.waiting[0], self.confirmed_each[0], self.waits) = (*last, confirmed.unwrap_or(0), 1);
     }
 }
 
@@ -113,6 +121,11 @@ pub struct HeadWall {
     last: [Option<(PlacedReturn, Taken)>; 2],
     /// The run of returns that wait for classification.
     run: Run,
+    /// Experience with runs in front of the design profile, and with runs behind it.
+    experience: [Experience; 2],
+    /// Angle of the last beam, and angle turned since the start of the dive, rad.
+    angle_rad: f64,
+    turned_rad: f64,
     trust: HeadTrust,
 }
 
@@ -140,70 +153,117 @@ impl HeadWall {
         let is_of_wall =
             |other: Option<(PlacedReturn, Taken)>| other.is_some_and(|(_, taken)| taken == Taken::Wall);
         let is_design = limits.is_design(&placed);
-        let is_wall =
-            is_design || is_of_wall(last) || is_of_wall(last_but_one) || relief.supports(&placed, limits);
+        let is_wall = is_design || relief.is_wall(&placed, limits);
+        let slopes = is_of_wall(last) || is_of_wall(last_but_one);
         let before = self.last[0].map(|(other, _)| other);
-        let (waited, waiting, this) = self.decide(&placed, is_wall, last.is_some(), limits);
+        self.turned_rad += math::wrap_signed(beam.angle_rad - self.angle_rad, math::TAU).abs();
+        self.angle_rad = beam.angle_rad;
+        let pass = Pass { head: u8::try_from(head).unwrap_or(u8::MAX), turned_rad: self.turned_rad };
+        let confirmed = relief.confirmed(&placed, &pass, limits);
+        let found = |placed: &PlacedReturn, is_wall: bool, confirmed: u8| Found {
+            placed: *placed,
+            is_wall,
+            passes: confirmed.saturating_add(1),
+            pass,
+        };
+        let (waited, waiting, this) =
+            self.decide((&placed, confirmed), (is_wall, last.is_some(), slopes), limits);
         relief.vote(head, &placed, limits);
         let both_design = is_design && before.is_some_and(|other| limits.is_design(&other));
         let jump_m =
             before.filter(|_| last.is_none() && !both_design).map(|other| placed.off_m - other.off_m);
-        let doubtful = if waiting == Some(Taken::Doubtful) { waited.count() } else { 0 };
+        let is_rejected = matches!(waiting, Some(Taken::Doubtful | Taken::Other));
+        let doubtful = if is_rejected { waited.count() } else { 0 };
         let others = Others { ballot: relief.ballot(head), change: relief.others_change(head) };
         let distrusted = self.trust.note(&placed, beam, Disagreement { jump_m, doubtful }, limits, &others);
         relief.note_changing(head, !self.trust.is_stuck(limits));
         relief.believe(head, self.distrusted().is_none());
         if self.distrusted().is_some() {
             self.run = Run::default();
-            self.last[0] = Some((placed, Taken::Doubtful));
-            let waiting = (waited.count() > 0).then_some(Taken::Doubtful);
-            return Sorted { waiting, this: Taken::Doubtful, distrusted };
+            self.last[0] = Some((placed, Taken::Other));
+            let waiting = (waited.count() > 0).then_some(Taken::Other);
+            return Sorted { waiting, this: Taken::Other, distrusted };
         }
         if let Some(taken) = waiting {
-            waited.returns().for_each(|other| relief.remember(other, taken == Taken::Wall, limits));
+            let is_wall = taken == Taken::Wall;
+            waited.returns().for_each(|(other, passes)| relief.remember(&found(other, is_wall, passes), limits));
         }
         if this == Taken::Wall {
-            relief.remember(&placed, true, limits);
+            relief.remember(&found(&placed, true, confirmed), limits);
         }
         Sorted { waiting, this, distrusted }
     }
 
     /// Classifies a head's new return and the returns that wait for it.
     ///
-    /// `agrees` means that the new return agrees with the head's previous return. Output: the run of waiting
-    /// returns, its classification (`None` if undecided), and the classification of the new return.
+    /// `confirmed` is the number of earlier passes that met the same thing. `agrees` means that the new return agrees with
+    /// the head's previous return, and `slopes` that it agrees with one of the last two, which is wall. Output: the run of
+    /// waiting returns, its classification (`None` if undecided), and the classification of the new return.
     fn decide(
         &mut self,
-        placed: &PlacedReturn,
-        is_wall: bool,
-        agrees: bool,
+        (placed, confirmed): (&PlacedReturn, u8),
+        (is_wall, agrees, slopes): (bool, bool, bool),
         limits: &WallLimits,
     ) -> (Run, Option<Taken>, Taken) {
-        let waited = self.run;
-        let goes_on = !is_wall && agrees && waited.count() > 0;
-        let mut run = if goes_on { waited } else { Run::default() };
-        if !is_wall {
-            run.add(placed, limits);
+        let mut waited = self.run;
+        let goes_on = !is_wall && agrees && waited.all > 0;
+        let mut run = if goes_on { waited } else { Run { slopes: u8::from(slopes), ..Run::default() } };
+        if is_wall {
+            waited.slopes += u8::from(agrees);
+        } else {
+            run.add(placed, confirmed, limits);
         }
-        let is_broad = run.is_broad();
-        let this = if is_wall || is_broad { Taken::Wall } else { Taken::Waits };
+        run.is_wall = !is_wall && (run.is_wall || self.log_odds(&run, limits) >= limits.sure_log_odds);
+        let this = if is_wall || run.is_wall { Taken::Wall } else { Taken::Waits };
         let waiting = match waited.count() {
             0 => None,
-            // Either the run ended in a slope to the wall, or the run is wide enough.
-            _ if is_wall && agrees || is_broad && goes_on => Some(Taken::Wall),
-            _ if !goes_on => Some(Taken::Doubtful),
-            _ if run.is_full() => Some(Taken::Doubtful),
+            _ if goes_on && run.is_wall => Some(Taken::Wall),
+            _ if !goes_on || run.is_full() => Some(self.taken(&waited, limits)),
             _ => None,
         };
-        if waiting == Some(Taken::Doubtful) && goes_on {
+        if run.is_wall && !(goes_on && waited.is_wall) {
+            self.note(&run, limits);
+        } else if waiting.is_some() {
+            self.note(&waited, limits);
+        }
+        if this == Taken::Wall {
+            run.waits = 0;
+        } else if waiting.is_some() && goes_on {
             run.give_up(placed);
         }
-        self.run = if this == Taken::Wall { Run::default() } else { run };
+        self.run = if is_wall { Run::default() } else { run };
         let settled = |(other, taken): (PlacedReturn, Taken)| {
             (other, waiting.filter(|_| taken == Taken::Waits).unwrap_or(taken))
         };
         self.last = [Some((*placed, this)), self.last[0].map(settled)];
         (waited, waiting, this)
+    }
+
+    /// Log odds that a run is wall.
+    fn log_odds(&self, run: &Run, limits: &WallLimits) -> f64 {
+        let [front, behind] = &self.experience;
+        let experience = if run.is_behind() { behind } else { front };
+        experience.log_odds(&run.extent(), limits.radius_m)
+    }
+
+    /// Classification of a run that has ended without a slope to the wall.
+    fn taken(&self, run: &Run, limits: &WallLimits) -> Taken {
+        let log_odds = self.log_odds(run, limits);
+        if log_odds >= limits.sure_log_odds {
+            Taken::Wall
+        } else if log_odds > -limits.sure_log_odds {
+            Taken::Doubtful
+        } else {
+            Taken::Other
+        }
+    }
+
+    /// Adds a decided run to the experience with runs on its side of the design profile.
+    fn note(&mut self, run: &Run, limits: &WallLimits) {
+        let log_odds = self.log_odds(run, limits);
+        let [front, behind] = &mut self.experience;
+        let experience = if run.is_behind() { behind } else { front };
+        experience.add(log_odds);
     }
 }
 

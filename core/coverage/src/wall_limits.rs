@@ -20,6 +20,9 @@ pub struct WallLimits {
     ///
     /// The distance doesn't depend on the target T, so the samples don't depend on it either.
     pub reach_m: f64,
+    /// Log odds at which a run of returns is certain to be wall, with the confidence of verdicts. With the opposite log
+    /// odds, it is certain to be something else.
+    pub sure_log_odds: f64,
 }
 
 /// Tolerance as a share of the equivalent radius: the roughness of blasted rock, a tenth of a tunnel's
@@ -28,18 +31,31 @@ const TOLERANCE_SHARE: f64 = 0.1;
 /// Minimum tolerance, m: three times the resolution and noise of profiling sonars.
 const LEAST_TOLERANCE_M: f64 = 0.03;
 
+/// Number of steps of a head in a turn, about, and least width of a step as a share of its width at the wall.
+const STEPS: f64 = 128.0;
+const STEPS_SHARE: f64 = 0.05;
+
 /// Reach along the tunnel as a share of the equivalent radius, and minimum reach, m: about the distance
 /// between passes.
 const REACH_SHARE: f64 = 0.1;
 const LEAST_REACH_M: f64 = 0.2;
 
 impl WallLimits {
-    /// Limits for a design profile of this perimeter.
-    pub fn new(perimeter_m: f64, contradiction_m: f64) -> Self {
+    /// Limits for a design profile of this perimeter, and verdicts with this confidence, as a number of standard
+    /// deviations.
+    pub fn new(perimeter_m: f64, contradiction_m: f64, confidence_sd: f64) -> Self {
         let radius_m = perimeter_m / math::TAU;
         let tolerance_m = (TOLERANCE_SHARE * radius_m).max(LEAST_TOLERANCE_M).min(contradiction_m);
         let reach_m = (REACH_SHARE * radius_m).max(LEAST_REACH_M);
-        Self { tolerance_m, contradiction_m, perimeter_m, radius_m, reach_m }
+        let below = 1.0 - math::erfc(confidence_sd / math::sqrt(2.0)) / 2.0;
+        let sure_log_odds = math::ln(below / (1.0 - below));
+        Self { tolerance_m, contradiction_m, perimeter_m, radius_m, reach_m, sure_log_odds }
+    }
+
+    /// Width of a single return across its ray, m: about the step of a head.
+    pub(super) fn step_m(&self, placed: &PlacedReturn) -> f64 {
+        let share = (1.0 + placed.off_m / self.radius_m).max(STEPS_SHARE);
+        self.perimeter_m / STEPS * share
     }
 
     /// Whether a return is wall because it agrees with the design.

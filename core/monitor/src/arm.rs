@@ -146,7 +146,11 @@ fn tunnel_design(mission: &Mission) -> TunnelDesign {
         site: mission.site,
         length_m: mission.length_m,
         contradiction_m: mission.coverage.contradiction_m,
-        limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
+        limits: WallLimits::new(
+            mission.profile.perimeter_m(),
+            mission.coverage.contradiction_m,
+            mission.target.confidence_sd,
+        ),
     }
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn pipe() -> Profile {
 /// Pipe of 3 m radius and 30 m length.
 pub(crate) fn tunnel() -> TunnelDesign {
     let profile = pipe();
-    let limits = WallLimits::new(profile.perimeter_m(), 1.0);
+    let limits = WallLimits::new(profile.perimeter_m(), 1.0, 2.0);
     TunnelDesign { profile, site: Site::default(), length_m: 30.0, contradiction_m: 1.0, limits }
 }
 

@@ -54,6 +54,32 @@ fn passed_sections_are_within_the_target() {
     }
 }
 
+/// Fish and second echoes are no wall, so the sections that they hide don't pass. The share of sections without a verdict
+/// stays small.
+#[test]
+fn fish_and_second_echoes_let_no_section_far_over_the_target_pass() {
+    let seeds = std::env::var("HEADRACE_FISH_SEEDS").map_or(1, |seeds| seeds.parse().unwrap());
+    let mut sum = [0_u32; 5];
+    for name in ["vita2-4", "vita2-2"] {
+        let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == name).unwrap();
+        for driven in [Driven::Planned, Driven::Times(1.0), Driven::Times(1.2)] {
+            let cell = Cell { vehicle, condition: Condition::Fish, start_m: 16.0, let_in_m: None, driven };
+            let figures = field_table::figures(&cell, 1..=seeds, 15.0);
+            print(&format!("{name} {driven:?}"), &figures);
+            let Figures { over, passed_over, passed_far, failed_under, under, .. } = figures;
+            for (sum, of) in sum.iter_mut().zip([over, passed_over, passed_far, failed_under, under]) {
+                *sum += of;
+            }
+        }
+    }
+    println!("over, passed of them, far over, failed under 0.9 T, of: {sum:?}");
+    let [over, passed_over, passed_far, failed_under, under] = sum;
+    assert!(over > 20 && under > 20, "{sum:?}");
+    assert_eq!(passed_far, 0, "{sum:?}");
+    assert!(f64::from(passed_over) <= 0.025 * f64::from(over), "{sum:?}");
+    assert!(f64::from(failed_under) <= 0.005 * f64::from(under), "{sum:?}");
+}
+
 /// On walls as rough as the vehicle file allows, the reported standard deviation of D is neither too small nor too
 /// large. An echosounder sees the same bump for seconds. The filter must not take the bump for a change of position.
 #[test]

@@ -82,7 +82,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
             if !is_bare {
                 store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
             } else if !wall.why.is_empty() {
-                lacks.add(MissingSample { x_m, arc_m, head: 0, why: wall.why });
+                lacks.add(MissingSample { x_m, arc_m, head: 0, why: wall.why, may_be_wall: false });
             }
         }
     }

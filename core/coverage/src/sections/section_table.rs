@@ -6,7 +6,7 @@ use crate::cause::{Cause, Causes};
 use crate::evidence::Evidence;
 use crate::explain::{Case, explain};
 use crate::frontier::{Outlook, Reach, clear_of};
-use crate::hole::{Hole, HoleFinder};
+use crate::hole::{FARTHEST_M, Hole, HoleFinder, WallChanges};
 use crate::missing_samples::MissingSamples;
 use crate::openings::Opening;
 use crate::passage::PassError;
@@ -18,7 +18,7 @@ use crate::visits::Visit;
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
-use headrace_geometry::tunnel::Profile;
+use headrace_geometry::tunnel::{Profile, WallPoint};
 use headrace_sampling::Target;
 
 /// Request to judge a section as of a given time.
@@ -83,6 +83,8 @@ struct Measured {
     sd_m: f64,
     /// Whether the newest visit alone shows that the section passes.
     by_newest: bool,
+    /// Whether doubtful returns would fill every hole over the target if they were wall.
+    filled_by_doubtful: bool,
 }
 
 /// Inputs of judging, and the callback for changed runs.
@@ -245,6 +247,10 @@ impl Sections {
             return None;
         }
         let measured = self.measure(request.section, judging)?;
+        let fails = fails && !measured.filled_by_doubtful;
+        if request.only_fails && !fails {
+            return None;
+        }
         let section = self.get(request.section)?;
         let before = Self::counted(section);
         let is_like = section.hole.is_some_and(|before| before.is_like(&measured.hole));
@@ -268,7 +274,7 @@ impl Sections {
     fn decide(
         &mut self,
         request: &Request,
-        &Measured { hole, sd_m, by_newest }: &Measured,
+        &Measured { hole, sd_m, by_newest, filled_by_doubtful }: &Measured,
         fails: bool,
         judging: &mut Judging<'_>,
     ) -> Option<()> {
@@ -279,11 +285,14 @@ impl Sections {
         let had_a_flag = section.is_flagged();
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
+        section.filled_by_doubtful = filled_by_doubtful;
         section.verdict = match verdict(&hole, sd_m, target, clear_m.min(passed_m)) {
             Verdict::Pass if section.doubt().is_some() => Verdict::CannotSay,
+            Verdict::Fail if filled_by_doubtful => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if fails => Verdict::Fail,
             verdict => verdict,
         };
+
         if by_newest && section.verdict != Verdict::Pass {
             section.verdict = Verdict::Pass;
             section.keep_newest_visit();
@@ -352,10 +361,19 @@ impl Sections {
             let newest = finder.largest_since(store, from_m, to_m, section.visits.newest());
             let newest_sd_m = pass_sd_m(&newest);
             if passes(&newest, newest_sd_m) {
-                return Some(Measured { hole: newest, sd_m: newest_sd_m, by_newest: true });
+                return Some(Measured {
+                    hole: newest,
+                    sd_m: newest_sd_m,
+                    by_newest: true,
+                    filled_by_doubtful: false,
+                });
             }
         }
-        Some(Measured { hole, sd_m, by_newest: false })
+        let least_m = self.target.max_hole_m + self.target.error_m(sd_m);
+        let first_visit = section.visits.first();
+        let filled_by_doubtful =
+            hole.least_m > least_m && is_filled_by_doubtful(judging, (from_m, to_m), least_m / 2.0, first_visit);
+        Some(Measured { hole, sd_m, by_newest: false, filled_by_doubtful })
     }
 
     /// Moves a judged section from its previous slot in the verdict counts to its present slot.
@@ -503,6 +521,26 @@ impl Sections {
         }
         all
     }
+}
+
+/// Whether doubtful returns, taken as wall, leave no empty circle of `radius_m` centred between two chainages.
+fn is_filled_by_doubtful(
+    judging: &mut Judging<'_>,
+    (from_m, to_m): (f64, f64),
+    radius_m: f64,
+    first_visit: u32,
+) -> bool {
+    let Judging { store, lacks, finder, .. } = judging;
+    if radius_m >= FARTHEST_M {
+        return false;
+    }
+    let doubtful = || lacks.between(from_m - radius_m, to_m + radius_m).filter(|lack| lack.may_be_wall);
+    if doubtful().next().is_none() {
+        return false;
+    }
+    let more = doubtful().map(|lack| WallPoint { x_m: lack.x_m, arc_m: lack.arc_m });
+    finder.lay_otherwise((store, first_visit), (from_m, to_m), radius_m, &WallChanges::NOTHING, more);
+    !finder.has_circle_otherwise((from_m, to_m), radius_m, &WallChanges::NOTHING)
 }
 
 /// Verdict on a hole whose centre is `clear_m` from where samples may still land.

@@ -241,7 +241,7 @@ mod tests {
 
     fn tunnel() -> TunnelDesign {
         let profile = shapes::circle(3.0).unwrap();
-        let limits = WallLimits::new(profile.perimeter_m(), 1.0);
+        let limits = WallLimits::new(profile.perimeter_m(), 1.0, 2.0);
         let (site, length_m) = (Site::default(), 30.0);
         TunnelDesign { profile, site, length_m, contradiction_m: 1.0, limits }
     }

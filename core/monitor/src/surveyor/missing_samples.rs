@@ -184,7 +184,7 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
             // Even with a longer range setting the vehicle would occlude this wall.
             let stays = loss == Loss::OutOfRange && ping.hidden == Hidden::Yes && head.is_hidden();
             let why = if stays { Causes::of(cause).with(Cause::Occluded) } else { Causes::of(cause) };
-            lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why });
+            lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why, may_be_wall: false });
         }
         Outcome::Lost(_, None) | Outcome::Unplaced(_) if ping.fix.is_none() => {
             let is_lost = !matches!(ping.outcome, Outcome::Unplaced(_));
@@ -414,7 +414,7 @@ impl Placing<'_> {
                 why = why.with(Cause::MissingReturns);
             }
         }
-        coverage.lacks.add(MissingSample { x_m, arc_m: wall.arc_m, head: ping.head, why });
+        coverage.lacks.add(MissingSample { x_m, arc_m: wall.arc_m, head: ping.head, why, may_be_wall: false });
     }
 }
 

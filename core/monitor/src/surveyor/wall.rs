@@ -50,13 +50,13 @@ pub(super) fn note_ping(
     };
     if let Some(taken) = sorted.waiting {
         for waiting in sweep.waiting.take() {
-            settle(context, sweep, &waiting, (taken == Taken::Wall, *is_distrusted));
+            settle(context, sweep, &waiting, (taken, *is_distrusted));
         }
     }
     match sorted.this {
         Taken::Wall => wall(context, sweep, ping),
         Taken::Waits if sweep.waiting.add(ping) => {}
-        Taken::Waits | Taken::Doubtful => doubtful(context, sweep, ping, *is_distrusted),
+        taken => rejected(context, sweep, ping, (taken != Taken::Other, *is_distrusted)),
     }
     let (why, between_m) = sorted.distrusted?;
     let (kind, off_m) = ObservedKind::of_distrust(why);
@@ -93,7 +93,8 @@ pub(super) fn end_returns(world: &mut World) {
         debug_assert!(found.is_ok(), "a head has no sweep");
         let Ok((classifier, mut sweep)) = found else { continue };
         for waiting in sweep.waiting.take() {
-            settle(&mut context, &mut sweep, &waiting, (false, classifier.0.distrusted().is_some()));
+            let taken = (Taken::Doubtful, classifier.0.distrusted().is_some());
+            settle(&mut context, &mut sweep, &waiting, taken);
         }
     }
 }
@@ -103,12 +104,12 @@ fn settle(
     context: &mut WallContext<'_>,
     sweep: &mut HeadSweep,
     waiting: &Waiting,
-    (is_wall, is_distrusted): (bool, bool),
+    (taken, is_distrusted): (Taken, bool),
 ) {
-    if is_wall {
+    if taken == Taken::Wall {
         wall(context, sweep, &waiting.ping);
     } else {
-        doubtful(context, sweep, &waiting.ping, is_distrusted);
+        rejected(context, sweep, &waiting.ping, (taken != Taken::Other, is_distrusted));
     }
     if let Some(last) = &mut sweep.last {
         last.unbroken &= !waiting.broken;
@@ -140,9 +141,14 @@ fn store(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing
     }
 }
 
-/// Counts a doubtful return. For holes and causes it is a missing return, aimed at the point where its beam
-/// meets the design profile.
-fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_distrusted: bool) {
+/// Counts a return that isn't accepted as wall. For holes and causes it is a missing return, aimed at the point where
+/// its beam meets the design profile. `may_be_wall` says whether the return is doubtful.
+fn rejected(
+    context: &mut WallContext<'_>,
+    sweep: &mut HeadSweep,
+    ping: &PlacedPing,
+    (may_be_wall, is_distrusted): (bool, bool),
+) {
     context.tally.doubtful += 1;
     digest(context.outputs.digests, ping, RecordKind::Doubtful);
     let Outcome::Sample { point, .. } = ping.outcome else {
@@ -169,7 +175,8 @@ fn doubtful(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedP
         Hidden::No => Cause::MissingReturns,
         Hidden::Yes | Hidden::Beside => Cause::Occluded,
     };
-    lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why: Causes::of(cause) });
+    let may_be_wall = may_be_wall && ping.hidden == Hidden::No && !is_distrusted;
+    lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why: Causes::of(cause), may_be_wall });
     if let Some(section) = sections.get_mut(sections.index_of(x_m)) {
         section.doubtful += 1;
     }

@@ -9,6 +9,7 @@ use super::effect::{Effect, EffectKind};
 use super::geometry::{mirrored, squareness};
 use super::occlusion::Stopped;
 use super::places::Places;
+use super::runs::Runs;
 use super::targets::PerSensor;
 use crate::builder::Builder;
 use crate::environment::Environment;
@@ -29,6 +30,8 @@ use crate::stages::Stage;
 /// - `square_share` (0) and `share` (0.1), the shares of returns that arrive by this path, for a beam perpendicular to
 ///   the wall and for a beam along the wall. Both are from 0 to 1. In between, the share grows with 1 minus the cosine
 ///   of incidence.
+/// - `mean_run`, the mean number of consecutive returns by this path once one has arrived, as in missing_returns.
+///   Without it, each return arrives by either path, whatever the return before it.
 ///
 /// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see that wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
@@ -41,12 +44,15 @@ const OFF_WALL_M: f64 = 1e-6;
 struct Parameters {
     share: f64,
     square_share: f64,
+    mean_run: Option<f64>,
 }
 
 #[derive(Component)]
 struct Multipath {
     places: Places<Parameters>,
     stream: Stream,
+    /// Whether the last return arrived by way of two walls.
+    is_bounced: bool,
 }
 
 impl EffectKind for MultipathKind {
@@ -66,7 +72,8 @@ impl EffectKind for MultipathKind {
             if share == 0.0 && square_share == 0.0 {
                 return Err(table.invalid("share", "or square_share must be above zero"));
             }
-            Ok(Parameters { share, square_share })
+            let mean_run = table.number("mean_run", 1.0..=100.0)?;
+            Ok(Parameters { share, square_share, mean_run })
         })?))
     }
 }
@@ -75,7 +82,7 @@ impl Effect for PerSensor<Places<Parameters>> {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
         for (source, places) in &self.0 {
             let stream = sim.stream(*source);
-            sim.insert(*source, Multipath { places: places.clone(), stream });
+            sim.insert(*source, Multipath { places: places.clone(), stream, is_bounced: false });
         }
         sim.system(Stage::Hear, bounce);
         Ok(())
@@ -96,18 +103,26 @@ fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f
     (range_m <= far_m).then_some(range_m)
 }
 
-type Bouncing<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a Reach, &'a Multipath, Option<&'a Stopped>);
+impl Parameters {
+    /// Whether a return arrives by way of two walls, for a beam with this squareness to the wall.
+    fn is_bounced(&self, before: bool, square: f64, chance: f64) -> bool {
+        let share = self.share + (self.square_share - self.share) * square;
+        let Some(mean) = self.mean_run.filter(|_| share > 0.0 && share < 1.0) else { return chance < share };
+        Runs::new(share, mean.max(share / (1.0 - share))).next(Some(before), chance)
+    }
+}
+
+type Bouncing<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a Reach, &'a mut Multipath, Option<&'a Stopped>);
 
 fn bounce(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Bouncing<'_>>) {
-    for (mut samples, rays, Reach(far_m), multipath, stopped) in &mut sonars {
+    for (mut samples, rays, Reach(far_m), mut multipath, stopped) in &mut sonars {
         for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
             let Some(hit) = ray.hit.filter(|_| !Stopped::has(stopped, number)) else { continue };
-            let Some(Parameters { share, square_share }) = multipath.places.here(&scenery, ray) else {
-                continue;
-            };
+            let Some(parameters) = multipath.places.here(&scenery, ray).copied() else { continue };
             let [chance, _] = multipath.stream.at(step).uniform();
             let square = squareness(ray.direction, hit.normal);
-            if chance < share + (square_share - share) * square {
+            multipath.is_bounced = parameters.is_bounced(multipath.is_bounced, square, chance);
+            if multipath.is_bounced {
                 let bounced_m = double_bounce_m(&scenery.environment, ray, *far_m);
                 sounding.range_m = bounced_m.or(sounding.range_m);
             }

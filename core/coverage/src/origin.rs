@@ -1,0 +1,155 @@
+//! Origin of a run of returns that does not continue known wall: a feature of the wall, or something else.
+//!
+//! Something else is an object in the water (a fish, bubbles, silt) or an echo by a second path. A feature of the wall
+//! is about as high or deep as it is wide. An object hangs at any distance from the wall, and is small. Each run
+//! therefore has odds of being wall, and these odds grow when a later pass meets the same thing at the same place.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math;
+
+/// Size of a run of agreeing returns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    /// Width of the run across the beams, m.
+    pub(super) width_m: f64,
+    /// Largest distance of the run from the design profile, m.
+    pub(super) off_m: f64,
+    /// Mean number of earlier passes that met the same thing.
+    pub(super) confirmed: f64,
+    /// Number of the run's ends that slope to the wall, from 0 to 2.
+    pub(super) slopes: u8,
+}
+
+/// Mean width of objects in the water and of echoes by a second path, m; in narrow tunnels at most this share of the
+/// equivalent radius.
+const OBJECT_WIDTH_M: f64 = 0.3;
+const OBJECT_WIDTH_SHARE: f64 = 0.1;
+/// Median height or depth of a wall feature as a share of its width, and standard deviation of its logarithm.
+///
+/// A half-buried boulder has half its width as height, and a niche is about as deep as wide.
+const HEIGHT_SHARE: f64 = 0.7;
+const HEIGHT_LN_SD: f64 = 0.7;
+/// Share of wall features that have any height or depth, such as posts, ladders and boreholes.
+const SLENDER_SHARE: f64 = 0.01;
+/// Range of the logarithm of widths of wall features: a factor of thirty, all widths equally likely.
+const WIDTHS_LN: f64 = 3.4;
+/// Growth of the log odds when another pass confirms a run.
+///
+/// Wall is met again in nearly every pass. Something else is met at the same place in about 3 % of passes.
+const CONFIRMS: f64 = 3.5;
+
+/// Growth of the log odds when an end of a run slopes to the wall.
+///
+/// Half of all wall features have such an end. Something else ends beside the wall in about 7 % of cases.
+const SLOPES: f64 = 2.0;
+
+/// Numbers of runs that were wall, and of runs that were something else, as expected from their odds.
+///
+/// These numbers give the odds of the next run before its size is known. In murk, few runs are wall.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Experience {
+    wall: f64,
+    other: f64,
+}
+
+/// Number of runs after which an observation counts a third.
+const REMEMBERED_RUNS: f64 = 50.0;
+
+impl Default for Experience {
+    /// Experience before the first run: clear water, in which five of six runs are wall.
+    fn default() -> Self {
+        Self { wall: 5.0, other: 1.0 }
+    }
+}
+
+impl Experience {
+    /// Returns the log odds that a run is wall, in a tunnel of this equivalent radius.
+    pub(super) fn log_odds(&self, run: &Extent, radius_m: f64) -> f64 {
+        let Extent { width_m, off_m, confirmed, slopes } = *run;
+        debug_assert!(width_m > 0.0 && off_m > 0.0 && radius_m > 0.0, "a run has a size: {run:?}, {radius_m} m");
+        // Low features, such as a lining that bulges, are as likely as those of median height.
+        let excess = math::ln(off_m / (HEIGHT_SHARE * width_m)).max(0.0) / HEIGHT_LN_SD;
+        let usual = math::exp(-excess * excess / 2.0) / (off_m * HEIGHT_LN_SD * math::sqrt(math::TAU));
+        let height = math::ln((1.0 - SLENDER_SHARE) * usual + SLENDER_SHARE / radius_m);
+        // Objects are at any distance from the wall, up to the middle of the tunnel.
+        let distance = -math::ln(radius_m);
+        let width = -math::ln(width_m * WIDTHS_LN);
+        let mean_m = OBJECT_WIDTH_M.min(OBJECT_WIDTH_SHARE * radius_m);
+        let object_width = -width_m / mean_m - math::ln(mean_m);
+        let size = height - distance + width - object_width;
+        math::ln(self.wall / self.other) + size + CONFIRMS * confirmed + SLOPES * f64::from(slopes)
+    }
+
+    /// Adds a run with these log odds of being wall.
+    pub(super) fn add(&mut self, log_odds: f64) {
+        let wall = probability(log_odds);
+        let kept = 1.0 - 1.0 / REMEMBERED_RUNS;
+        self.wall = kept * self.wall + wall;
+        self.other = kept * self.other + 1.0 - wall;
+    }
+}
+
+/// Probability of an event with these log odds.
+pub(super) fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + math::exp(-log_odds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const RADIUS_M: f64 = 5.5;
+
+    fn odds(width_m: f64, off_m: f64, confirmed: f64) -> f64 {
+        Experience::default().log_odds(&Extent { width_m, off_m, confirmed, slopes: 0 }, RADIUS_M)
+    }
+
+    /// Probability that a run is wall in clear water. A boulder is as wide as high, a side tunnel is wider than deep. Fish
+    /// and second echoes are small and far from the wall.
+    #[test]
+    fn wide_runs_near_the_wall_are_wall_and_small_runs_far_from_it_are_not() {
+        for (width_m, off_m, confirmed, least, most) in [
+            (3.0, 0.5, 0.0, 0.999, 1.0),
+            (3.0, 3.0, 0.0, 0.99, 1.0),
+            (0.6, 0.4, 0.0, 0.9, 1.0),
+            (0.6, 3.0, 0.0, 0.02, 0.5),
+            (0.6, 3.0, 2.0, 0.977, 1.0),
+            (0.2, 3.0, 0.0, 0.0, 0.1),
+            (0.05, 2.0, 0.0, 0.0, 0.1),
+            (0.05, 2.0, 2.0, 0.977, 1.0),
+        ] {
+            let wall = probability(odds(width_m, off_m, confirmed));
+            assert!((least..=most).contains(&wall), "{width_m} m wide, {off_m} m off, {confirmed}: {wall}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn run_is_wall_more_likely_if_it_is_lower_confirmed_or_in_clearer_water(
+            width_m in 0.01f64..5.0,
+            off_m in 0.05f64..5.0,
+            confirmed in 0.0f64..3.0,
+            strays in 1usize..20,
+        ) {
+            let here = odds(width_m, off_m, confirmed);
+            prop_assert!(odds(width_m, 1.1 * off_m, confirmed) <= here);
+            prop_assert!(odds(width_m, off_m, confirmed + 1.0) > here);
+            let mut murk = Experience::default();
+            (0..strays).for_each(|_| murk.add(-5.0));
+            let extent = Extent { width_m, off_m, confirmed, slopes: 0 };
+            prop_assert!(murk.log_odds(&extent, RADIUS_M) < here);
+        }
+
+        /// Experience is forgotten, so clear water follows murk.
+        #[test]
+        fn odds_return_after_many_runs_of_wall(strays in 0usize..500) {
+            let mut experience = Experience::default();
+            (0..strays).for_each(|_| experience.add(-9.0));
+            (0..500).for_each(|_| experience.add(9.0));
+            let extent = Extent { width_m: 0.6, off_m: 0.4, confirmed: 0.0, slopes: 0 };
+            prop_assert!(experience.log_odds(&extent, RADIUS_M) >= odds(0.6, 0.4, 0.0));
+        }
+    }
+}
