@@ -34,7 +34,12 @@ impl Missed {
             Condition::Clean | Condition::DataSheet | Condition::Told => {
                 Some(Bounds { false_fails: 0.0, cannot_say: 0.02, passed: 0.97, advice: 0.95 })
             }
-            Condition::Poor | Condition::Murk | Condition::Fish | Condition::Rough | Condition::AsBuilt | Condition::Lively => {
+            Condition::Poor
+            | Condition::Murk
+            | Condition::Fish
+            | Condition::Rough
+            | Condition::AsBuilt
+            | Condition::Lively => {
                 Some(Bounds { false_fails: 0.005, cannot_say: 0.08, passed: 0.88, advice: 0.8 })
             }
             _ => None,

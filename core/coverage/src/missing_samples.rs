@@ -122,7 +122,13 @@ mod tests {
     #[test]
     fn full_list_drops_the_oldest_missing_samples() {
         let mut lacks = MissingSamples::default();
-        let lack = |x_m: f64| MissingSample { x_m, arc_m: 1.0, head: 0, why: Causes::of(Cause::HeadSilent), may_be_wall: false };
+        let lack = |x_m: f64| MissingSample {
+            x_m,
+            arc_m: 1.0,
+            head: 0,
+            why: Causes::of(Cause::HeadSilent),
+            may_be_wall: false,
+        };
         for k in 0..2 * ROOM + 10 {
             lacks.add(lack(k as f64));
         }
@@ -138,7 +144,13 @@ mod tests {
         let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
         for k in 0..ROOM + 100 {
             let (head, why) = (u8::from(k % 2 == 1), if k % 5 == 0 { Cause::Occluded } else { missing });
-            lacks.add(MissingSample { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why), may_be_wall: false });
+            lacks.add(MissingSample {
+                x_m: k as f64,
+                arc_m: 0.0,
+                head,
+                why: Causes::of(why),
+                may_be_wall: false,
+            });
         }
         let last = (ROOM + 99) as f64;
         // Head 1 should have made five of ten samples in a row. The last of them is occluded.
@@ -159,7 +171,13 @@ mod tests {
         for k in 0..ROOM + 5 * BLOCK + 77 {
             let along_m = (k % 9000) as f64 * 0.01;
             let x_m = if (k / 9000).is_multiple_of(2) { along_m } else { 90.0 - along_m };
-            lacks.add(MissingSample { x_m, arc_m: k as f64, head: 0, why: Causes::of(Cause::HeadSilent), may_be_wall: false });
+            lacks.add(MissingSample {
+                x_m,
+                arc_m: k as f64,
+                head: 0,
+                why: Causes::of(Cause::HeadSilent),
+                may_be_wall: false,
+            });
             if k % 977 == 0 || k >= ROOM && k % 101 == 0 {
                 let [from_m, to_m] = [x_m - 0.3, x_m + 0.1 * (k % 7) as f64];
                 let all = lacks.ring.iter().filter(|lack| (from_m..=to_m).contains(&lack.x_m));

@@ -67,7 +67,10 @@ impl Experience {
     /// Returns the log odds that a run is wall, in a tunnel of this equivalent radius.
     pub(super) fn log_odds(&self, run: &Extent, radius_m: f64) -> f64 {
         let Extent { width_m, off_m, confirmed, slopes } = *run;
-        debug_assert!(width_m > 0.0 && off_m > 0.0 && radius_m > 0.0, "a run has a size: {run:?}, {radius_m} m");
+        debug_assert!(
+            width_m > 0.0 && off_m > 0.0 && radius_m > 0.0,
+            "a run has a size: {run:?}, {radius_m} m"
+        );
         // Low features, such as a lining that bulges, are as likely as those of median height.
         let excess = math::ln(off_m / (HEIGHT_SHARE * width_m)).max(0.0) / HEIGHT_LN_SD;
         let usual = math::exp(-excess * excess / 2.0) / (off_m * HEIGHT_LN_SD * math::sqrt(math::TAU));

@@ -35,12 +35,19 @@ impl Pass {
 /// A return that deviates from the design, as support for later passes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Found {
-    pub(super) placed: PlacedReturn,
+    placed: PlacedReturn,
     /// Whether the return was classified as wall.
-    pub(super) is_wall: bool,
+    is_wall: bool,
     /// Number of passes that met the same thing here, with this one.
-    pub(super) passes: u8,
-    pub(super) pass: Pass,
+    passes: u8,
+    pass: Pass,
+}
+
+impl Found {
+    /// A return of a pass, after `confirmed` earlier passes that met the same thing.
+    pub(super) fn new(placed: &PlacedReturn, is_wall: bool, confirmed: u8, pass: Pass) -> Self {
+        Self { placed: *placed, is_wall, passes: confirmed.saturating_add(1), pass }
+    }
 }
 
 /// Recent returns in one bin of the wall.
@@ -165,7 +172,8 @@ impl Relief {
     ) -> impl Iterator<Item = &Found> + use<'_> {
         let (slab, bin) = place(placed, limits);
         let (placed, reach_m, tolerance_m) = (*placed, share * limits.reach_m, share * limits.tolerance_m);
-        let cells = (slab - 2..=slab + 2).flat_map(move |slab| (bin - 1..=bin + 1).map(move |bin| (slab, bin)));
+        let cells =
+            (slab - 2..=slab + 2).flat_map(move |slab| (bin - 1..=bin + 1).map(move |bin| (slab, bin)));
         let found = cells.filter_map(move |(slab, bin)| self.cell(slab, bin)?.off.as_ref());
         found.filter(move |Found { placed: other, .. }| {
             (other.x_m - placed.x_m).abs() <= reach_m && (other.off_m - placed.off_m).abs() <= tolerance_m

@@ -109,7 +109,8 @@ impl Run {
 
     /// Removes all waiting returns except the last one.
     fn give_up(&mut self, last: &PlacedReturn) {
-        let confirmed = self.waits.checked_sub(1).and_then(|at| self.confirmed_each.get(usize::from(at)).copied());
+        let confirmed =
+            self.waits.checked_sub(1).and_then(|at| self.confirmed_each.get(usize::from(at)).copied());
         (self.waiting[0], self.confirmed_each[0], self.waits) = (*last, confirmed.unwrap_or(0), 1);
     }
 }
@@ -156,16 +157,8 @@ impl HeadWall {
         let is_wall = is_design || relief.is_wall(&placed, limits);
         let slopes = is_of_wall(last) || is_of_wall(last_but_one);
         let before = self.last[0].map(|(other, _)| other);
-        self.turned_rad += math::wrap_signed(beam.angle_rad - self.angle_rad, math::TAU).abs();
-        self.angle_rad = beam.angle_rad;
-        let pass = Pass { head: u8::try_from(head).unwrap_or(u8::MAX), turned_rad: self.turned_rad };
-        let confirmed = relief.confirmed(&placed, &pass, limits);
-        let found = |placed: &PlacedReturn, is_wall: bool, confirmed: u8| Found {
-            placed: *placed,
-            is_wall,
-            passes: confirmed.saturating_add(1),
-            pass,
-        };
+        let pass = self.pass(head, beam);
+        let confirmed = if is_wall { 0 } else { relief.confirmed(&placed, &pass, limits) };
         let (waited, waiting, this) =
             self.decide((&placed, confirmed), (is_wall, last.is_some(), slopes), limits);
         relief.vote(head, &placed, limits);
@@ -185,13 +178,20 @@ impl HeadWall {
             return Sorted { waiting, this: Taken::Other, distrusted };
         }
         if let Some(taken) = waiting {
-            let is_wall = taken == Taken::Wall;
-            waited.returns().for_each(|(other, passes)| relief.remember(&found(other, is_wall, passes), limits));
+            let found = |(other, passes)| Found::new(other, taken == Taken::Wall, passes, pass);
+            waited.returns().for_each(|other| relief.remember(&found(other), limits));
         }
         if this == Taken::Wall {
-            relief.remember(&found(&placed, true, confirmed), limits);
+            relief.remember(&Found::new(&placed, true, confirmed, pass), limits);
         }
         Sorted { waiting, this, distrusted }
+    }
+
+    /// Turns the head to the next beam; returns its pass.
+    fn pass(&mut self, head: usize, beam: &Beam<'_>) -> Pass {
+        self.turned_rad += math::wrap_signed(beam.angle_rad - self.angle_rad, math::TAU).abs();
+        self.angle_rad = beam.angle_rad;
+        Pass { head: u8::try_from(head).unwrap_or(u8::MAX), turned_rad: self.turned_rad }
     }
 
     /// Classifies a head's new return and the returns that wait for it.

@@ -371,8 +371,8 @@ impl Sections {
         }
         let least_m = self.target.max_hole_m + self.target.error_m(sd_m);
         let first_visit = section.visits.first();
-        let filled_by_doubtful =
-            hole.least_m > least_m && is_filled_by_doubtful(judging, (from_m, to_m), least_m / 2.0, first_visit);
+        let filled_by_doubtful = hole.least_m > least_m
+            && is_filled_by_doubtful(judging, (from_m, to_m), least_m / 2.0, first_visit);
         Some(Measured { hole, sd_m, by_newest: false, filled_by_doubtful })
     }
 

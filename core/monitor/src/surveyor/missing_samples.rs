@@ -414,7 +414,13 @@ impl Placing<'_> {
                 why = why.with(Cause::MissingReturns);
             }
         }
-        coverage.lacks.add(MissingSample { x_m, arc_m: wall.arc_m, head: ping.head, why, may_be_wall: false });
+        coverage.lacks.add(MissingSample {
+            x_m,
+            arc_m: wall.arc_m,
+            head: ping.head,
+            why,
+            may_be_wall: false,
+        });
     }
 }
 
