@@ -298,26 +298,26 @@ mod tests {
         }
     }
 
-    /// A rock of 0.6 m in height is wide enough to be wall from its first return on.
+    /// A rock of 0.35 m in height and 0.9 m in width is wall, from its first return on.
     #[test]
     fn undecided_return_is_wall_once_the_next_returns_agree() {
         let mut bench = Bench::new();
         bench.note(&at(0, 3.0));
         let mut found = Vec::new();
-        for number in 1..20 {
-            found.push(bench.note(&at(number, 2.4)));
+        for number in 1..24 {
+            found.push(bench.note(&at(number, 2.65)));
         }
         assert_eq!(found[0], (1, 0), "the first return waits");
-        assert_eq!(found.last(), Some(&(20, 0)), "{found:?}");
+        assert_eq!(found.last(), Some(&(24, 0)), "{found:?}");
         assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
         // All samples are one angular step apart, so the head's pass covers the arc length of each sample.
         let crossed = |number: f64| {
-            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
+            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.65).outcome else {
                 panic!()
             };
             bench.coverage.store.clone().nearest_pass_m(WallPoint { x_m: 5.1, arc_m }, 0.5).is_some()
         };
-        assert!((1..18).all(|number| crossed(f64::from(number) + 0.5)));
+        assert!((1..22).all(|number| crossed(f64::from(number) + 0.5)));
     }
 
     #[test]
@@ -332,19 +332,20 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
-    /// The first two returns are from a rock. Pings that arrive while the first return waits take effect when
+    /// All returns but the first are from a rock. Pings that arrive while the first return waits take effect when
     /// it is classified.
     #[test]
     fn lost_ping_after_an_undecided_return_interrupts_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {
             let mut bench = Bench::new();
             bench.note(&at(0, 3.0));
-            bench.note(&at(1, 2.4));
+            bench.note(&at(1, 2.65));
             if let Some(between) = between {
                 bench.note(&between);
             }
-            assert_eq!(bench.note(&at(4, 2.4)), (3, 0));
-            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + 2.5 * STEP_RAD, 2.4).outcome else {
+            let last = (4..24).map(|number| bench.note(&at(number, 2.65))).last();
+            assert_eq!(last, Some((22, 0)), "the rock is wide enough to be wall");
+            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + 2.5 * STEP_RAD, 2.65).outcome else {
                 panic!()
             };
             let is_crossed =
@@ -352,11 +353,11 @@ mod tests {
             (is_crossed, bench.coverage.sections.get(20).unwrap().t_y_m.count)
         };
         let lost = pinged(5.1, 1.0 + 2.0 * STEP_RAD);
-        assert_eq!(is_stepped(None), (true, 2));
-        assert_eq!(is_stepped(Some(lost)), (false, 2));
+        assert_eq!(is_stepped(None), (true, 21));
+        assert_eq!(is_stepped(Some(lost)), (false, 21));
         assert_eq!(
             is_stepped(Some(PlacedPing { new_sweep: true, ..lost })),
-            (false, 1),
+            (false, 20),
             "it has no previous sample"
         );
     }

@@ -1,6 +1,8 @@
 use super::*;
 use crate::hole::FARTHEST_M;
+use crate::missing_samples::MissingSample;
 use crate::store::{StoreLayout, WallSample};
+use crate::unsure::Unsure;
 use headrace_fusion::relative::Relative;
 use headrace_geometry::tunnel::shapes;
 
@@ -169,6 +171,66 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     sections.judge(&request, &mut judging);
     let section = sections.get(20).unwrap();
     (section.verdict, section.hole.unwrap().diameter_m, section.visits.first())
+}
+
+/// Judges a section of a pipe in which a square hole has no samples except, in its middle, a missing sample that may be
+/// wall or not.
+fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>) {
+    let profile = shapes::circle(3.0).unwrap();
+    let layout = StoreLayout {
+        perimeter_m: profile.perimeter_m(),
+        from_m: 0.0,
+        to_m: 10.0,
+        cell_m: 0.25,
+        capacity: 20_000,
+    };
+    let (mut store, mut sections, mut lacks) =
+        (SampleStore::new(layout), sections(), MissingSamples::default());
+    let visit = Visit { number: 0, tie: 0, at: MonoNs(0), errors: [PassError::default(); 2] };
+    for (x_m, arc_m) in
+        (0..40).flat_map(|i| (0..94).map(move |k| (3.0 + 0.1 * f64::from(i), 0.2 * f64::from(k))))
+    {
+        if (x_m - 5.1_f64).abs().max((arc_m - 7.0).abs()) > edge_m / 2.0 {
+            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
+            sections.touch(x_m, &visit, &profile);
+        }
+    }
+    if let Some(may_be_wall) = may_be_wall {
+        let why = Causes::of(Cause::MissingReturns);
+        lacks.add(MissingSample { x_m: 5.1, arc_m: 7.0, head: 0, why, may_be_wall });
+    }
+    let mut judging = Judging {
+        store: &store,
+        lacks: &lacks,
+        finder: &mut HoleFinder::default(),
+        profile: &profile,
+        tell: &mut |_, _| {},
+    };
+    let to_come = Some(Reach { from_m: 9.0, to_m: f64::INFINITY });
+    let request = Request {
+        section: 20,
+        at: MonoNs(0),
+        swept_by_all: None,
+        none_alive: false,
+        to_come,
+        not_passed: None,
+        ended: None,
+        only_fails: false,
+    };
+    sections.judge(&request, &mut judging);
+    let section = sections.get(20).unwrap();
+    (section.verdict, section.unsure())
+}
+
+/// The target is 0.5 m. A return in the middle of a hole of 0.7 m would fill it, but not one of 2 m.
+#[test]
+fn section_neither_passes_nor_fails_if_doubtful_returns_would_fill_its_hole() {
+    let undecided = (Verdict::CannotSay, Some(Unsure::DoubtfulReturns));
+    assert_eq!(with_hole(0.1, None), (Verdict::Pass, None));
+    assert_eq!(with_hole(0.5, None), (Verdict::Fail, None));
+    assert_eq!(with_hole(0.5, Some(false)), (Verdict::Fail, None), "the return is certainly no wall");
+    assert_eq!(with_hole(0.5, Some(true)), undecided);
+    assert_eq!(with_hole(2.0, Some(true)), (Verdict::Fail, None), "the rest of the hole is too large");
 }
 
 /// A mesh leaves holes as wide as its diagonal: 0.28 m for 0.2 m, 0.48 m for 0.34 m.
