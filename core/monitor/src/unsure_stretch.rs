@@ -57,7 +57,7 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
             format!("hole {:.2} ± {:.2} m", stretch.hole_m, stretch.hole_error_m)
         }
         Unsure::SeveralStretches => "position lost or doubtful between passes".to_owned(),
-        Unsure::DoubtfulReturns => "most returns doubtful".to_owned(),
+        Unsure::DoubtfulReturns => "doubtful returns".to_owned(),
         Unsure::DistrustedHead => "seen by a head whose returns are rejected".to_owned(),
         Unsure::ContradictedProfile => "the wall position differs from the design".to_owned(),
         Unsure::OtherSize => "the cross-section differs from the design".to_owned(),
