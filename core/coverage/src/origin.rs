@@ -21,6 +21,8 @@ pub(super) struct Extent {
     pub(super) slopes: u8,
 }
 
+// The figures below are assumptions about tunnels and water, not fits. Their effect: docs/decisions/0004-verdicts-and-causes.md.
+
 /// Mean width of objects in the water and of echoes by a second path, m; in narrow tunnels at most this share of the
 /// equivalent radius.
 const OBJECT_WIDTH_M: f64 = 0.3;
@@ -36,18 +38,17 @@ const SLENDER_SHARE: f64 = 0.01;
 const WIDTHS_LN: f64 = 3.4;
 /// Growth of the log odds when another pass confirms a run.
 ///
-/// Wall is met again in nearly every pass. Something else is met at the same place in about 3 % of passes.
+/// Wall is met again in nearly every pass. Something else is taken to be met at the same place in 3 % of passes.
 const CONFIRMS: f64 = 3.5;
-
 /// Growth of the log odds when an end of a run slopes to the wall.
 ///
-/// Half of all wall features have such an end. Something else ends beside the wall in about 7 % of cases.
+/// Half of the ends of wall features are taken to slope, and 7 % of the ends of something else.
 const SLOPES: f64 = 2.0;
 
-/// Numbers of runs that were wall, and of runs that were something else, as expected from their odds.
+/// Runs of this dive that were wall, and runs that were something else, as expected from their odds.
 ///
 /// These numbers give the odds of the next run before its size is known. In murk, few runs are wall.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Experience {
     wall: f64,
     other: f64,
@@ -55,15 +56,10 @@ pub(super) struct Experience {
 
 /// Number of runs after which an observation counts a third.
 const REMEMBERED_RUNS: f64 = 50.0;
-
-impl Default for Experience {
-    /// Experience before the first run: clear water, in which five of six runs are wall.
-    ///
-    /// With twenty of twenty-one, more sections pass over the target among fish, and more get no verdict.
-    fn default() -> Self {
-        Self { wall: 5.0, other: 1.0 }
-    }
-}
+/// Runs that are added to those of the dive: clear water, in which five of six runs are wall.
+///
+/// They bound the odds, so that no number of runs of one kind makes the next one certain.
+const PRIOR: Experience = Experience { wall: 2.5, other: 0.5 };
 
 impl Experience {
     /// Returns the log odds that a run is wall, in a tunnel of this equivalent radius.
@@ -83,7 +79,8 @@ impl Experience {
         let mean_m = OBJECT_WIDTH_M.min(OBJECT_WIDTH_SHARE * radius_m);
         let object_width = -width_m / mean_m - math::ln(mean_m);
         let size = height - distance + width - object_width;
-        math::ln(self.wall / self.other) + size + CONFIRMS * confirmed + SLOPES * f64::from(slopes)
+        let before = math::ln((PRIOR.wall + self.wall) / (PRIOR.other + self.other));
+        before + size + CONFIRMS * confirmed + SLOPES * f64::from(slopes)
     }
 
     /// Adds a run with these log odds of being wall.
@@ -147,14 +144,20 @@ mod tests {
             prop_assert!(murk.log_odds(&extent, RADIUS_M) < here);
         }
 
-        /// Experience is forgotten, so clear water follows murk.
+        /// Experience is forgotten, so clear water follows murk. It never decides alone, not even after a long dive: a slender
+        /// run remains doubtful in the clearest water, and wall seen in two passes is wall in the densest murk.
         #[test]
-        fn odds_return_after_many_runs_of_wall(strays in 0usize..500) {
+        fn experience_of_any_length_is_forgotten_and_decides_nothing_alone(runs in 0usize..100_000) {
+            let slender = Extent { width_m: 0.2, off_m: 3.0, confirmed: 0.0, slopes: 0 };
+            let boulder = Extent { width_m: 0.6, off_m: 0.4, confirmed: 0.0, slopes: 0 };
             let mut experience = Experience::default();
-            (0..strays).for_each(|_| experience.add(-9.0));
-            (0..500).for_each(|_| experience.add(9.0));
-            let extent = Extent { width_m: 0.6, off_m: 0.4, confirmed: 0.0, slopes: 0 };
-            prop_assert!(experience.log_odds(&extent, RADIUS_M) >= odds(0.6, 0.4, 0.0));
+            (0..runs).for_each(|_| experience.add(-50.0));
+            let confirmed = Extent { confirmed: 2.0, ..boulder };
+            prop_assert!(probability(experience.log_odds(&confirmed, RADIUS_M)) > 0.977);
+            (0..500).for_each(|_| experience.add(50.0));
+            prop_assert!(experience.log_odds(&boulder, RADIUS_M) >= odds(0.6, 0.4, 0.0));
+            (0..runs).for_each(|_| experience.add(50.0));
+            prop_assert!(probability(experience.log_odds(&slender, RADIUS_M)) < 0.977);
         }
     }
 }

@@ -246,7 +246,7 @@ impl HeadWall {
         experience.log_odds(&run.extent(), limits.radius_m)
     }
 
-    /// Classification of a run that has ended without a slope to the wall.
+    /// Classification of a run that has ended, or that is too long to wait.
     fn taken(&self, run: &Run, limits: &WallLimits) -> Taken {
         let log_odds = self.log_odds(run, limits);
         if log_odds >= limits.sure_log_odds {

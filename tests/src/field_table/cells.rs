@@ -417,8 +417,9 @@ impl Cell {
              [[effects.missing_returns]]\nshare = 0.05\nmean_run = 8\nsensors = {pings}\n"
         );
         format!(
-            "{occlusion}{DEPTH}{}{tables}{}{}",
+            "{occlusion}{DEPTH}{}{tables}{}{}{}",
             self.units_and_cables(),
+            self.fish(&heads),
             self.murk(&heads, seed, length_m),
             self.wrong(plain, seed, duration_s)
         )
@@ -437,24 +438,28 @@ impl Cell {
         }
     }
 
-    /// Returns that come from something else than the wall.
-    ///
-    /// `Fish`: clusters of returns in front of the wall, and second echoes in runs. `Murk`: murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
+    /// Clusters of returns in front of the wall, and second echoes in runs of several returns.
+    fn fish(&self, heads: &str) -> String {
+        if self.condition != Condition::Fish {
+            return String::new();
+        }
+        let far_m = self.aside_m(3.0);
+        format!(
+            "[effects.near_returns]\nshare = 0.01\nmean_run = 6\nnear_m = {}\nfar_m = {far_m}\nsensors = {heads}\n\
+             [effects.multipath]\nshare = 0.05\nsquare_share = 0.01\nmean_run = 8\nsensors = {heads}\n",
+            0.4 * far_m
+        )
+    }
+
+    /// Murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
     ///
     /// In these stretches, 10 to 30 % of the heads' returns are missing, in runs. Clusters in front of the wall
     /// cause 5 % of the returns, and second echoes cause some. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
-        let far_m = self.aside_m(3.0);
-        if self.condition == Condition::Fish {
-            return format!(
-                "[effects.near_returns]\nshare = 0.01\nmean_run = 6\nnear_m = {}\nfar_m = {far_m}\nsensors = {heads}\n\
-                 [effects.multipath]\nshare = 0.05\nsquare_share = 0.01\nmean_run = 8\nsensors = {heads}\n",
-                0.4 * far_m
-            );
-        }
         if self.condition != Condition::Murk {
             return String::new();
         }
+        let far_m = self.aside_m(3.0);
         let mut draw = Draw::new(seed ^ 0x5117);
         let (mut from_m, end_m) = (self.start_m + draw.between(2.0, 6.0), self.start_m + length_m);
         let mut murk = String::new();

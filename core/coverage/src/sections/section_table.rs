@@ -307,7 +307,7 @@ impl Sections {
             let radius_m = f64::midpoint(target.max_hole_m, target.error_m(sd_m));
             section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
-            if had_a_flag || self.fails_already(request, judging) {
+            if had_a_flag || !filled_by_doubtful && self.fails_already(request, judging) {
                 let section = self.get_mut(request.section)?;
                 (section.verdict, section.not_inspected) = (Verdict::Fail, false);
             }
@@ -371,8 +371,10 @@ impl Sections {
         }
         let least_m = self.target.max_hole_m + self.target.error_m(sd_m);
         let first_visit = section.visits.first();
+        // The doubtful returns in an unchanged hole still count, even if their places are no longer stored.
+        let is_known = section.filled_by_doubtful && section.hole.is_some_and(|before| before.is_like(&hole));
         let filled_by_doubtful = hole.least_m > least_m
-            && is_filled_by_doubtful(judging, (from_m, to_m), least_m / 2.0, first_visit);
+            && (is_known || is_filled_by_doubtful(judging, (from_m, to_m), least_m / 2.0, first_visit));
         Some(Measured { hole, sd_m, by_newest: false, filled_by_doubtful })
     }
 

@@ -223,8 +223,29 @@ mod tests {
     }
 
     #[test]
+    fn multipath_returns_have_the_given_share_and_mean_run() {
+        let dive = Dive {
+            seconds: 1000.0,
+            tunnel: "profile = \"rectangle\"\nwidth_m = 4\nheight_m = 3",
+            ..Dive::with_head()
+        };
+        let runs = |keys: &str| {
+            let effects = format!("[effects.multipath]\nshare = 0.2\nsquare_share = 0.2\n{keys}");
+            let bounced: Vec<bool> =
+                dive.dive(&effects).rows.iter().map(|row| !row.causes.is_empty()).collect();
+            let all = bounced.iter().filter(|is| **is).count();
+            let begun = bounced.windows(2).filter(|two| !two[0] && two[1]).count();
+            assert_share(all, bounced.len(), 0.2);
+            all as f64 / begun as f64
+        };
+        let (single, in_runs) = (runs(""), runs("mean_run = 8"));
+        assert!((single - 1.25).abs() < 0.1, "{single}");
+        assert!((in_runs - 8.0).abs() < 1.0, "{in_runs}");
+    }
+
+    #[test]
     fn time_slice_length_does_not_change_results() {
-        Dive::with_head().assert_slices_dont_matter("[effects.multipath]\nshare = 0.5");
+        Dive::with_head().assert_slices_dont_matter("[effects.multipath]\nshare = 0.5\nmean_run = 4");
     }
 
     #[test]
@@ -232,6 +253,7 @@ mod tests {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.multipath]\n{keys}"));
         assert!(refusal("share = 0").contains("must be above zero"));
         assert!(refusal("share = 2").contains("from 0 to 1"));
+        assert!(refusal("mean_run = 0.5").contains("from 1 to 100"));
         assert!(refusal("bounces = 2").contains("is not a key here"));
     }
 }

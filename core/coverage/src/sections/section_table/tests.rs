@@ -174,7 +174,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
 }
 
 /// Judges a section of a pipe in which a square hole has no samples except, in its middle, a missing sample that may be
-/// wall or not.
+/// wall or not. The section is judged again at the end of the dive, when the list of missing samples is empty.
 fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>) {
     let profile = shapes::circle(3.0).unwrap();
     let layout = StoreLayout {
@@ -199,13 +199,6 @@ fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>
         let why = Causes::of(Cause::MissingReturns);
         lacks.add(MissingSample { x_m: 5.1, arc_m: 7.0, head: 0, why, may_be_wall });
     }
-    let mut judging = Judging {
-        store: &store,
-        lacks: &lacks,
-        finder: &mut HoleFinder::default(),
-        profile: &profile,
-        tell: &mut |_, _| {},
-    };
     let to_come = Some(Reach { from_m: 9.0, to_m: f64::INFINITY });
     let request = Request {
         section: 20,
@@ -217,7 +210,18 @@ fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>
         ended: None,
         only_fails: false,
     };
-    sections.judge(&request, &mut judging);
+    let all = Reach { from_m: 0.0, to_m: 10.0 };
+    let at_the_end = Request { ended: Some(Ended(Some(all))), ..request };
+    for (request, lacks) in [(request, &lacks), (at_the_end, &MissingSamples::default())] {
+        let mut judging = Judging {
+            store: &store,
+            lacks,
+            finder: &mut HoleFinder::default(),
+            profile: &profile,
+            tell: &mut |_, _| {},
+        };
+        sections.judge(&request, &mut judging);
+    }
     let section = sections.get(20).unwrap();
     (section.verdict, section.unsure())
 }
