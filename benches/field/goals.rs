@@ -44,13 +44,16 @@ impl Missed {
             }
             _ => None,
         };
-        let first_go = matches!(cell.driven, Driven::Planned | Driven::Stood | Driven::Advised);
+        let first_go =
+            matches!(cell.driven, Driven::Planned | Driven::Stood | Driven::Swung | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
         // D and D_true are comparable only after a single visit: D is the best of several visits, but D_true combines
         // all visits. In the `Lively` condition, the pilot also goes back.
         let once = match cell.driven {
             Driven::Back => false,
-            Driven::Planned | Driven::Stood | Driven::Times(_) => cell.condition != Condition::Lively,
+            Driven::Planned | Driven::Stood | Driven::Swung | Driven::Times(_) => {
+                cell.condition != Condition::Lively
+            }
             Driven::Advised => true,
         };
         let judged = !figures.errors.is_empty() && once;

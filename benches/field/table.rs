@@ -57,6 +57,10 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if speed == "stood" && !stands && arguments.cell.is_empty() {
         return false;
     }
+    let of_mounts = [Condition::Mounts, Condition::WrongMount];
+    if speed == "swung" && !of_mounts.contains(&condition) && arguments.cell.is_empty() {
+        return false;
+    }
     // The middle place runs for few cells, because it only shows that results don't depend on the place.
     let told_apart = place != "3000"
         || ["vita1", "vita2-4"].contains(&vehicle.name) && ["planned", "advised"].contains(&speed);

@@ -19,6 +19,7 @@ pub(super) struct AlertRow {
     pub(super) lamp: Lamp,
     /// Whether the alert flashes because somebody must still acknowledge it.
     pub(super) needs_acknowledgement: bool,
+    pub(super) is_caution: bool,
     pub(super) text: String,
     pub(super) advice: String,
 }
@@ -41,6 +42,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
             Priority::Warning | Priority::Caution => Lamp::Amber,
         },
         needs_acknowledgement: alert.needs_acknowledgement(),
+        is_caution: alert.priority == Priority::Caution,
         text: alert.text(&around),
         advice: alert.advice(&around),
     };

@@ -129,19 +129,20 @@ impl Page {
     /// Draws the panels within the available room.
     fn panels(&self, shot: &ScreenFrame, rows: &mut Rows<'_>) {
         // Room is reserved: alerts and messages have at least two rows, and the wall has two strips. Each
-        // panel except the last has a title.
+        // panel except the last has a title. The wall's strips by clock hour go before cautions.
         let left = usize::from(rows.left()).saturating_sub(3 + 3 + 1 + 2);
         let well = shot.sensors.iter().filter(|sensor| sensor.state == SensorState::Ok).count();
         let wanted = shot.sensors.len() - well + panels::sensor_rows(well, usize::from(rows.width()));
         let sensors = wanted.min(left).max(1);
         let left = left.saturating_sub(sensors);
         let columns = usize::from(rows.width());
-        let more_alerts = left.min(panels::alert_rows(shot, self.ink, columns).saturating_sub(2)).min(8);
-        let left = left - more_alerts;
-        let clock = if left > CLOCK_ROWS { CLOCK_ROWS } else { 0 };
-        let ruler = left - clock > 0;
-        let alerts = 2 + more_alerts;
-        panels::alerts(shot, self.ink, alerts, rows);
+        let [urgent, all] =
+            panels::alert_rows(shot, self.ink, columns).map(|rows| rows.saturating_sub(2).min(8));
+        let left_by_urgent = left.saturating_sub(urgent);
+        let clock = if left_by_urgent > CLOCK_ROWS { CLOCK_ROWS } else { 0 };
+        let more_alerts = all.min(left - clock);
+        let ruler = left - clock > more_alerts;
+        panels::alerts(shot, self.ink, 2 + more_alerts, rows);
         panels::sensors(shot, self.ink, sensors, rows);
         panels::wall(&self.wall, self.extent, self.ink, (clock > 0, ruler), rows);
         self.told(rows);

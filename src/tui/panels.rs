@@ -185,9 +185,12 @@ fn wrapped(text: &str, columns: usize) -> Vec<String> {
     lines
 }
 
-/// Number of rows needed for all alerts.
-pub(super) fn alert_rows(shot: &ScreenFrame, ink: Palette, columns: usize) -> usize {
-    shot.alerts.iter().map(|alert| alert_lines(alert, ink, columns).len()).sum()
+/// Number of rows needed for the alerts above a caution, and for all alerts.
+pub(super) fn alert_rows(shot: &ScreenFrame, ink: Palette, columns: usize) -> [usize; 2] {
+    [false, true].map(|cautions| {
+        let counted = shot.alerts.iter().filter(|alert| cautions || !alert.is_caution);
+        counted.map(|alert| alert_lines(alert, ink, columns).len()).sum()
+    })
 }
 
 /// Draws the alerts in `room` rows below a title with their number.

@@ -271,10 +271,14 @@ impl Section {
 
     /// Records that the section holds samples of a distrusted head.
     ///
-    /// The section then can't pass, and is due for judging.
-    pub fn suspect(&mut self) {
-        (self.suspect, self.stale, self.settled) = (true, true, false);
-        self.suspected_in = self.visits.newest();
+    /// The section then can't pass, and is due for judging. Returns false if this was known of its newest visit.
+    pub fn suspect(&mut self) -> bool {
+        let is_new = !self.suspect || self.suspected_in != self.visits.newest();
+        if is_new {
+            (self.suspect, self.stale, self.settled) = (true, true, false);
+            self.suspected_in = self.visits.newest();
+        }
+        is_new
     }
 
     /// Raises or clears the section's flag according to the verdict.

@@ -54,6 +54,13 @@ pub trait Navigation: Stateful + Send + Sync {
         None
     }
 
+    /// Whether the pitch and yaw of several heads on their mounts are not verified yet.
+    ///
+    /// False for methods that do not check mounts.
+    fn has_unverified_mounts(&self) -> bool {
+        false
+    }
+
     /// Returns the fix at `at`, which may be shortly before or after the last reading.
     ///
     /// Errors: the part of the fix that is missing.

@@ -276,7 +276,7 @@ mod tests {
         let heads = [(head, Vec::new()), (head, Vec::new())];
         let new =
             |dive_time| Advisor::new(advice::Advisor::new(&pipe(), task(), &heads, &[]), 0.5, dive_time);
-        let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
+        let doubts = Doubts { cable: None, setting: None, unverified_mounts: false, stand_s: 0, hung: 0 };
         let update = |seconds: f64| {
             let (fix, situation) = (Err(NoFix::Heading), two_heads(0.0));
             Placement::Update(Update { at: at(seconds), situation, doubts, fix, sd: None })

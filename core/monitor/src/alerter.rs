@@ -7,7 +7,7 @@ use super::console::command::Command;
 use super::console::packets::ReceivedCommand;
 use super::live_state::{LiveMetres, LiveState, PositionDoubt, PositionState, source_bits};
 use super::merge::MAX_TICK_PACKETS;
-use super::messages::{Event, Notice, PlacedItem, Placement, Standing, Update};
+use super::messages::{Doubts, Event, Notice, PlacedItem, Placement, Standing, Update};
 use super::notes::{Note, Notes, Spoken};
 use super::observations::Observations;
 use super::placer::Placed;
@@ -142,7 +142,8 @@ impl Alerter {
         };
         digest(&mut self.states, *at, situation, &self.state);
         let as_of = LiveState { now: *at, ..self.state };
-        self.take_beat(&Beat { at: *at, state: &as_of, setting: doubts.setting });
+        let Doubts { setting, unverified_mounts, .. } = *doubts;
+        self.take_beat(&Beat { at: *at, state: &as_of, setting, unverified_mounts });
     }
 
     pub(super) fn save(&self, to: &mut Saver) {

@@ -40,6 +40,8 @@ pub struct Doubts {
     pub cable: Option<CableDoubt>,
     /// Vehicle file setting that is likely wrong.
     pub setting: Option<SettingDoubt>,
+    /// Whether the heads' pitch and yaw on their mounts are not verified yet.
+    pub unverified_mounts: bool,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s.
     pub stand_s: u32,
     /// Bitmask of the stuck sources. They repeat a reading, and count as silent.

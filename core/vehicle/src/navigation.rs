@@ -16,9 +16,10 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// Allowed values of noise settings.
 ///
-/// Zero is excluded, because the filter would then rely on that sensor alone.
+/// Zero is excluded, because the filter would then rely on that sensor alone. Mounts may be exact.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
+const MOUNT_DEGREES: RangeInclusive<f64> = 0.0..=5.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
 /// Allowed lengths of a filter epoch and of a time window, s. The filter's buffers suffice for both.
@@ -87,7 +88,7 @@ fn settings(section: &Section<'_>, usual: &Settings) -> Result<Settings, ConfigE
         ("accel_noise_mps2_rthz", SMALL, 1.0, &mut settings.force_noise),
     ];
     read(section, keys)?;
-    let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 12] = [
+    let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 13] = [
         ("tether_sd_m", METRES, 1.0, &mut settings.tether_sd_m),
         ("tether_scale_sd", SMALL, 1.0, &mut settings.scale_sd),
         ("depth_sd_m", METRES, 1.0, &mut settings.depth_sd_m),
@@ -100,6 +101,7 @@ fn settings(section: &Section<'_>, usual: &Settings) -> Result<Settings, ConfigE
         ("return_sd_m", METRES, 1.0, &mut settings.return_sd_m),
         ("return_beam_deg", DEGREES, DEGREE, &mut settings.return_beam_rad),
         ("velocity_sd_mps", SMALL, 1.0, &mut settings.velocity_sd_mps),
+        ("mount_sd_deg", MOUNT_DEGREES, DEGREE, &mut settings.mount_sd_rad),
     ];
     read(section, keys)?;
     let keys = [("epoch_s", EPOCH_S, &mut settings.epoch), ("window_s", WINDOW_S, &mut settings.window)];

@@ -53,7 +53,7 @@ pub fn expected_errors(
     let navigation = navigated(&scene, &Settings { learns: false, ..settings })?;
     Ok(Some(ExpectedErrors {
         confidence_sd: vehicle.target.confidence_sd,
-        by_time: by_time(&navigation, vehicle),
+        by_time: by_time(&navigation, vehicle, settings.mount_sd_rad),
     }))
 }
 
@@ -82,13 +82,15 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
 
 /// Pairs of the time between two passes, s, and the standard deviation of the size of a hole between these passes, m.
 /// The standard deviation is the largest around the wall.
-fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig) -> Vec<[f64; 2]> {
+fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig, mount_sd_rad: f64) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;
+    let mounts = running.suspicions.mount_error(mount_sd_rad);
     let arm = Rot::<Tunnel, Body>::identity() * -navigation.unit_at();
     let error = |time_s: u32| {
         let time_s = f64::from(time_s);
         let relative = running.clones.relative(DurNs::from_secs_f64(time_s))?.moved(arm);
+        let relative = relative.weighted(1.0, &mounts, 1.0);
         let error = PassError { relative, from_m: profile.reference() };
         Some([time_s, error.worst_m(profile)])
     };

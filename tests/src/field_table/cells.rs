@@ -102,6 +102,8 @@ pub enum Condition {
     Lively,
     /// The speed of sound in the water is 4 % above the value in the vehicle file.
     WrongSound,
+    /// The mounts of all heads differ by 0.3 degrees (sd) from the vehicle file, which declares this error.
+    Mounts,
     /// The mount of a head differs by 3 degrees from the vehicle file.
     WrongMount,
     /// The wall is 6 % wider than in the vehicle file.
@@ -119,7 +121,7 @@ pub enum Condition {
 }
 
 /// All conditions with the names that the table uses.
-pub const CONDITIONS: [(&str, Condition); 17] = [
+pub const CONDITIONS: [(&str, Condition); 18] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
     ("told", Condition::Told),
@@ -130,6 +132,7 @@ pub const CONDITIONS: [(&str, Condition); 17] = [
     ("as-built", Condition::AsBuilt),
     ("lively", Condition::Lively),
     ("wrong-sound", Condition::WrongSound),
+    ("mounts", Condition::Mounts),
     ("wrong-mount", Condition::WrongMount),
     ("wrong-wall", Condition::WrongWall),
     ("wrong-latency", Condition::WrongLatency),
@@ -152,6 +155,8 @@ pub enum Driven {
     Planned,
     /// At the planned speed, after a stationary phase at the start.
     Stood,
+    /// At the planned speed, after swinging left and right in place at the start.
+    Swung,
     /// At this multiple of the largest speed by the paper's Eq. 16, with the heads in phase for the planned speed.
     Times(f64),
     /// By a pilot who never goes back and follows the live advice within 5 %, with a delay of 3 s.
@@ -162,9 +167,10 @@ pub enum Driven {
 }
 
 /// All kinds of driving with the names that the table uses.
-pub const DRIVEN: [(&str, Driven); 5] = [
+pub const DRIVEN: [(&str, Driven); 6] = [
     ("planned", Driven::Planned),
     ("stood", Driven::Stood),
+    ("swung", Driven::Swung),
     ("faster", Driven::Times(1.2)),
     ("advised", Driven::Advised),
     ("back", Driven::Back),
@@ -212,6 +218,7 @@ const STEEL: &str = "magnetic_disturbance = { per_100m = 4, up_to_deg = 10, leng
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
 /// Cable slack settings of the vehicle file, for a taut and for a hanging cable.
 const TAUT: &str = "slack_sd_m = 0.003\nslack_time_s = 10\n";
+const MOUNTS: &str = "mount_sd_deg = 0.3\n";
 const HANGS: &str = "slack_sd_m = 0.06\nslack_time_s = 10\n";
 
 /// Settings of the vehicle file that state the noises of the `DataSheet` effects.
@@ -230,6 +237,11 @@ const OFF_DESIGN_M: f64 = 0.06;
 
 /// Duration of the stationary phase at the start of a dive, s.
 const STANDS_S: f64 = 30.0;
+
+/// Speed of a vehicle that swings in place, m/s: the smallest of a waypoint.
+const CREEP_MPS: f64 = 0.001;
+/// Swings at the start of a dive: number, time of each in seconds, and angle in degrees.
+const SWINGS: (u32, f64, f64) = (12, 10.0, 5.0);
 
 /// Speed of the vehicle from the launch to the start of the inspection, m/s.
 const WAY_MPS: f64 = 0.3;
@@ -272,7 +284,7 @@ impl Cell {
             Some("mode") => format!("mode = {mode:?}"),
             Some("layout") => format!("layout = {layout:?}"),
             Some("planned_speed_mps") => "planned_speed_mps = PLANNED".to_owned(),
-            Some("[navigation]" | "slack_sd_m" | "slack_time_s") => String::new(),
+            Some("[navigation]" | "slack_sd_m" | "slack_time_s" | "mount_sd_deg") => String::new(),
             _ => line.to_owned(),
         });
         let told = lines.collect::<Vec<_>>().join("\n");
@@ -285,6 +297,7 @@ impl Cell {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
             Condition::Told => TRUE_NOISES.to_owned(),
+            Condition::Mounts | Condition::WrongMount => format!("{TAUT}{MOUNTS}"),
             _ => TAUT.to_owned(),
         }
     }
@@ -312,7 +325,7 @@ impl Cell {
     fn speeds_mps(&self, vehicle: &VehicleConfig) -> [f64; 2] {
         let planned_mps = HELD_SHARE * self.plan_mps(vehicle);
         match self.driven {
-            Driven::Planned | Driven::Stood => [planned_mps, planned_mps],
+            Driven::Planned | Driven::Stood | Driven::Swung => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
             // For these kinds of driving, the second value is the largest speed that the pilot may drive.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
@@ -350,12 +363,24 @@ impl Cell {
                 self.aside_m(1.0),
                 self.aside_m(0.5)
             )
-        } else if self.driven == Driven::Stood {
+        } else if matches!(self.driven, Driven::Stood | Driven::Swung) {
             let place = |chainage_m: f64, more: &str| {
-                format!("[[trajectory.waypoints]]\nchainage_m = {chainage_m}\n{more}\n")
+                format!("[[trajectory.waypoints]]\nchainage_m = {chainage_m:.4}\n{more}\n")
             };
-            let [from, to] = [format!("stay_s = {STANDS_S}"), format!("speed_mps = {speed_mps}")];
-            format!("kind = \"waypoints\"\n{}{}", place(start_m, &from), place(to_m, &to))
+            let mut way = place(start_m, &format!("stay_s = {STANDS_S}"));
+            let (swings, swing_s, yaw_deg) = SWINGS;
+            let mut from_m = start_m;
+            for swing in 0..if self.driven == Driven::Swung { swings } else { 0 } {
+                let yaw_deg = if swing % 2 == 0 { yaw_deg } else { -yaw_deg };
+                from_m += CREEP_MPS * swing_s;
+                way += &place(from_m, &format!("yaw_deg = {yaw_deg}\nspeed_mps = {CREEP_MPS}"));
+            }
+            if from_m > start_m {
+                from_m += CREEP_MPS * swing_s / 2.0;
+                way += &place(from_m, &format!("speed_mps = {CREEP_MPS}"));
+            }
+            way += &place(to_m, &format!("speed_mps = {speed_mps}"));
+            format!("kind = \"waypoints\"\n{way}")
         } else {
             let leg = |distance_m: f64, speed_mps: f64| {
                 format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")
@@ -483,6 +508,10 @@ impl Cell {
     fn wrong(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
         let mut draw = Draw::new(seed);
         match self.condition {
+            Condition::Mounts => {
+                let heads = quoted(&of_sense(plain, Sense::Head));
+                format!("[effects.mount_error]\nangles_sd_deg = 0.3\nsensors = {heads}\n")
+            }
             Condition::WrongSound => "[effects.sound_speed_error]\nshare = 0.04\n".to_owned(),
             Condition::WrongLatency => {
                 let sense = draw.one_of(&[Sense::Head, Sense::Inertial]);

@@ -14,6 +14,10 @@ use headrace_geometry::math;
 ///
 /// If less weight remains, the vehicle has not turned to both sides enough.
 const LEAST_LEFT: f64 = 0.05;
+/// Minimum lean of the beams along the tunnel in a pose window, rms, radians.
+///
+/// A smaller lean is mostly error of the heading, so the window shows nothing.
+const LEAST_LEAN_RAD: f64 = 0.012;
 
 /// Minimum size of the smallest reported tilt, in standard deviations caused by range noise.
 const SHOWS: f64 = 3.0;
@@ -24,6 +28,36 @@ const MOST_RAD: f64 = 0.3;
 /// residual.
 const SUMS: usize = 5;
 
+/// Tilt of a head on its mount about one axis, as the ranges show it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Tilt {
+    pub(super) rad: f64,
+    /// Standard deviation, radians; infinite if the ranges show nothing.
+    pub(super) sd_rad: f64,
+}
+
+impl Default for Tilt {
+    fn default() -> Self {
+        Self { rad: 0.0, sd_rad: f64::INFINITY }
+    }
+}
+
+impl Tilt {
+    /// Mean square of the tilt, given what the ranges show and a declared standard deviation; zero if that is zero.
+    ///
+    /// It contains the square of the expected tilt, because samples are placed as if there were none.
+    pub(super) fn mean_square(&self, declared_rad: f64) -> f64 {
+        let declared = declared_rad * declared_rad;
+        if declared <= 0.0 {
+            return 0.0;
+        }
+        let ratio = self.sd_rad * self.sd_rad / declared;
+        let (share, left) = (1.0 / (1.0 + ratio), declared / (1.0 + 1.0 / ratio));
+        let expected_rad = share * self.rad;
+        left + expected_rad * expected_rad
+    }
+}
+
 /// Tilt sums of one head about one axis within a pose window, and their products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltSums {
@@ -32,10 +66,10 @@ pub(super) struct TiltSums {
     sums: [f64; SUMS],
 }
 
-/// Tilt sums over blocks after the vehicle's pose is eliminated, and their second moments.
+/// Tilt sums over pose windows after the vehicle's pose is eliminated, and their second moments.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltFit {
-    blocks: u32,
+    windows: u32,
     sums: [f64; SUMS],
     squares: [[f64; SUMS]; SUMS],
 }
@@ -94,17 +128,21 @@ impl TiltSums {
 }
 
 impl TiltFit {
-    /// Adds the tilt sums of a block to the fit.
-    pub(super) fn add(&mut self, block: [f64; SUMS]) {
-        if block[0] <= 0.0 {
+    /// Adds the tilt sums of a pose window to the fit.
+    ///
+    /// Unlike other settings, a tilt needs no blocks of distance: its effect changes sign as the vehicle swings, and
+    /// that of the wall's shape does not.
+    pub(super) fn add(&mut self, window: [f64; SUMS]) {
+        let [pattern_2, _, tilt_2, ..] = window;
+        if pattern_2 <= 0.0 || tilt_2 < LEAST_LEAN_RAD * LEAST_LEAN_RAD * pattern_2 {
             return;
         }
-        self.blocks += 1;
-        for (sum, part) in self.sums.iter_mut().zip(block) {
+        self.windows += 1;
+        for (sum, part) in self.sums.iter_mut().zip(window) {
             *sum += part;
         }
-        for (line, a) in self.squares.iter_mut().zip(block) {
-            for (sum, b) in line.iter_mut().zip(block) {
+        for (line, a) in self.squares.iter_mut().zip(window) {
+            for (sum, b) in line.iter_mut().zip(window) {
                 *sum += a * b;
             }
         }
@@ -115,7 +153,7 @@ impl TiltFit {
     /// `None` if the vehicle has not turned enough.
     fn estimate(&self) -> Option<(f64, f64)> {
         let [pattern_2, both, tilt_2, pattern_off, tilt_off] = self.sums;
-        if self.blocks < FEWEST_BLOCKS || pattern_2 <= 0.0 {
+        if self.windows < FEWEST_BLOCKS || pattern_2 <= 0.0 {
             return None;
         }
         let share = both / pattern_2;
@@ -123,26 +161,33 @@ impl TiltFit {
         (weight > LEAST_LEFT * tilt_2).then(|| ((tilt_off - share * pattern_off) / weight, weight))
     }
 
+    /// Returns the head's tilt; `None` if the vehicle has not turned enough.
+    ///
+    /// The standard deviation comes from the scatter of pose windows, and is at least the one caused by range noise, whose variance is
+    /// `level` times the declared variance.
+    pub(super) fn tilt(&self, level: f64) -> Option<Tilt> {
+        let (rad, weight) = self.estimate()?;
+        let [pattern_2, both, _, pattern_off, _] = self.sums;
+        let share = both / pattern_2;
+        let steady = (pattern_off - rad * both) / pattern_2;
+        // Weights that combine a window's sums into the residual that the fit leaves in this window.
+        let left = [share * steady, share * rad - steady, -rad, -share, 1.0];
+        let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
+        let n = f64::from(self.windows);
+        let sd_rad = math::sqrt((scatter * n / (n - 2.0)).max(0.0)) / weight;
+        Some(Tilt { rad, sd_rad: sd_rad.max(math::sqrt(level / weight)) })
+    }
+
     /// Returns the head's tilt and its distance from zero in standard deviations, if it certainly exceeds
     /// `least_rad`.
     ///
-    /// The standard deviation comes from the scatter of blocks. It is at least the one caused by range noise, whose
-    /// variance is `level` times the declared variance. `None` if declared noise would hide a tilt of `least_rad`, or
-    /// if the tilt is too large for the linear model.
+    /// `None` if declared noise would hide a tilt of `least_rad`, or if the tilt is too large for the linear model.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
         if weight * least_rad * least_rad < SHOWS * SHOWS {
             return None;
         }
-        let [pattern_2, both, _, pattern_off, _] = self.sums;
-        let share = both / pattern_2;
-        let steady = (pattern_off - tilt_rad * both) / pattern_2;
-        // Weights that combine a block's sums into the residual that the fit leaves in this block.
-        let left = [share * steady, share * tilt_rad - steady, -tilt_rad, -share, 1.0];
-        let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
-        let n = f64::from(self.blocks);
-        let sd_rad = math::sqrt((scatter * n / (n - 2.0)).max(0.0)) / weight;
-        let sure_sd = tilt_rad.abs() / sd_rad.max(math::sqrt(level / weight));
+        let sure_sd = tilt_rad.abs() / self.tilt(level)?.sd_rad;
         ((least_rad..MOST_RAD).contains(&tilt_rad.abs()) && sure_sd >= SURE).then_some((tilt_rad, sure_sd))
     }
 
@@ -231,7 +276,7 @@ mod tests {
             "a tilt below the limit is not reported"
         );
         // The certainty of the tilt is limited by the range noise if that is large, and otherwise by the scatter of
-        // blocks.
+        // pose windows.
         let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
         assert!(
             (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,

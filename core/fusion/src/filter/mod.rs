@@ -469,6 +469,10 @@ impl Navigation for FilterNavigation {
         running.suspicions.doubt([running.state.range_scale, scale_sd])
     }
 
+    fn has_unverified_mounts(&self) -> bool {
+        self.running().is_some_and(|running| running.suspicions.has_unverified_mounts())
+    }
+
     fn cable_doubt(&self) -> Option<CableDoubt> {
         self.dispute().or_else(|| self.raw_ways.doubt())
     }
@@ -503,7 +507,9 @@ impl Navigation for FilterNavigation {
         debug_assert!(pose.position.is_finite() && pose.attitude.is_unit(), "a fix has a pose: {pose:?}");
         let (speed_mps, tie) = (state.velocity_mps.x(), self.running.ties);
         let settled = self.running.settled;
-        let [relative, revisit] = [relative, self.revisit].map(|of| of.moved(arm));
+        let mounts = self.running.suspicions.mount_error(self.context.settings.mount_sd_rad);
+        let [relative, revisit] =
+            [relative, self.revisit].map(|of| of.moved(arm).weighted(1.0, &mounts, 1.0));
         Ok(Fix { pose, speed_mps, relative, revisit, tie, settled })
     }
 }

@@ -3,7 +3,8 @@
 //! Each setting is a parameter that is fitted to the residuals. Within a pose window of a few seconds, the vehicle's
 //! pose explains as much of the residuals as it can, and the parameters explain the rest. The sums of pose windows are
 //! added up over blocks of distance. Blocks are about as independent as the wall allows, so their scatter gives the
-//! uncertainty of a parameter. Summary: `docs/why/navigation.md`, "Settings in doubt".
+//! uncertainty of a parameter. For a head's tilt, each pose window is a block. Summary: `docs/why/navigation.md`,
+//! "Settings in doubt".
 //!
 //! A residual is r = x b, with x the error of the setting and b as follows (t, A, p: as in the range's derivatives):
 //!
@@ -13,14 +14,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, SURE};
-use super::head_tilt::TiltFit;
+use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, POSE, SURE};
+use super::head_tilt::{Tilt, TiltFit};
 use super::measure::{self, Beam, ScalarUpdate, with_quantum};
 use super::pose_window::PoseWindow;
 use super::settings::Settings;
 use super::sources::Source;
 use super::state::{ATTITUDE, POSITION, State, vec};
 use super::window::Waiting;
+use crate::relative::Relative;
 use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3, head_direction};
 use headrace_geometry::math;
 use headrace_geometry::site::Site;
@@ -31,7 +33,7 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
 /// Length of a pose window: about the time for which a filter with wrong ranges keeps its position.
-const SPELL: DurNs = DurNs(2_000_000_000);
+const SPELL: DurNs = DurNs(5_000_000_000);
 /// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that is too short by
 /// then is dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
@@ -42,6 +44,10 @@ const FEWEST_READINGS: u32 = 100;
 /// Smallest setting errors that are reported: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
+/// Largest standard deviation of a head's pitch and yaw with which its mount counts as verified, radians.
+///
+/// The smallest angle that is reported then differs from zero by two standard deviations.
+const VERIFIED_RAD: f64 = LEAST_ANGLE_RAD / 2.0;
 /// Residual above which a range loses weight, and residual above which a range is ignored, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
@@ -116,6 +122,14 @@ impl Setting {
         }
     }
 
+    /// Whether the setting is the direction in which a head points, so that its samples are displaced along the tunnel.
+    pub fn is_of_pointing(self) -> bool {
+        match self {
+            Self::HeadPitched(_) | Self::HeadYawed(_) | Self::WrongWayRound | Self::Swapped(_) => true,
+            Self::RangeScale(_) | Self::HeadTurned(_) => false,
+        }
+    }
+
     /// Returns the number of the second of two swapped sources; `None` for other settings.
     pub fn other(self) -> Option<u16> {
         match self {
@@ -154,6 +168,16 @@ struct Look {
     sd_m: f64,
 }
 
+/// A range's derivatives by the vehicle's pose and by a rotation about the head, its expected value, its residual, and its
+/// weight in the fits.
+struct Seen {
+    by_pose: [f64; POSE],
+    own_turn: Vec3<Tunnel>,
+    expected_m: f64,
+    residual_m: f64,
+    weight: f64,
+}
+
 /// Sums over a block of pose windows, with the block's start and number of readings.
 ///
 /// The vehicle's pose is already eliminated from the sums.
@@ -163,7 +187,6 @@ struct Block {
     readings: u32,
     scale: [f64; 2],
     turned: [[f64; 2]; FOLLOWED],
-    tilted: [[[f64; 5]; 2]; FOLLOWED],
 }
 
 /// Fits of all settings that are checked.
@@ -179,10 +202,12 @@ pub struct SettingChecks {
     /// For each checked source, the number of readings and the observed share of the declared variance, at most 1.
     heard: [u32; FOLLOWED],
     levels: [f64; FOLLOWED],
+    /// Pitch and yaw of each head on its mount, as the ranges show them; `None` for sources that are no heads.
+    mounts: [Option<[Tilt; 2]>; FOLLOWED],
     doubt: Option<SettingDoubt>,
 }
 
-stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, doubt; lists: alternatives; });
+stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, mounts, doubt; lists: alternatives; });
 
 impl Default for SettingChecks {
     /// Creates the checks with allocated buffers, but no readings.
@@ -197,6 +222,7 @@ impl Default for SettingChecks {
             alternatives: Vec::with_capacity(ALTERNATIVES),
             heard: [0; FOLLOWED],
             levels: [1.0; FOLLOWED],
+            mounts: [None; FOLLOWED],
             doubt: None,
         }
     }
@@ -212,6 +238,37 @@ impl SettingChecks {
         let is_scaled = self.scale.is_settled() && share.abs() >= LEAST_SCALE && sure_sd >= SURE;
         let setting = Setting::RangeScale(share);
         self.doubt.or_else(|| is_scaled.then_some(SettingDoubt { setting, source: None, sure_sd }))
+    }
+
+    /// Whether the ranges have not shown yet that all heads point along their mounts.
+    ///
+    /// They show it while the vehicle swings from side to side. A single head needs no check: a tilt moves all of its
+    /// samples alike.
+    pub fn has_unverified_mounts(&self) -> bool {
+        self.compared_heads().flatten().any(|tilt| tilt.sd_rad > VERIFIED_RAD)
+    }
+
+    /// Returns the covariance between samples of two heads that is due to their mounts.
+    ///
+    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. Ranges reduce or
+    /// increase it.
+    pub fn mount_error(&self, declared_rad: f64) -> Relative {
+        let mut worst = [0.0, 0.0];
+        for head in self.compared_heads() {
+            for (worst, tilt) in worst.iter_mut().zip(head) {
+                *worst = tilt.mean_square(declared_rad).max(*worst);
+            }
+        }
+        // The errors of two heads are independent.
+        let [pitch, yaw] = worst.map(|square| 2.0 * square);
+        Relative::new([[0.0; 3], [0.0, pitch, 0.0], [0.0, 0.0, yaw]])
+    }
+
+    /// Pitch and yaw of the heads, if there are several.
+    fn compared_heads(&self) -> impl Iterator<Item = &[Tilt; 2]> {
+        let heads = self.mounts.iter().flatten();
+        let several = heads.clone().count() > 1;
+        heads.filter(move |_| several)
     }
 
     /// Processes a reading before it is fused; `state` is the estimate at the time of the reading.
@@ -266,20 +323,33 @@ impl SettingChecks {
         self.block.readings += 1;
         self.spell.add(by_pose, row.residual, weight);
         self.spell.scale.add(by_pose, expected_m, row.residual, weight);
-        if info.kind != SensorKind::Head {
-            return;
+        if info.kind == SensorKind::Head {
+            let seen = Seen { by_pose, own_turn, expected_m, residual_m: row.residual, weight };
+            self.hear_head(slot, &info.mount.rotation, (state, &look.beam), &seen);
         }
-        let axis = state.attitude * (info.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
+    }
+
+    /// Adds a head's return to the fits of its mount.
+    fn hear_head(
+        &mut self,
+        slot: usize,
+        mount: &Rot<Body, Sensor>,
+        (state, beam): (&State, &Beam),
+        seen: &Seen,
+    ) {
+        let Seen { by_pose, own_turn, expected_m, residual_m, weight } = *seen;
+        if let Some(mount) = self.mounts.get_mut(slot) {
+            mount.get_or_insert_default();
+        }
+        let axis = state.attitude * (*mount * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
         if let Some(line) = self.spell.turned.get_mut(slot) {
-            line.add(by_pose, own_turn.dot(&axis), row.residual, weight);
+            line.add(by_pose, own_turn.dot(&axis), residual_m, weight);
         }
-        let along = state.attitude * look.beam.along;
-        for (line, axis) in
-            self.spell.tilted.get_mut(slot).into_iter().flatten().zip(tilt_axes(&info.mount.rotation))
-        {
+        let along = state.attitude * beam.along;
+        for (line, axis) in self.spell.tilted.get_mut(slot).into_iter().flatten().zip(tilt_axes(mount)) {
             let axis = state.attitude * axis;
             let leans = axis.cross(&along).x();
-            line.add(by_pose, own_turn.dot(&axis), expected_m * leans * leans, row.residual, weight);
+            line.add(by_pose, own_turn.dot(&axis), expected_m * leans * leans, residual_m, weight);
         }
     }
 
@@ -340,9 +410,21 @@ impl SettingChecks {
         for (sums, line) in self.block.turned.iter_mut().zip(&spell.turned) {
             add(sums, line);
         }
-        for (sums, line) in self.block.tilted.iter_mut().flatten().zip(spell.tilted.iter().flatten()) {
-            for (sum, part) in sums.iter_mut().zip(line.freed(spell.residuals, &factor)) {
-                *sum += part;
+        for (fit, line) in self.tilted.iter_mut().flatten().zip(spell.tilted.iter().flatten()) {
+            fit.add(line.freed(spell.residuals, &factor));
+        }
+        self.note_mounts();
+        self.doubt = self.likeliest();
+    }
+
+    /// Computes how well the ranges show the heads' pitch and yaw.
+    fn note_mounts(&mut self) {
+        for ((head, fits), level) in self.mounts.iter_mut().zip(&self.tilted).zip(self.levels) {
+            for (known, fit) in head.iter_mut().flatten().zip(fits) {
+                // A mount does not change during a dive, so the most certain estimate counts.
+                if let Some(tilt) = fit.tilt(level).filter(|tilt| tilt.sd_rad < known.sd_rad) {
+                    *known = tilt;
+                }
             }
         }
     }
@@ -363,9 +445,6 @@ impl SettingChecks {
             self.scale.add(self.block.scale, readings);
             for (fit, sums) in self.turned.iter_mut().zip(self.block.turned) {
                 fit.add(sums, readings);
-            }
-            for (fit, sums) in self.tilted.iter_mut().flatten().zip(self.block.tilted.iter().flatten()) {
-                fit.add(*sums);
             }
             for alternative in &mut self.alternatives {
                 alternative.close();

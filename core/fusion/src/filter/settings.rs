@@ -41,7 +41,7 @@ impl GaussMarkov {
     }
 }
 
-/// Noise settings of the sensors. Every number is positive.
+/// Noise settings of the sensors. Every number is positive, `mount_sd_rad` may be zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// White noise of the gyros, rad/s/sqrt(Hz).
@@ -101,6 +101,8 @@ pub struct Settings {
     pub return_step_rad: f64,
     /// Noise of a velocity log's velocity over ground, m/s.
     pub velocity_sd_mps: f64,
+    /// Declared error of a head's pitch and yaw on its mount, radians. It counts until the ranges show less.
+    pub mount_sd_rad: f64,
     /// Gate: a measurement is rejected if its squared innovation exceeds the innovation's variance times this
     /// factor.
     pub gate: f64,
@@ -156,6 +158,7 @@ impl Default for Settings {
             return_beam_rad: 1.4 * DEGREE,
             return_step_rad: 3.0 * DEGREE,
             velocity_sd_mps: 0.02,
+            mount_sd_rad: 0.0,
             gate: GATE_999,
             window: DurNs::from_millis(200),
             epoch: DurNs::from_millis(100),

@@ -77,6 +77,10 @@ impl Navigation for TwoFilterNavigation {
         self.navigating.setting_doubt()
     }
 
+    fn has_unverified_mounts(&self) -> bool {
+        self.navigating.has_unverified_mounts()
+    }
+
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
         self.navigating.fix(at)
     }

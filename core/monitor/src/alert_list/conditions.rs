@@ -38,6 +38,8 @@ pub(crate) struct Beat<'a> {
     /// Live state whose `now` is the time of the advice update.
     pub(crate) state: &'a LiveState,
     pub(crate) setting: Option<SettingDoubt>,
+    /// Whether the heads' pitch and yaw on their mounts are not verified yet.
+    pub(crate) unverified_mounts: bool,
 }
 
 /// Result of checking a condition: whether it holds.
@@ -154,7 +156,9 @@ impl AlertList {
 
     /// Checks the observations about the dive as a whole.
     fn take_observations(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
-        let Beat { at, state, setting } = *beat;
+        let Beat { at, state, setting, unverified_mounts } = *beat;
+        let unverified = unverified_mounts && self.is_late(at);
+        self.observe(at, &Seen::of(ListKind::MountsUnverified, unverified, Figures::None), to);
         let active = |kind: ListKind, source: Option<SourceId>| {
             let is_it =
                 |known: &&ActiveObservation| ListKind::from(known.kind) == kind && known.source == source;

@@ -82,11 +82,13 @@ pub enum ListKind {
     SensorDeaf,
     /// A sensor repeats its last reading.
     SensorHung,
+    /// The ranges have not shown yet that all heads point along their mounts.
+    MountsUnverified,
 }
 
 impl ListKind {
     /// All kinds of alerts.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 25] = [
         Self::Missed,
         Self::CannotSay,
         Self::TooFast,
@@ -111,6 +113,7 @@ impl ListKind {
         Self::BatteryLeft,
         Self::SensorDeaf,
         Self::SensorHung,
+        Self::MountsUnverified,
     ];
 
     /// Word used for the alert kind in JSON.
@@ -140,6 +143,7 @@ impl ListKind {
             Self::BatteryLeft => "battery_left",
             Self::SensorDeaf => "sensor_deaf",
             Self::SensorHung => "sensor_hung",
+            Self::MountsUnverified => "mounts_unverified",
         }
     }
 
@@ -160,6 +164,7 @@ impl ListKind {
             | Self::HeadOutvoted => AlertClass::Sensor,
             Self::NotRecorded => AlertClass::Recording,
             Self::SettingDoubted
+            | Self::MountsUnverified
             | Self::OutsideTunnel
             | Self::ProfileContradicted
             | Self::CableLeft
@@ -171,7 +176,7 @@ impl ListKind {
     /// Priority of the alert when it is raised. It may rise later as cable, time or charge runs out.
     pub fn priority(self) -> Priority {
         match self {
-            Self::CannotSay | Self::TurnFails => Priority::Caution,
+            Self::CannotSay | Self::TurnFails | Self::MountsUnverified => Priority::Caution,
             Self::TooFast
             | Self::NoSpeed
             | Self::PositionDoubtful

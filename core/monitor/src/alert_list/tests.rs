@@ -274,7 +274,9 @@ fn higher_priority_needs_a_new_acknowledgement() {
         let at = MonoNs(at_s * 1_000_000_000);
         (state.at, state.now) = (Some(at), at);
         bench.list.set_battery(pct);
-        bench.with(|list, to| list.beat(&Beat { at, state: &state, setting: None }, to));
+        bench.with(|list, to| {
+            list.beat(&Beat { at, state: &state, setting: None, unverified_mounts: false }, to);
+        });
     };
     let battery = |bench: &Bench| {
         let found = bench.list.iter().find(|alert| alert.kind == ListKind::BatteryLeft);
@@ -296,6 +298,26 @@ fn higher_priority_needs_a_new_acknowledgement() {
     assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
 }
 
+/// A dive begins with unverified mounts. The vehicle may swing during the first 30 s, before the alert asks for it.
+#[test]
+fn unverified_mounts_raise_a_caution_after_the_grace_period_until_they_are_verified() {
+    let mut bench = Bench::new(0.0, 0.0);
+    let mut state = crate::live_state::test_state();
+    let mut beat = |at_s: u64, unverified_mounts: bool| {
+        let at = MonoNs(at_s * 1_000_000_000);
+        (state.at, state.now) = (Some(at), at);
+        bench.with(|list, to| list.beat(&Beat { at, state: &state, setting: None, unverified_mounts }, to));
+        let found = bench.list.iter().find(|alert| alert.kind == ListKind::MountsUnverified);
+        found.map(|alert| (alert.priority, alert.state == AlertState::Active))
+    };
+    assert_eq!((beat(1, true), beat(30, true)), (None, None));
+    assert_eq!(
+        (beat(31, true), beat(90, true)),
+        (Some((Priority::Caution, true)), Some((Priority::Caution, true)))
+    );
+    assert_eq!(beat(91, false), Some((Priority::Caution, false)));
+}
+
 /// Later occurrences only update the figures of the active alert. They publish no notice.
 #[test]
 fn later_occurrences_update_the_alert_figures_and_publish_no_notice() {
@@ -305,7 +327,9 @@ fn later_occurrences_update_the_alert_figures_and_publish_no_notice() {
         let kind = ObservedKind::ProfileContradicted;
         state.observations[0] = Some(ActiveObservation { kind, source: None, occurrences });
         (state.at, state.now) = (Some(at), at);
-        bench.with(|list, to| list.beat(&Beat { at, state: &state, setting: None }, to));
+        bench.with(|list, to| {
+            list.beat(&Beat { at, state: &state, setting: None, unverified_mounts: false }, to);
+        });
     };
     let first = Occurrences { count: 1, first_m: 7.0, worst_m: 0.4 };
     beat(&mut bench, MonoNs(1_000_000_000), first);

@@ -127,6 +127,7 @@ impl ListedAlert {
                 "go slower, or pass it again with a more certain position".to_owned()
             }
             (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
+            (ListKind::MountsUnverified, _) => "swing 5 degrees left and right until this ends".to_owned(),
             (ListKind::NotRecorded, _) => "free disk space, or change the medium".to_owned(),
             (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
             _ => String::new(),
@@ -140,6 +141,7 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
         ListKind::SensorStalled => format!("{name} doesn't turn"),
         ListKind::SensorHung => format!("{name} is stuck: it repeats one reading"),
         ListKind::SensorDeaf => format!("{name} detects no wall"),
+        ListKind::MountsUnverified => "mounts of the heads not verified".to_owned(),
         ListKind::NoSonar => "NO SONAR: no returns".to_owned(),
         ListKind::NoData => "NO DATA: nothing from any sensor".to_owned(),
         ListKind::NotRecorded => "NOT RECORDED: the recording fails, or its disk is too slow".to_owned(),

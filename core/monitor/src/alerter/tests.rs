@@ -25,7 +25,7 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
     let fix = Fix { pose, speed_mps: 0.07, relative, revisit: relative, tie: 0, settled: 0 };
     let fix = lacking.map_or(Ok(fix), Err);
     let cable = is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, differs_m: 0.5, log: None });
-    let doubts = Doubts { cable, setting: None, stand_s: 3, hung: 0 };
+    let doubts = Doubts { cable, setting: None, unverified_mounts: false, stand_s: 3, hung: 0 };
     let pose = fix.ok().map(|fix| fix.pose);
     let situation = Situation { pose, speed_mps: 0.07, pass_error_m, ..situation(None) };
     let placement = Placement::Update(Update { at: AT, situation, doubts, fix, sd: None });

@@ -144,7 +144,7 @@ fn raised(kind: ObservedKind) -> ListedAlertJson {
     state.observations[0] = Some(ActiveObservation { kind, source: None, occurrences });
     let mut list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 0);
     let mut to = Telling { notices: &mut Vec::new(), stream: &mut ResultStream::default() };
-    list.beat(&Beat { at: MonoNs(1), state: &state, setting: None }, &mut to);
+    list.beat(&Beat { at: MonoNs(1), state: &state, setting: None, unverified_mounts: false }, &mut to);
     let alert = list.iter().find(|alert| matches!(alert.figures, Figures::Deviation(_))).unwrap();
     alert.json(&armed().view().surroundings(), MonoNs(1))
 }

@@ -59,7 +59,9 @@ pub(super) fn navigate(
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
             let (cable, setting) = (navigation.cable_doubt(), navigation.setting_doubt());
-            let doubts = Doubts { cable, setting, stand_s: navigation.stand_s(), hung: navigator.hung };
+            let unverified_mounts = navigation.has_unverified_mounts();
+            let stand_s = navigation.stand_s();
+            let doubts = Doubts { cable, setting, unverified_mounts, stand_s, hung: navigator.hung };
             let sd = navigation.pose_sd();
             *state = VehicleState { at: Some(at), fix, sd, cable_doubt: doubts.cable };
             digest(&mut poses.0, at, &state);

@@ -37,8 +37,7 @@ pub(super) fn suspect(
     let sections = &mut coverage.sections;
     for index in sections.index_of(from_m)..=sections.index_of(to_m) {
         let Some(section) = sections.get_mut(index) else { continue };
-        section.suspect();
-        if section.hole.is_some() {
+        if section.suspect() && section.hole.is_some() {
             requests.0.push(Request::at(&outlook)(index));
         }
     }

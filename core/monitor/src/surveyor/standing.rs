@@ -206,7 +206,7 @@ mod tests {
         for (source, kind) in (0..3).flat_map(|source| kinds.map(|kind| (SourceId(source), kind))) {
             observations.note_of(Some(source), kind, at, Occurrence { x_m: 1.0, off_m: 0.5 });
         }
-        let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
+        let doubts = Doubts { cable: None, setting: None, unverified_mounts: false, stand_s: 0, hung: 0 };
         for (head, kind) in (0..3).zip(kinds) {
             let is_distrusted =
                 |source: SourceId, asked: ObservedKind| source == SourceId(head) && asked == kind;

@@ -56,8 +56,11 @@ fn note_update(
     survey: &mut Survey<'_>,
     outputs: &mut Outputs<'_>,
 ) {
-    navigation_doubts::note(*at, situation, doubts, &mut outputs.refs());
     let Survey { coverage, driving, requests, plan, .. } = survey;
+    let (said, seen) = ((*at, situation, doubts), (&**coverage, &*heads));
+    if let Some(between_m) = navigation_doubts::note(said, seen, &mut outputs.refs()) {
+        due::suspect(coverage, between_m, (heads, *at), requests);
+    }
     let profile = &site.tunnel.profile;
     let healthy = driving.lacking.healthy(*at, situation, heads);
     driving.note(*at, [situation, &healthy], profile, plan);

@@ -52,6 +52,8 @@ pub(super) struct Rig {
     /// Time between samples of the inertial unit, s.
     pub(super) imu_s: f64,
     pub(super) seed: u64,
+    /// True yaw of the first head on its mount, radians. The filter does not know it.
+    pub(super) head_yaw_rad: f64,
 }
 
 pub(super) fn at(seconds: f64) -> MonoNs {
@@ -74,6 +76,12 @@ pub(super) fn cruise(t: f64) -> Pose {
     }
 }
 
+/// Pose of a vehicle at rest that swings 5 degrees left and right.
+pub(super) fn swing(t: f64) -> Pose {
+    let yaw_rad = 0.087 * math::sin(math::TAU * t / 20.0);
+    Pose { attitude: Rot::from_roll_pitch_yaw(0.0, 0.0, yaw_rad), ..rest(t) }
+}
+
 /// Pose of a vehicle at rest that is level and faces along the tunnel.
 pub(super) fn rest(_: f64) -> Pose {
     Pose { position: Point3::new(3.0, 0.4, 4.0), attitude: Rot::identity() }
@@ -85,7 +93,16 @@ impl Rig {
         let slack = GaussMarkov { reach: 0.06, time_s: 10.0 };
         let settings = Settings { slack, return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() };
         let site = Site { axis_yaw_rad: 0.7, ..Site::default() };
-        Self { profile: shapes::ceran().unwrap(), site, settings, way, noise: 1.0, imu_s: 0.02, seed }
+        Self {
+            profile: shapes::ceran().unwrap(),
+            site,
+            settings,
+            way,
+            noise: 1.0,
+            imu_s: 0.02,
+            seed,
+            head_yaw_rad: 0.0,
+        }
     }
 
     pub(super) fn navigation(&self) -> FilterNavigation {
@@ -315,9 +332,11 @@ impl Rig {
 
     pub(super) fn sonar(&self, source: usize, t: f64) -> Reading {
         let angle_rad = math::wrap(t * 1.7, math::TAU);
+        let yaw_rad = if source == HEADS { self.head_yaw_rad } else { 0.0 };
+        let along = Rot::<Sensor, Sensor>::from_roll_pitch_yaw(0.0, 0.0, yaw_rad) * head_direction(angle_rad);
         Reading::Sonar(SonarReturn {
             angle_rad,
-            range_m: Some(self.range_m(source, t, head_direction(angle_rad))),
+            range_m: Some(self.range_m(source, t, along)),
             resolution_m: 0.01,
             max_range_m: 20.0,
             sound_speed_mps: DEVICE_MPS,

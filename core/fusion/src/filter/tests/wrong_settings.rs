@@ -1,9 +1,12 @@
 //! Detection of wrong settings in a dive of some minutes, by the filter alone.
 
 use super::super::FilterNavigation;
+use super::super::head_tilt::Tilt;
 use super::super::setting_check::{Setting, SettingDoubt};
-use super::rig::{HEADS, Rig, cruise};
+use super::rig::{HEADS, Rig, at, cruise, rest, swing};
 use crate::Navigation as _;
+use crate::relative::Relative;
+use headrace_geometry::math;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
 /// Returns the filter's doubt about settings after a dive of four minutes. All echoes are scaled, and each head's
@@ -55,4 +58,86 @@ fn rotated_head_is_reported_with_its_angle() {
             "{turned_rad} of head {head}: {doubt:?}"
         );
     }
+}
+
+/// Feeds the readings of a dive to a filter that knows `mount_sd_deg`; only readings that `is_heard` allows.
+fn dived(rig: &Rig, to_s: f64, mount_sd_deg: f64, is_heard: &dyn Fn(usize) -> bool) -> FilterNavigation {
+    let mut nav = rig.navigation();
+    nav.context.settings.mount_sd_rad = mount_sd_deg.to_radians();
+    for event in rig.events(0.0, to_s).iter().filter(|event| is_heard(event.source)) {
+        Rig::hear(&mut nav, event);
+    }
+    nav
+}
+
+const ALL: &dyn Fn(usize) -> bool = &|_| true;
+
+#[test]
+fn swing_at_rest_verifies_mounts_and_reveals_a_yawed_head() {
+    for (yaw_rad, seed) in [(0.0, 1), (0.0, 2), (0.052, 3), (-0.065, 4)] {
+        let rig = Rig { head_yaw_rad: yaw_rad, ..Rig::new(swing, seed) };
+        assert!(dived(&rig, 20.0, 0.0, ALL).has_unverified_mounts(), "a swing of 20 s is too short");
+        let nav = dived(&rig, 240.0, 0.0, ALL);
+        let doubt = nav.setting_doubt();
+        assert!(!nav.has_unverified_mounts(), "{yaw_rad}: {doubt:?}");
+        match doubt {
+            None => assert!(yaw_rad == 0.0, "{yaw_rad} is not reported"),
+            Some(SettingDoubt { setting: Setting::HeadYawed(by_rad), source, .. }) => {
+                assert_eq!(source.map(usize::from), Some(HEADS));
+                // With two heads, the vehicle's heading may explain up to half of the angle.
+                assert!((0.5..1.2).contains(&(by_rad / yaw_rad)), "{by_rad} instead of {yaw_rad}");
+            }
+            other => panic!("{yaw_rad}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn mounts_stay_unverified_without_a_swing_and_need_no_check_for_a_single_head() {
+    let is_unverified = |is_heard: &dyn Fn(usize) -> bool| {
+        dived(&Rig::new(rest, 5), 240.0, 0.0, is_heard).has_unverified_mounts()
+    };
+    assert!(is_unverified(ALL));
+    assert!(!is_unverified(&|source| source != HEADS), "one head");
+    assert!(!is_unverified(&|source| source < HEADS), "no head");
+}
+
+/// Two heads differ by twice the variance of one. A swing that shows no tilt reduces it.
+#[test]
+fn declared_mount_error_widens_the_error_between_passes_until_the_vehicle_has_swung() {
+    let adds = |rig: &Rig, to_s: f64, declared_deg: f64, is_heard: &dyn Fn(usize) -> bool| {
+        let relative = |declared_deg: f64| -> Relative {
+            dived(rig, to_s, declared_deg, is_heard).fix(at(to_s)).unwrap().relative
+        };
+        let square = |relative: Relative| relative.turn_sd_rad() * relative.turn_sd_rad();
+        (square(relative(declared_deg)) - square(relative(0.0))).sqrt().to_degrees()
+    };
+    for declared_deg in [0.3, 1.0, 3.0] {
+        let still_deg = adds(&Rig::new(rest, 6), 100.0, declared_deg, ALL);
+        assert!((still_deg / (2.0 * declared_deg) - 1.0).abs() < 1e-6, "{still_deg}");
+        let swung_deg = adds(&Rig::new(swing, 6), 200.0, declared_deg, ALL);
+        assert!(swung_deg < 0.98 * still_deg && swung_deg > 0.0, "{swung_deg} of {still_deg}");
+        let tilted = Rig { head_yaw_rad: 0.08, ..Rig::new(swing, 6) };
+        let tilted_deg = adds(&tilted, 200.0, declared_deg, ALL);
+        assert!(tilted_deg > swung_deg, "{tilted_deg} with a yawed head, {swung_deg} without");
+    }
+    assert!(adds(&Rig::new(rest, 6), 100.0, 0.3, &|source| source != HEADS) < 1e-9, "one head");
+}
+
+/// Oracle: the mean square of the tilt over its posterior density, by a sum over a grid of tilts.
+#[test]
+fn mean_square_of_a_tilt_equals_that_of_its_posterior_density() {
+    for (declared, rad, sd_rad) in [(0.005, 0.0, 0.01), (0.005, 0.02, 0.004), (0.02, -0.03, 0.003)] {
+        let density = |tilt: f64| {
+            let square = |x: f64| x * x;
+            math::exp(-0.5 * (square(tilt / declared) + square((tilt - rad) / sd_rad)))
+        };
+        let tilts = || (-20_000..=20_000).map(|k| 1e-5 * f64::from(k));
+        let squares = tilts().map(|tilt| density(tilt) * tilt * tilt).sum::<f64>();
+        let expected = squares / tilts().map(density).sum::<f64>();
+        let found = Tilt { rad, sd_rad }.mean_square(declared);
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found} instead of {expected}");
+    }
+    assert!((Tilt::default().mean_square(0.01) - 0.0001).abs() < 1e-12, "the ranges show nothing");
+    assert!(Tilt { rad: 0.1, sd_rad: 0.01 }.mean_square(0.0) < 1e-12, "mounts are declared exact");
 }
