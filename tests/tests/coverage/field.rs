@@ -188,6 +188,6 @@ fn heads_off_their_mounts_let_no_section_far_over_the_target_pass() {
         assert!(f64::from(passed_over) <= 0.025 * f64::from(over), "{condition:?} {driven:?}: {sum:?}");
         assert!(f64::from(failed_under) <= 0.005 * f64::from(under), "{condition:?} {driven:?}: {sum:?}");
         let is_declared = condition == Condition::Mounts;
-        assert!(!is_declared || (0.4..=1.3).contains(&ratio), "{driven:?}: errors are {ratio} of their sd");
+        assert!(!is_declared || (0.5..=1.3).contains(&ratio), "{driven:?}: errors are {ratio} of their sd");
     }
 }

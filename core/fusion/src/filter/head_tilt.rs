@@ -28,36 +28,6 @@ const MOST_RAD: f64 = 0.3;
 /// residual.
 const SUMS: usize = 5;
 
-/// Tilt of a head on its mount about one axis, as the ranges show it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Tilt {
-    pub(super) rad: f64,
-    /// Standard deviation, radians; infinite if the ranges show nothing.
-    pub(super) sd_rad: f64,
-}
-
-impl Default for Tilt {
-    fn default() -> Self {
-        Self { rad: 0.0, sd_rad: f64::INFINITY }
-    }
-}
-
-impl Tilt {
-    /// Mean square of the tilt, given what the ranges show and a declared standard deviation; zero if that is zero.
-    ///
-    /// It contains the square of the expected tilt, because samples are placed as if there were none.
-    pub(super) fn mean_square(&self, declared_rad: f64) -> f64 {
-        let declared = declared_rad * declared_rad;
-        if declared <= 0.0 {
-            return 0.0;
-        }
-        let ratio = self.sd_rad * self.sd_rad / declared;
-        let (share, left) = (1.0 / (1.0 + ratio), declared / (1.0 + 1.0 / ratio));
-        let expected_rad = share * self.rad;
-        left + expected_rad * expected_rad
-    }
-}
-
 /// Tilt sums of one head about one axis within a pose window, and their products with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltSums {
@@ -161,11 +131,11 @@ impl TiltFit {
         (weight > LEAST_LEFT * tilt_2).then(|| ((tilt_off - share * pattern_off) / weight, weight))
     }
 
-    /// Returns the head's tilt; `None` if the vehicle has not turned enough.
+    /// Returns the standard deviation of the head's tilt, radians; `None` if the vehicle has not turned enough.
     ///
-    /// The standard deviation comes from the scatter of pose windows, and is at least the one caused by range noise, whose variance is
+    /// It comes from the scatter of pose windows, and is at least the one caused by range noise, whose variance is
     /// `level` times the declared variance.
-    pub(super) fn tilt(&self, level: f64) -> Option<Tilt> {
+    pub(super) fn sd_rad(&self, level: f64) -> Option<f64> {
         let (rad, weight) = self.estimate()?;
         let [pattern_2, both, _, pattern_off, _] = self.sums;
         let share = both / pattern_2;
@@ -175,7 +145,7 @@ impl TiltFit {
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.windows);
         let sd_rad = math::sqrt((scatter * n / (n - 2.0)).max(0.0)) / weight;
-        Some(Tilt { rad, sd_rad: sd_rad.max(math::sqrt(level / weight)) })
+        Some(sd_rad.max(math::sqrt(level / weight)))
     }
 
     /// Returns the head's tilt and its distance from zero in standard deviations, if it certainly exceeds
@@ -187,7 +157,7 @@ impl TiltFit {
         if weight * least_rad * least_rad < SHOWS * SHOWS {
             return None;
         }
-        let sure_sd = tilt_rad.abs() / self.tilt(level)?.sd_rad;
+        let sure_sd = tilt_rad.abs() / self.sd_rad(level)?;
         ((least_rad..MOST_RAD).contains(&tilt_rad.abs()) && sure_sd >= SURE).then_some((tilt_rad, sure_sd))
     }
 

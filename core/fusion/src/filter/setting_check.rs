@@ -15,7 +15,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, POSE, SURE};
-use super::head_tilt::{Tilt, TiltFit};
+use super::head_tilt::TiltFit;
 use super::measure::{self, Beam, ScalarUpdate, with_quantum};
 use super::pose_window::PoseWindow;
 use super::settings::Settings;
@@ -202,8 +202,10 @@ pub struct SettingChecks {
     /// For each checked source, the number of readings and the observed share of the declared variance, at most 1.
     heard: [u32; FOLLOWED],
     levels: [f64; FOLLOWED],
-    /// Pitch and yaw of each head on its mount, as the ranges show them; `None` for sources that are no heads.
-    mounts: [Option<[Tilt; 2]>; FOLLOWED],
+    /// Smallest standard deviation so far of each head's pitch and yaw on its mount, radians; infinite at first.
+    ///
+    /// Mounts do not change during a dive. `None` for sources that are no heads.
+    mounts: [Option<[f64; 2]>; FOLLOWED],
     doubt: Option<SettingDoubt>,
 }
 
@@ -245,27 +247,21 @@ impl SettingChecks {
     /// They show it while the vehicle swings from side to side. A single head needs no check: a tilt moves all of its
     /// samples alike.
     pub fn has_unverified_mounts(&self) -> bool {
-        self.compared_heads().flatten().any(|tilt| tilt.sd_rad > VERIFIED_RAD)
+        self.compared_heads().flatten().any(|sd_rad| *sd_rad > VERIFIED_RAD)
     }
 
     /// Returns the covariance between samples of two heads that is due to their mounts.
     ///
-    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. Ranges reduce or
-    /// increase it.
+    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. A swing does not reduce
+    /// it, because each head is compared with others whose mounts are just as uncertain.
     pub fn mount_error(&self, declared_rad: f64) -> Relative {
-        let mut worst = [0.0, 0.0];
-        for head in self.compared_heads() {
-            for (worst, tilt) in worst.iter_mut().zip(head) {
-                *worst = tilt.mean_square(declared_rad).max(*worst);
-            }
-        }
-        // The errors of two heads are independent.
-        let [pitch, yaw] = worst.map(|square| 2.0 * square);
-        Relative::new([[0.0; 3], [0.0, pitch, 0.0], [0.0, 0.0, yaw]])
+        let is_compared = self.compared_heads().next().is_some();
+        let variance = if is_compared { 2.0 * declared_rad * declared_rad } else { 0.0 };
+        Relative::new([[0.0; 3], [0.0, variance, 0.0], [0.0, 0.0, variance]])
     }
 
-    /// Pitch and yaw of the heads, if there are several.
-    fn compared_heads(&self) -> impl Iterator<Item = &[Tilt; 2]> {
+    /// Standard deviations of pitch and yaw of the heads, if there are several.
+    fn compared_heads(&self) -> impl Iterator<Item = &[f64; 2]> {
         let heads = self.mounts.iter().flatten();
         let several = heads.clone().count() > 1;
         heads.filter(move |_| several)
@@ -339,7 +335,7 @@ impl SettingChecks {
     ) {
         let Seen { by_pose, own_turn, expected_m, residual_m, weight } = *seen;
         if let Some(mount) = self.mounts.get_mut(slot) {
-            mount.get_or_insert_default();
+            mount.get_or_insert([f64::INFINITY; 2]);
         }
         let axis = state.attitude * (*mount * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
         if let Some(line) = self.spell.turned.get_mut(slot) {
@@ -420,11 +416,8 @@ impl SettingChecks {
     /// Computes how well the ranges show the heads' pitch and yaw.
     fn note_mounts(&mut self) {
         for ((head, fits), level) in self.mounts.iter_mut().zip(&self.tilted).zip(self.levels) {
-            for (known, fit) in head.iter_mut().flatten().zip(fits) {
-                // A mount does not change during a dive, so the most certain estimate counts.
-                if let Some(tilt) = fit.tilt(level).filter(|tilt| tilt.sd_rad < known.sd_rad) {
-                    *known = tilt;
-                }
+            for (least_rad, fit) in head.iter_mut().flatten().zip(fits) {
+                *least_rad = least_rad.min(fit.sd_rad(level).unwrap_or(f64::INFINITY));
             }
         }
     }

@@ -101,7 +101,7 @@ pub struct Settings {
     pub return_step_rad: f64,
     /// Noise of a velocity log's velocity over ground, m/s.
     pub velocity_sd_mps: f64,
-    /// Declared error of a head's pitch and yaw on its mount, radians. It counts until the ranges show less.
+    /// Declared error of a head's pitch and yaw on its mount, radians.
     pub mount_sd_rad: f64,
     /// Gate: a measurement is rejected if its squared innovation exceeds the innovation's variance times this
     /// factor.
