@@ -34,6 +34,10 @@ use headrace_sensor::reading::Reading;
 
 /// Length of a pose window: about the time for which a filter with wrong ranges keeps its position.
 const SPELL: DurNs = DurNs(5_000_000_000);
+/// Distance after which pose windows show fresh wall, and number of windows that show fresh wall at one place: those of
+/// the first swing.
+const FRESH_M: f64 = 0.5;
+const FRESH_AT_ONE_PLACE: u32 = 4;
 /// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that is too short by
 /// then is dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
@@ -206,10 +210,14 @@ pub struct SettingChecks {
     ///
     /// Mounts do not change during a dive. `None` for sources that are no heads.
     mounts: [Option<[f64; 2]>; FOLLOWED],
+    /// Chainage of the vehicle, m.
+    here_m: f64,
+    /// Chainage at which pose windows last began to show fresh wall, m, and number of windows since.
+    fresh_from: (f64, u32),
     doubt: Option<SettingDoubt>,
 }
 
-stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, mounts, doubt; lists: alternatives; });
+stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, mounts, here_m, fresh_from, doubt; lists: alternatives; });
 
 impl Default for SettingChecks {
     /// Creates the checks with allocated buffers, but no readings.
@@ -225,6 +233,8 @@ impl Default for SettingChecks {
             heard: [0; FOLLOWED],
             levels: [1.0; FOLLOWED],
             mounts: [None; FOLLOWED],
+            here_m: 0.0,
+            fresh_from: (f64::INFINITY, 0),
             doubt: None,
         }
     }
@@ -281,6 +291,7 @@ impl SettingChecks {
         let Some(look) = look(info, design, &waiting.reading) else { return };
         let Some(slot) = self.slot(waiting.source) else { return };
         let x_m = state.position.x();
+        self.here_m = x_m;
         let spell_begun = *self.spell.begun.get_or_insert(waiting.at);
         if !(0..SPELL.0).contains(&waiting.at.since(spell_begun).0) {
             self.end_spell();
@@ -406,8 +417,14 @@ impl SettingChecks {
         for (sums, line) in self.block.turned.iter_mut().zip(&spell.turned) {
             add(sums, line);
         }
+        let (from_m, windows) = self.fresh_from;
+        self.fresh_from = match (self.here_m - from_m).abs() {
+            moved_m if moved_m < FRESH_M => (from_m, windows.saturating_add(1)),
+            _ => (self.here_m, 0),
+        };
+        let is_fresh = self.fresh_from.1 < FRESH_AT_ONE_PLACE;
         for (fit, line) in self.tilted.iter_mut().flatten().zip(spell.tilted.iter().flatten()) {
-            fit.add(line.freed(spell.residuals, &factor));
+            fit.add(line.freed(spell.residuals, &factor), is_fresh);
         }
         self.note_mounts();
         self.doubt = self.likeliest();

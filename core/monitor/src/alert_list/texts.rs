@@ -127,7 +127,7 @@ impl ListedAlert {
                 "go slower, or pass it again with a more certain position".to_owned()
             }
             (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
-            (ListKind::MountsUnverified, _) => "swing 5 degrees left and right until this ends".to_owned(),
+            (ListKind::MountsUnverified, _) => "drive slowly and swing 5 degrees left and right".to_owned(),
             (ListKind::NotRecorded, _) => "free disk space, or change the medium".to_owned(),
             (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
             _ => String::new(),

@@ -76,10 +76,16 @@ pub(super) fn cruise(t: f64) -> Pose {
     }
 }
 
-/// Pose of a vehicle at rest that swings 5 degrees left and right.
+/// Pose of a vehicle that swings 5 degrees left and right while it drives slowly.
 pub(super) fn swing(t: f64) -> Pose {
     let yaw_rad = 0.087 * math::sin(math::TAU * t / 20.0);
-    Pose { attitude: Rot::from_roll_pitch_yaw(0.0, 0.0, yaw_rad), ..rest(t) }
+    let position = Point3::new(3.0 + 0.05 * t, 0.4, 4.0);
+    Pose { position, attitude: Rot::from_roll_pitch_yaw(0.0, 0.0, yaw_rad) }
+}
+
+/// Pose of a vehicle that swings in place.
+pub(super) fn swing_in_place(t: f64) -> Pose {
+    Pose { position: rest(t).position, ..swing(t) }
 }
 
 /// Pose of a vehicle at rest that is level and faces along the tunnel.

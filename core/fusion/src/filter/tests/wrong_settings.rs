@@ -2,7 +2,7 @@
 
 use super::super::FilterNavigation;
 use super::super::setting_check::{Setting, SettingDoubt};
-use super::rig::{HEADS, Rig, at, cruise, rest, swing};
+use super::rig::{HEADS, Rig, at, cruise, rest, swing, swing_in_place};
 use crate::Navigation as _;
 use crate::relative::Relative;
 use headrace_geometry::math;
@@ -72,7 +72,7 @@ fn dived(rig: &Rig, to_s: f64, mount_sd_deg: f64, is_heard: &dyn Fn(usize) -> bo
 const ALL: &dyn Fn(usize) -> bool = &|_| true;
 
 #[test]
-fn swing_at_rest_verifies_mounts_and_reveals_a_yawed_head() {
+fn slow_swing_verifies_mounts_and_reveals_a_yawed_head() {
     for (yaw_rad, seed) in [(0.0, 1), (0.0, 2), (0.052, 3), (-0.065, 4)] {
         let rig = Rig { head_yaw_rad: yaw_rad, ..Rig::new(swing, seed) };
         assert!(dived(&rig, 20.0, 0.0, ALL).has_unverified_mounts(), "a swing of 20 s is too short");
@@ -112,7 +112,7 @@ fn declared_mount_error_widens_the_error_between_passes_of_several_heads() {
         math::sqrt(square(declared_deg) - square(0.0)).to_degrees()
     };
     for declared_deg in [0.1, 0.3, 3.0] {
-        for way in [rest, swing] {
+        for way in [rest, swing, swing_in_place] {
             let added_deg = adds_deg(&Rig::new(way, 6), declared_deg, ALL);
             assert!((added_deg / (2.0 * declared_deg) - 1.0).abs() < 1e-6, "{added_deg}");
         }
