@@ -155,7 +155,7 @@ pub enum Driven {
     Planned,
     /// At the planned speed, after a stationary phase at the start.
     Stood,
-    /// At the planned speed, after swinging left and right in place at the start.
+    /// At the planned speed, after driving slowly to the start while swinging left and right.
     Swung,
     /// At this multiple of the largest speed by the paper's Eq. 16, with the heads in phase for the planned speed.
     Times(f64),
@@ -238,9 +238,9 @@ const OFF_DESIGN_M: f64 = 0.06;
 /// Duration of the stationary phase at the start of a dive, s.
 const STANDS_S: f64 = 30.0;
 
-/// Speed of a vehicle that swings in place, m/s: the smallest of a waypoint.
-const CREEP_MPS: f64 = 0.001;
-/// Swings at the start of a dive: number, time of each in seconds, and angle in degrees.
+/// Speed of a vehicle that swings, m/s.
+const SWINGING_MPS: f64 = 0.05;
+/// Swings before a dive: number, time of each in seconds, and angle in degrees.
 const SWINGS: (u32, f64, f64) = (12, 10.0, 5.0);
 
 /// Speed of the vehicle from the launch to the start of the inspection, m/s.
@@ -367,17 +367,18 @@ impl Cell {
             let place = |chainage_m: f64, more: &str| {
                 format!("[[trajectory.waypoints]]\nchainage_m = {chainage_m:.4}\n{more}\n")
             };
-            let mut way = place(start_m, &format!("stay_s = {STANDS_S}"));
             let (swings, swing_s, yaw_deg) = SWINGS;
-            let mut from_m = start_m;
-            for swing in 0..if self.driven == Driven::Swung { swings } else { 0 } {
+            let each_m = SWINGING_MPS * swing_s;
+            let swings = if self.driven == Driven::Swung { swings } else { 0 };
+            let mut from_m = (start_m - (f64::from(swings) + 0.5) * each_m).max(start_m.min(1.0));
+            let mut way = place(from_m, &format!("stay_s = {STANDS_S}"));
+            for swing in 0..swings {
                 let yaw_deg = if swing % 2 == 0 { yaw_deg } else { -yaw_deg };
-                from_m += CREEP_MPS * swing_s;
-                way += &place(from_m, &format!("yaw_deg = {yaw_deg}\nspeed_mps = {CREEP_MPS}"));
+                from_m += each_m;
+                way += &place(from_m, &format!("yaw_deg = {yaw_deg}\nspeed_mps = {SWINGING_MPS}"));
             }
-            if from_m > start_m {
-                from_m += CREEP_MPS * swing_s / 2.0;
-                way += &place(from_m, &format!("speed_mps = {CREEP_MPS}"));
+            if swings > 0 {
+                way += &place(from_m + each_m / 2.0, &format!("speed_mps = {SWINGING_MPS}"));
             }
             way += &place(to_m, &format!("speed_mps = {speed_mps}"));
             format!("kind = \"waypoints\"\n{way}")

@@ -40,8 +40,6 @@ pub(super) struct TiltSums {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltFit {
     windows: u32,
-    /// Number of these windows that showed wall for the first time.
-    fresh: u32,
     sums: [f64; SUMS],
     squares: [[f64; SUMS]; SUMS],
 }
@@ -103,15 +101,14 @@ impl TiltFit {
     /// Adds the tilt sums of a pose window to the fit.
     ///
     /// Unlike other settings, a tilt needs no blocks of distance: its effect changes sign as the vehicle swings, and
-    /// that of the wall's shape does not. `is_fresh` tells whether the window shows wall that earlier ones did not: bumps
-    /// that are seen again in every swing do not average out.
-    pub(super) fn add(&mut self, window: [f64; SUMS], is_fresh: bool) {
+    /// that of the wall's shape does not. The vehicle must move on between windows, because bumps that are seen again in
+    /// every swing do not average out.
+    pub(super) fn add(&mut self, window: [f64; SUMS]) {
         let [pattern_2, _, tilt_2, ..] = window;
         if pattern_2 <= 0.0 || tilt_2 < LEAST_LEAN_RAD * LEAST_LEAN_RAD * pattern_2 {
             return;
         }
         self.windows += 1;
-        self.fresh += u32::from(is_fresh);
         for (sum, part) in self.sums.iter_mut().zip(window) {
             *sum += part;
         }
@@ -127,7 +124,7 @@ impl TiltFit {
     /// `None` if the vehicle has not turned enough.
     fn estimate(&self) -> Option<(f64, f64)> {
         let [pattern_2, both, tilt_2, pattern_off, tilt_off] = self.sums;
-        if self.windows < FEWEST_BLOCKS || self.fresh == 0 || pattern_2 <= 0.0 {
+        if self.windows < FEWEST_BLOCKS || pattern_2 <= 0.0 {
             return None;
         }
         let share = both / pattern_2;
@@ -137,7 +134,7 @@ impl TiltFit {
 
     /// Returns the standard deviation of the head's tilt, radians; `None` if the vehicle has not turned enough.
     ///
-    /// It comes from the scatter of pose windows, of which only fresh ones are independent, and is at least the one caused by range noise, whose variance is
+    /// It comes from the scatter of pose windows, and is at least the one caused by range noise, whose variance is
     /// `level` times the declared variance.
     pub(super) fn sd_rad(&self, level: f64) -> Option<f64> {
         let (rad, weight) = self.estimate()?;
@@ -148,8 +145,7 @@ impl TiltFit {
         let left = [share * steady, share * rad - steady, -rad, -share, 1.0];
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.windows);
-        let correlated = n / f64::from(self.fresh);
-        let sd_rad = math::sqrt((scatter * correlated * n / (n - 2.0)).max(0.0)) / weight;
+        let sd_rad = math::sqrt((scatter * n / (n - 2.0)).max(0.0)) / weight;
         Some(sd_rad.max(math::sqrt(level / weight)))
     }
 
@@ -206,7 +202,7 @@ mod tests {
             for [pattern, by_tilt, residual_m] in block {
                 line.add([0.0; POSE], *by_tilt, *pattern, *residual_m, 1.0 / (NOISE_M * NOISE_M));
             }
-            fit.add(line.freed([0.0; POSE], &unit), true);
+            fit.add(line.freed([0.0; POSE], &unit));
         }
         fit
     }

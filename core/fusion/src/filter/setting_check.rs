@@ -34,10 +34,8 @@ use headrace_sensor::reading::Reading;
 
 /// Length of a pose window: about the time for which a filter with wrong ranges keeps its position.
 const SPELL: DurNs = DurNs(5_000_000_000);
-/// Distance after which pose windows show fresh wall, and number of windows that show fresh wall at one place: those of
-/// the first swing.
-const FRESH_M: f64 = 0.5;
-const FRESH_AT_ONE_PLACE: u32 = 4;
+/// Minimum distance between two pose windows that count for the tilt of a head, m. Bumps of the wall are about as long.
+const MOVES_ON_M: f64 = 0.2;
 /// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that is too short by
 /// then is dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
@@ -212,12 +210,12 @@ pub struct SettingChecks {
     mounts: [Option<[f64; 2]>; FOLLOWED],
     /// Chainage of the vehicle, m.
     here_m: f64,
-    /// Chainage at which pose windows last began to show fresh wall, m, and number of windows since.
-    fresh_from: (f64, u32),
+    /// Chainage of the last pose window that counted for the tilt of a head, m; `None` before the first.
+    tilted_at_m: Option<f64>,
     doubt: Option<SettingDoubt>,
 }
 
-stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, mounts, here_m, fresh_from, doubt; lists: alternatives; });
+stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, mounts, here_m, tilted_at_m, doubt; lists: alternatives; });
 
 impl Default for SettingChecks {
     /// Creates the checks with allocated buffers, but no readings.
@@ -234,7 +232,7 @@ impl Default for SettingChecks {
             levels: [1.0; FOLLOWED],
             mounts: [None; FOLLOWED],
             here_m: 0.0,
-            fresh_from: (f64::INFINITY, 0),
+            tilted_at_m: None,
             doubt: None,
         }
     }
@@ -417,14 +415,11 @@ impl SettingChecks {
         for (sums, line) in self.block.turned.iter_mut().zip(&spell.turned) {
             add(sums, line);
         }
-        let (from_m, windows) = self.fresh_from;
-        self.fresh_from = match (self.here_m - from_m).abs() {
-            moved_m if moved_m < FRESH_M => (from_m, windows.saturating_add(1)),
-            _ => (self.here_m, 0),
-        };
-        let is_fresh = self.fresh_from.1 < FRESH_AT_ONE_PLACE;
-        for (fit, line) in self.tilted.iter_mut().flatten().zip(spell.tilted.iter().flatten()) {
-            fit.add(line.freed(spell.residuals, &factor), is_fresh);
+        if self.tilted_at_m.is_none_or(|last_m| (self.here_m - last_m).abs() >= MOVES_ON_M) {
+            self.tilted_at_m = Some(self.here_m);
+            for (fit, line) in self.tilted.iter_mut().flatten().zip(spell.tilted.iter().flatten()) {
+                fit.add(line.freed(spell.residuals, &factor));
+            }
         }
         self.note_mounts();
         self.doubt = self.likeliest();
