@@ -1,14 +1,16 @@
 //! Summary of a report as text.
 
 use headrace_config::plain::one_line;
-use headrace_coverage::{Unsure, Verdict};
+use headrace_coverage::{Action, Unsure, Verdict};
 use headrace_monitor::live_messages::UnsureStretch;
 use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, of_it_text, unsure_text};
 use headrace_monitor::other_targets::OtherTargetReport;
 use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
-use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport, SourceReport};
+use headrace_monitor::report::{
+    DiveReport, NotInspectedReport, PositionGapReport, Report, RunReport, SourceReport,
+};
 
 use crate::terminal;
 
@@ -194,6 +196,7 @@ fn stretches(report: &Report) -> Vec<String> {
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);
     let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
     all.extend(report.no_verdict.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
+    all.extend(report.position_gaps.iter().filter_map(|gap| without_position(gap, report)));
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().map(|(_, text)| text).collect()
 }
@@ -225,6 +228,22 @@ fn unsure(stretch: &UnsureStretch) -> String {
     }
     let of_it = of_it_text(stretch.metres_m, stretch.to_m - stretch.from_m);
     format!("  {from} to {to}{of_it}  {what}: {}{helps}", unsure_text(stretch))
+}
+
+/// Line about a position gap that no fix has ended, with its first chainage. The sections of other gaps have verdicts.
+fn without_position(gap: &PositionGapReport, report: &Report) -> Option<(f64, String)> {
+    let (from_m, to_m, back_to_m) = (gap.from_m?, gap.to_m?, gap.back_to_m?);
+    if gap.is_over {
+        return None;
+    }
+    let action = actions_text(&[Action::Position], back_to_m, 0.0, &report.heads);
+    let text = format!(
+        "  {} to about {}  NO POSITION: scanned for {:.0} s  -> {action}",
+        station(from_m),
+        station(to_m),
+        gap.to_s - gap.from_s
+    );
+    Some((from_m, text))
 }
 
 /// A line broken to `columns` columns, if given. Continuation lines are indented.

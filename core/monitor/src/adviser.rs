@@ -198,7 +198,7 @@ impl Advisor {
 }
 
 /// Rotation of the vehicle between two passes of heads over the same wall.
-fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
+fn swing<'a>(looks: &'a mut Looks, at: MonoNs, situation: &Situation) -> Swing<'a> {
     if let Some(pose) = situation.pose {
         looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));
     }
@@ -311,7 +311,7 @@ mod tests {
                 let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.01 * seconds);
                 let pose = Some(Pose { attitude, ..pose(5.0) });
                 let turned = Situation { pose, speed_mps, ..two_heads(apart_m) };
-                last = swing(&mut looks, at(seconds), &turned);
+                last = Swing { history: None, ..swing(&mut looks, at(seconds), &turned) };
             }
             last
         };

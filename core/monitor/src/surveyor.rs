@@ -15,6 +15,7 @@ mod judge;
 mod missing_samples;
 mod navigation_doubts;
 mod passages;
+mod position_gaps;
 mod samples;
 mod standing;
 mod survey;
@@ -38,6 +39,7 @@ use driving::Driving;
 use headrace_coverage::{Outlook, Request};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
 use headrace_geometry::time::MonoNs;
+pub use position_gaps::{PositionGap, PositionGaps};
 pub use survey::Found;
 use survey::{Cursor, Requests};
 
@@ -76,6 +78,7 @@ impl Surveyor {
         part.add_component_state::<HeadFrontier>("reach of heads");
         part.insert_state("relief", NearWall::default());
         part.insert_state("driving", Driving::default());
+        part.insert_state("position gaps", PositionGaps::with_room());
         part.insert_state("coverage", coverage);
         part.insert_state("search for holes", finder);
         part.insert_state("observations", Observations::default());
@@ -124,6 +127,11 @@ impl Surveyor {
 
     /// Counts of pings over the whole dive.
     pub fn tally(&self) -> &Tally {
+        self.part.world.resource()
+    }
+
+    /// Stretches of the dive without a position.
+    pub fn position_gaps(&self) -> &PositionGaps {
         self.part.world.resource()
     }
 

@@ -14,8 +14,10 @@ use super::margin::{self, APART_SHARE, Margins, RemainingTarget};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
+use super::spacing;
 use super::strips::{Going, PARTS, Strips, View};
 use super::swing::Swing;
+use super::swung_passes::{self, Place};
 use super::target::Target;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
@@ -46,6 +48,18 @@ struct Fastest {
     advised_mps: f64,
     /// T_y (largest distance between samples of a turn) at the place that limits the speed, m.
     t_y_m: f64,
+}
+
+/// The advised speed, and its place among the speeds that meet the target.
+struct Chosen {
+    /// Advised speed, m/s; `None` if no speed meets the target.
+    advised_mps: Option<f64>,
+    /// Lower end of the interval of speeds that ends at the advised one, m/s.
+    from_mps: f64,
+    /// Speed nearest to the present one that meets the target, m/s.
+    nearest_mps: Option<f64>,
+    /// Whether only the passes of several swings together meet the target at the advised speed.
+    by_several_swings: bool,
 }
 
 /// The inspection task that the advice is for.
@@ -90,9 +104,11 @@ pub struct Advisor {
     last_mps: Option<f64>,
     /// Distance that the vehicle may move before the heads' rings are recast, m.
     still_m: f64,
+    /// Speed at which passes of several swings meet the target together, m/s; zero if there is none.
+    swung_mps: f64,
 }
 
-stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, anew, margins, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m; });
+stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, anew, margins, astern, last_mps, still_m, swung_mps; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m; });
 
 impl Advisor {
     /// Creates an advisor for heads with their modes, and for parts of the hull that may occlude the heads.
@@ -142,6 +158,7 @@ impl Advisor {
             astern: false,
             last_mps: None,
             still_m: 0.0,
+            swung_mps: 0.0,
         };
         advisor.look_from_the_middle();
         advisor
@@ -189,7 +206,7 @@ impl Advisor {
     /// end of the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
     /// Source: docs/decisions/0005-advice-and-plan.md.
     /// Allocates: never.
-    pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
+    pub fn advise(&mut self, situation: &Situation, swing: Swing<'_>, left_s: Option<f64>) -> Advice {
         let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
         if situation.heads.iter().all(Option::is_none) {
             return Advice::nothing(Reason::NoReturns);
@@ -208,7 +225,13 @@ impl Advisor {
     }
 
     /// Returns the advice for a vehicle at `pose`, from which the heads' rings have been cast.
-    fn advise_at(&mut self, pose: &Pose, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
+    fn advise_at(
+        &mut self,
+        pose: &Pose,
+        situation: &Situation,
+        swing: Swing<'_>,
+        left_s: Option<f64>,
+    ) -> Advice {
         let sector = |head: usize| self.heads.get(head)?.sector.as_ref();
         let phasing = Phasing::of(situation).in_sectors_of(situation, sector);
         let passes = phasing.at(situation.speed_mps).beside(self.parallax_rad);
@@ -219,29 +242,28 @@ impl Advisor {
         self.now.count_losses(0, sure_m, &rates_of(situation));
         let fastest = self.fastest(&phasing, &lossy, &going, sure, self.last_mps);
         let possible = fastest.as_ref().ok().filter(|fastest| fastest.speed_mps > 0.0);
-        let advised_mps = possible.map(|fastest| fastest.advised_mps);
-        let [from_mps, nearest_mps] = possible.map_or([None; 2], |fastest| {
-            let driving = self.driving(&phasing, &lossy, &going, sure);
-            let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
-            let nearest = now_mps.and_then(|now_mps| driving.nearest_mps(now_mps));
-            [Some(driving.lower_end_mps(fastest.advised_mps)), nearest]
-        });
+        let depends_on_swing = matches!(&fastest, Ok(_) | Err(SamplingError::OffAxis { .. }));
+        if self.until_alternatives == 0 || !depends_on_swing {
+            let swung_mps = depends_on_swing.then(|| self.swung_mps(&phasing, &going, swing, sure, pose));
+            self.swung_mps = swung_mps.unwrap_or(0.0);
+        }
+        let driving = self.driving(&phasing, &lossy, &going, sure);
+        let chosen = self.choose(possible, &driving, situation.speed_mps.abs());
         self.last_mps = possible.map(|fastest| fastest.speed_mps);
         self.still_m = self.still_m_for(&fastest, &going);
-        let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
-        let x_m = pose.position.x();
-        let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
+        let mut predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
+        if chosen.by_several_swings && situation.speed_mps.abs() <= self.swung_mps {
+            // Passes of later swings fill the gaps of this turn.
+            predicted_t_m = predicted_t_m.min(sure_m);
+        }
         self.think_over(&phasing, &lossy, &going, situation, sure);
-        let unseen_m = match fastest {
-            Err(SamplingError::UnseenStrip { width_m, arc_m, .. }) => Some([width_m, arc_m]),
-            _ => None,
-        };
-        let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
-        let helps = advised_mps.is_some();
+        let unseen_m = unseen_m(&fastest);
+        let helps = chosen.advised_mps.is_some();
+        let needs_remedy = !helps || chosen.by_several_swings;
         Advice {
-            v_max_mps: advised_mps.unwrap_or(0.0),
-            from_mps: from_mps.unwrap_or(0.0),
-            nearest_mps,
+            v_max_mps: chosen.advised_mps.unwrap_or(0.0),
+            from_mps: chosen.from_mps,
+            nearest_mps: chosen.nearest_mps,
             reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
             predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
             will_exceed: predicted_t_m > self.task.target.max_hole_m,
@@ -251,12 +273,10 @@ impl Advisor {
             even_pass_gap_s: passes.even_gap_s(),
             t_y_m: self.now.largest_step_m(0),
             ping_period_s: going.ping_period_s,
-            phase_error_rad: errors
-                .max_by(|a, b| a.abs().total_cmp(&b.abs()))
-                .filter(|_| passes.heads().len() > 1),
-            left: Left { length_m: left_m.clamp(0.0, self.task.length_m), time_s: left_s },
+            phase_error_rad: largest_phase_error_rad(&passes, self.heads.len()),
+            left: Left { length_m: self.left_m(pose.position.x()), time_s: left_s },
             unseen_m,
-            remedy: if helps { None } else { self.remedy(situation, &passes, &going, unseen_m.is_some()) },
+            remedy: if needs_remedy { self.remedy(situation, &passes, &going, unseen_m) } else { None },
             alternatives: self.alternatives,
             anew: self.anew,
             margins: self.margins,
@@ -264,8 +284,68 @@ impl Advisor {
         }
     }
 
+    /// Returns the remaining length of tunnel in the direction of travel, m.
+    fn left_m(&self, x_m: f64) -> f64 {
+        let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
+        left_m.clamp(0.0, self.task.length_m)
+    }
+
+    /// Chooses between the largest speed at which successive passes meet the target, and that of several swings.
+    fn choose(&self, fastest: Option<&Fastest>, driving: &Driving<'_>, now_mps: f64) -> Chosen {
+        let Some(fastest) = fastest.filter(|fastest| fastest.advised_mps >= self.swung_mps) else {
+            let advised_mps = Some(self.swung_mps).filter(|mps| *mps > 0.0);
+            let by_several_swings = advised_mps.is_some();
+            return Chosen { advised_mps, from_mps: 0.0, nearest_mps: None, by_several_swings };
+        };
+        let is_under_way = now_mps > UNDER_WAY_MPS;
+        Chosen {
+            advised_mps: Some(fastest.advised_mps),
+            from_mps: driving.lower_end_mps(fastest.advised_mps),
+            nearest_mps: if is_under_way { driving.nearest_mps(now_mps) } else { None },
+            by_several_swings: false,
+        }
+    }
+
+    /// Returns the advised speed at which passes of several swings meet the target together, m/s.
+    ///
+    /// Zero if there is none, or if the swing is too small for this speed to be higher than that of successive passes.
+    fn swung_mps(
+        &self,
+        phasing: &Phasing,
+        going: &Going,
+        swing: Swing<'_>,
+        sure: RemainingTarget,
+        pose: &Pose,
+    ) -> f64 {
+        const PLACES: u32 = 8;
+        /// Smallest displacement by swing at which the passes of several swings are simulated, as a share of the target.
+        const LEAST_SHARE: f64 = 0.5;
+        /// Shortest history that shows how the vehicle swings, seconds.
+        const LEAST_S: f64 = 30.0;
+        let Some(looks) = swing.history.filter(|looks| looks.span_s() >= LEAST_S) else { return 0.0 };
+        if going.swing_most_m.is_none_or(|most_m| most_m < LEAST_SHARE * sure.most_m()) {
+            return 0.0;
+        }
+        let perimeter_m = self.profile.perimeter_m();
+        let mut places = [Place::default(); PLACES as usize];
+        for (slot, number) in places.iter_mut().zip(0..PLACES) {
+            let arc_m = perimeter_m * f64::from(number) / f64::from(PLACES);
+            let [y_m, z_m] = self.profile.point_at(arc_m);
+            let seen_by = self.now.at(arc_m).map(|strip| strip.seen_by).unwrap_or_default();
+            *slot = Place { from_vehicle_m: [y_m - pose.position.y(), z_m - pose.position.z()], seen_by };
+        }
+        let (t_y_m, needed) = (self.now.largest_step_m(0), self.now.most_needed(0));
+        let meets = |gap_m: f64, speed_mps: f64| {
+            let advance_m = (speed_mps + going.swing_mps) * going.ping_period_s;
+            spacing::t_max_m(gap_m * needed, advance_m, t_y_m) <= sure.at_m(speed_mps)
+        };
+        let bound_mps = sure.most_m() / (sure.even_gap_s + going.ping_period_s);
+        let speed_mps = swung_passes::highest_mps(bound_mps, (looks, phasing), &places, sure.most_m(), meets);
+        speed_mps * (1.0 - SPEED_MARGIN)
+    }
+
     /// Returns the motion of the vehicle and its beams for the prediction of spacing.
-    fn going(&self, pose: &Pose, situation: &Situation, phasing: &Phasing, swing: Swing) -> Going {
+    fn going(&self, pose: &Pose, situation: &Situation, phasing: &Phasing, swing: Swing<'_>) -> Going {
         let periods_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
         let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
         Going {
@@ -543,7 +623,13 @@ impl Advisor {
     ///
     /// The order is: a steady heading, then the tunnel's centre if samples of a turn are close enough there, then the
     /// fastest mode.
-    fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
+    fn remedy(
+        &self,
+        situation: &Situation,
+        passes: &Passes,
+        going: &Going,
+        unseen_m: Option<[f64; 2]>,
+    ) -> Option<Remedy> {
         let target_m = self.task.target.max_hole_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         if going.swing_mps.max(going.apart_swing_mps) > 0.0
@@ -555,7 +641,7 @@ impl Advisor {
         let same = |mode: &HeadMode| Some(self.stride(mode.turn.step_rad())) == stride;
         let modes = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let centred_m = modes.iter().position(same).and_then(|mode| self.centred_m.get(mode));
-        if !unseen
+        if unseen_m.is_none()
             && self.now.largest_step_m(0) >= target_m
             && centred_m.is_some_and(|centred_m| *centred_m < target_m)
         {
@@ -563,6 +649,20 @@ impl Advisor {
         }
         let best = self.alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
         best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
+    }
+}
+
+/// Phase error of the head farthest out of phase, radians; `None` for a single head and for heads in sectors.
+fn largest_phase_error_rad(passes: &Passes, heads: usize) -> Option<f64> {
+    let errors = passes.phase_errors_rad(heads).into_iter().flatten();
+    errors.max_by(|a, b| a.abs().total_cmp(&b.abs())).filter(|_| passes.heads().len() > 1)
+}
+
+/// Width of the strip that no head sees, and the arc length of its middle, m, if it is why no speed meets the target.
+fn unseen_m(fastest: &Result<Fastest, SamplingError>) -> Option<[f64; 2]> {
+    match fastest {
+        Err(SamplingError::UnseenStrip { width_m, arc_m, .. }) => Some([*width_m, *arc_m]),
+        _ => None,
     }
 }
 

@@ -41,6 +41,7 @@ pub mod section;
 pub mod spacing;
 pub mod strips;
 pub mod swing;
+mod swung_passes;
 pub mod target;
 
 pub use error::SamplingError;

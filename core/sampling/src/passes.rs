@@ -92,6 +92,19 @@ enum Pattern {
     Loose,
 }
 
+/// Passes of a head over the vertical: the first one from now on, and one per turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadPasses {
+    /// Number of the head.
+    pub head: usize,
+    /// Time of the first pass, seconds from now.
+    pub first_s: f64,
+    /// Turn period, seconds.
+    pub turn_s: f64,
+    /// Distance of the head's scan plane ahead of the vehicle's origin, m.
+    pub ahead_m: f64,
+}
+
 /// Measured phasing of the heads, from which their passes at any speed follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Phasing {
@@ -215,6 +228,21 @@ impl Phasing {
             *phase = scheduled_phase(head, scheduled) - ahead;
         }
         then
+    }
+
+    /// Returns the first pass of each head from now on.
+    ///
+    /// Empty if the heads don't all turn continuously, in one sense and at one rate.
+    pub fn first_passes(&self) -> impl Iterator<Item = HeadPasses> {
+        let phases = if let Pattern::Turning(phases) = &self.pattern { Some(phases) } else { None };
+        phases.into_iter().flat_map(|phases| {
+            let figures =
+                |head: usize| Some((*phases.get(head)?, *self.turns_s.get(head)?, *self.ahead_m.get(head)?));
+            self.heads.iter().filter_map(move |head| {
+                let (phase, turn_s, ahead_m) = figures(head)?;
+                (turn_s > 0.0).then_some(HeadPasses { head, first_s: phase * turn_s, turn_s, ahead_m })
+            })
+        })
     }
 
     /// Returns the passes of the heads at the speed `speed_mps`.

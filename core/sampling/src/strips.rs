@@ -247,6 +247,12 @@ impl Strips {
         of_setting.map(|steps| steps[0]).fold(0.0, f64::max)
     }
 
+    /// Returns the largest number of passes needed over any place because of lost returns, in a setting.
+    pub fn most_needed(&self, setting: usize) -> f64 {
+        let of_setting = self.needed.iter().skip(setting * self.strips.len()).take(self.strips.len());
+        of_setting.map(|needed| needed[0]).fold(1.0, f64::max)
+    }
+
     /// Returns T_max predicted at a speed, m: the largest of any strip.
     ///
     /// The result is infinite if there is a wide strip that no head sees. Passes are farther apart on a strip that

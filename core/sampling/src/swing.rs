@@ -4,6 +4,7 @@ use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Yz;
 
 /// Number of stored directions: at 5 Hz, `WINDOW` plus one turn of a head in its slowest mode.
 const BEATS: usize = 320;
@@ -15,10 +16,12 @@ const WINDOW: DurNs = DurNs(30_000_000_000);
 ///
 /// A rotation of twice this value or more counts fully.
 const DEAD_RAD: f64 = 0.0075;
+/// Smallest part of a direction along the tunnel for which displacements are computed: 60 degrees off.
+const LEAST_ALONG: f64 = 0.5;
 
 /// Size and speed of a vehicle's swing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Swing {
+pub struct Swing<'a> {
     /// Largest rotation between two passes, divided by the time between them, rad/s.
     pub rate_radps: f64,
     /// Largest rotation between any two moments of the stored history, radians.
@@ -28,10 +31,12 @@ pub struct Swing {
     ///
     /// The time is that until the rearmost head reaches the position of the foremost head.
     pub apart_rate_radps: f64,
+    /// The directions of the vehicle of which the swing consists, if known.
+    pub history: Option<&'a Looks>,
 }
 
 /// History of the directions of the vehicle's x axis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Looks {
     looks: Vec<(MonoNs, Vec3<Tunnel>)>,
     count: usize,
@@ -73,7 +78,7 @@ impl Looks {
     /// heads pass a place within `apart_s`. Rotation within the navigation errors is excluded, with a continuous
     /// transition.
     /// Allocates: never.
-    pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing {
+    pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing<'_> {
         let rate = |over_s: f64| {
             let known = over_s > 0.0 && over_s.is_finite();
             let turned_rad = if known { self.turned_over(now, over_s) } else { 0.0 };
@@ -86,7 +91,7 @@ impl Looks {
             (values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)).max(0.0)
         };
         let most_rad = math::hypot(extent(Vec3::y), extent(Vec3::z)).max(largest_rad);
-        Swing { rate_radps, most_rad: counted(largest_rad) * most_rad, apart_rate_radps }
+        Swing { rate_radps, most_rad: counted(largest_rad) * most_rad, apart_rate_radps, history: Some(self) }
     }
 
     /// Returns the largest rotation between two moments this duration apart within the last half minute, radians.
@@ -107,6 +112,49 @@ impl Looks {
         turned_rad
     }
 
+    /// Displacement along the tunnel of the beams to a place on the wall, m, some seconds from now.
+    ///
+    /// `from_vehicle_m` is the place relative to the vehicle: to the left and up. The vehicle is assumed to swing as
+    /// before: backwards through the history, then forwards, and so on.
+    pub fn displacement_m(&self, seconds: f64, from_vehicle_m: Yz) -> f64 {
+        let (last, step_s) = (self.looks.len().saturating_sub(1), self.step_s());
+        if last == 0 || step_s <= 0.0 {
+            return 0.0;
+        }
+        let back = math::wrap(seconds / step_s, 2.0 * last as f64);
+        let back = back.min(2.0 * last as f64 - back);
+        let before = math::floor_to_i64(back);
+        let look = |k: i64| self.nth_newest(usize::try_from(k).unwrap_or(0).min(last));
+        let (newer, older) = (look(before), look(before + 1));
+        let share = back - before as f64;
+        displaced_m(newer, from_vehicle_m) * (1.0 - share) + displaced_m(older, from_vehicle_m) * share
+    }
+
+    /// Smallest and largest displacement of the beams to a place in the stored history, m.
+    pub fn displacements_m(&self, from_vehicle_m: Yz) -> [f64; 2] {
+        let all = || self.looks.iter().map(|(_, look)| displaced_m(Some(*look), from_vehicle_m));
+        if self.looks.is_empty() {
+            return [0.0; 2];
+        }
+        [all().fold(f64::MAX, f64::min), all().fold(f64::MIN, f64::max)]
+    }
+
+    /// Length of the stored history, seconds.
+    pub fn span_s(&self) -> f64 {
+        let (newest, oldest) = (self.newest_first().next(), self.newest_first().last());
+        newest.zip(oldest).map_or(0.0, |((to, _), (from, _))| to.since(*from).as_secs_f64())
+    }
+
+    /// Mean time between two stored directions, seconds.
+    fn step_s(&self) -> f64 {
+        self.span_s() / (self.looks.len().saturating_sub(1)).max(1) as f64
+    }
+
+    fn nth_newest(&self, k: usize) -> Option<Vec3<Tunnel>> {
+        let index = (self.count - 1).checked_sub(k)? % BEATS;
+        self.looks.get(index).map(|(_, look)| *look)
+    }
+
     fn recent(&self, now: MonoNs) -> impl Iterator<Item = &(MonoNs, Vec3<Tunnel>)> {
         self.newest_first().take_while(move |(at, _)| now.since(*at).0 <= WINDOW.0)
     }
@@ -114,6 +162,13 @@ impl Looks {
     fn newest_first(&self) -> impl Iterator<Item = &(MonoNs, Vec3<Tunnel>)> {
         (0..self.looks.len()).filter_map(|k| self.looks.get((self.count - 1 - k) % BEATS))
     }
+}
+
+/// Displacement along the tunnel of the beams to a place, m, if the vehicle's x axis has this direction.
+///
+/// The scan plane is normal to the x axis.
+fn displaced_m(look: Option<Vec3<Tunnel>>, [y_m, z_m]: Yz) -> f64 {
+    look.map_or(0.0, |look| -(y_m * look.y() + z_m * look.z()) / look.x().abs().max(LEAST_ALONG))
 }
 
 /// Returns the share of a rotation that is not attributed to navigation errors.
@@ -171,17 +226,17 @@ mod tests {
         let ended = |t: f64| [if t < 50.0 { 0.1 * math::sin(TAU * t / 10.0) } else { 0.0 }, 0.0];
         let (now, still) = (looks(75.0, ended), looks(90.0, ended));
         assert!(now.0.swing(now.1, 2.0, 0.0).rate_radps > 0.02);
-        assert_eq!(still.0.swing(still.1, 2.0, 0.0), Swing::default());
+        assert_eq!(Swing { history: None, ..still.0.swing(still.1, 2.0, 0.0) }, Swing::default());
     }
 
     #[test]
     fn steady_heading_and_navigation_drift_are_no_swing() {
-        assert_eq!(Looks::default().swing(MonoNs(0), 2.0, 0.0), Swing::default());
+        assert_eq!(Swing { history: None, ..Looks::default().swing(MonoNs(0), 2.0, 0.0) }, Swing::default());
         let (askew, now) = looks(40.0, |_| [0.3, -0.1]);
-        assert_eq!(askew.swing(now, 8.0, 0.0), Swing::default());
+        assert_eq!(Swing { history: None, ..askew.swing(now, 8.0, 0.0) }, Swing::default());
         let jitter = |t: f64| [2e-4 * math::sin(1e3 * t), 0.002 * math::sin(t / 9.0)];
         let (wandering, now) = looks(40.0, jitter);
-        assert_eq!(wandering.swing(now, 2.0, 0.0), Swing::default());
+        assert_eq!(Swing { history: None, ..wandering.swing(now, 2.0, 0.0) }, Swing::default());
     }
 
     #[test]
@@ -207,6 +262,6 @@ mod tests {
         // The largest rotation is from the oldest stored direction to the direction farthest from it.
         let turned_rad = looks.swing(now, 60.0, 0.0).rate_radps * 60.0;
         assert!((turned_rad - 0.09).abs() < 0.01, "{turned_rad}");
-        assert_eq!(looks.swing(now, f64::NAN, 0.0), Swing::default());
+        assert_eq!(Swing { history: None, ..looks.swing(now, f64::NAN, 0.0) }, Swing::default());
     }
 }

@@ -342,6 +342,39 @@ fn dive_mostly_without_a_position_exits_with_1() {
     assert!(report["coverage_extent"]["length_m"].as_f64().unwrap() > 0.0);
     let answer = folder.headrace(&["replay", "dive.mcap"]);
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
+    let gap = answer.stdout.lines().find(|line| line.contains("NO POSITION: scanned for"));
+    assert!(
+        gap.is_some_and(|gap| gap.contains("-> once the position is back, go back to ")),
+        "{}",
+        answer.stdout
+    );
+}
+
+/// Wall that the heads scanned while the tether was silent has no verdict. The report tells for how long and about where.
+/// The vehicle drives at 0.11 m/s; the position is lost some seconds after the counter falls silent at 60 s.
+#[test]
+fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainage() {
+    let noise = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
+                 imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
+    for (span, is_over) in [("from_s = 60", false), ("from_s = 60\nfor_s = 60", true)] {
+        let report = steady(20.0, &format!("{noise}{}", silence("\"tether\"", span)));
+        accounted_for(span, &report);
+        let [gap] = &report.position_gaps[..] else { panic!("{span}: {:?}", report.position_gaps) };
+        let begun_s = report.dive.start_s;
+        let true_m = |at_s: f64| START_M + SPEED_MPS * (at_s - begun_s);
+        let end_s = if is_over { 120.0 } else { 20.0 / SPEED_MPS };
+        assert!((gap.to_s - begun_s - end_s).abs() < 2.0 && gap.is_over == is_over, "{span}: {gap:?}");
+        assert!((60.0..100.0).contains(&(gap.from_s - begun_s)), "{span}: {gap:?}");
+        // 50 pings per second of each of the four heads.
+        let pings = 200.0 * (gap.to_s - gap.from_s);
+        assert!((gap.pings as f64 - pings).abs() < 0.05 * pings, "{span}: {gap:?}");
+        let (from_m, to_m) = (gap.from_m.unwrap(), gap.to_m.unwrap());
+        assert!((from_m - true_m(gap.from_s)).abs() < 1.0, "{span}: {gap:?}");
+        let error_m = (to_m - true_m(gap.to_s)).abs();
+        assert!(error_m < if is_over { 0.1 } else { 0.3 * (to_m - from_m) }, "{span}: {error_m} m, {gap:?}");
+    }
+    let steady_dive = steady(6.0, noise);
+    assert_eq!(steady_dive.position_gaps, [], "the position was never lost");
 }
 
 /// Samples from before the position estimate has converged don't affect later sections. If a vehicle waits until its

@@ -2,8 +2,13 @@
 //!
 //! `cargo bench -p headrace_tests --bench field` computes the whole table.
 
+use std::collections::BTreeMap;
+
 use headrace_coverage::Verdict;
-use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES};
+use headrace_monitor::messages::Notice;
+use headrace_tests::field_table::{
+    self, CONDITIONS, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES,
+};
 use headrace_tests::truth;
 
 fn print(name: &str, figures: &Figures) {
@@ -190,4 +195,41 @@ fn heads_off_their_mounts_let_no_section_far_over_the_target_pass() {
         let is_declared = condition == Condition::Mounts;
         assert!(!is_declared || (0.5..=1.3).contains(&ratio), "{driven:?}: errors are {ratio} of their sd");
     }
+}
+
+/// A section that passes during the dive passes in the report, too. With `HEADRACE_LIVE_CONDITIONS=all` in dives of all
+/// conditions.
+#[test]
+fn sections_that_pass_live_pass_in_the_report() {
+    let are_all = std::env::var("HEADRACE_LIVE_CONDITIONS").is_ok_and(|conditions| conditions == "all");
+    let few = [Condition::DataSheet, Condition::Murk, Condition::Fish];
+    let conditions = CONDITIONS.map(|(_, condition)| condition);
+    let names: &[&str] = if are_all { &["vita1", "vita2-2", "vita2-4", "bluerov2"] } else { &["vita2-4"] };
+    let mut passed = 0;
+    for condition in conditions.into_iter().filter(|condition| are_all || few.contains(condition)) {
+        for name in names {
+            let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == *name).unwrap();
+            for driven in [Driven::Planned, Driven::Times(1.2)] {
+                let cell = Cell { vehicle, condition, start_m: 16.0, let_in_m: None, driven };
+                let dive = cell.dive(1, 12.0);
+                let mut live = BTreeMap::new();
+                let judged = truth::dive_noting(&dive.scene, &dive.believed.vehicle, &mut |dive| {
+                    let view = dive.view();
+                    for notice in view.notices() {
+                        if let Notice::Section { section, .. } = notice {
+                            live.insert(section, view.section_row(section).unwrap().verdict);
+                        }
+                    }
+                });
+                for section in &judged.report.sections {
+                    if live.get(&section.index) == Some(&Verdict::Pass) {
+                        passed += 1;
+                        let name = format!("{name} {condition:?} {driven:?}");
+                        assert_eq!(section.verdict, Verdict::Pass, "{name}: {}", section.start_m);
+                    }
+                }
+            }
+        }
+    }
+    assert!(passed > 50, "{passed} sections passed");
 }

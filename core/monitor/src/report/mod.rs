@@ -15,6 +15,7 @@ use headrace_geometry::time::MonoNs;
 
 mod advice;
 mod inspected;
+mod position_gaps;
 mod runs;
 mod smoothing;
 mod sources;
@@ -24,6 +25,7 @@ mod unsure;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use inspected::{CoverageExtentReport, NotInspectedReport};
+pub use position_gaps::PositionGapReport;
 pub use runs::{ReturnReport, RunReport, go_back};
 pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};
@@ -65,6 +67,8 @@ pub struct Report {
     pub no_verdict: Vec<NoVerdictReport>,
     /// Stretches to pass again on the way home, from the far end to the portal.
     pub go_back: Vec<ReturnReport>,
+    /// Stretches of the dive without a position, in order of time.
+    pub position_gaps: Vec<PositionGapReport>,
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,
     /// Metres by verdict for the additional targets and section lengths requested.
@@ -242,6 +246,7 @@ impl Report {
             runs: runs::run_reports(dive),
             no_verdict: unsure::unsure_reports(coverage),
             go_back: runs::go_back(sections),
+            position_gaps: position_gaps::position_gaps(dive),
             survey: survey::survey(coverage, &dive.mission().profile),
             other_targets: Vec::new(),
             heads: dive.head_descriptions().clone(),

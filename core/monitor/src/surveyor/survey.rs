@@ -4,6 +4,7 @@ use bevy_ecs::prelude::{Res, ResMut, Resource};
 use bevy_ecs::system::SystemParam;
 
 use super::driving::Driving;
+use super::position_gaps::PositionGaps;
 use crate::alert_list::RunInput;
 use crate::merge::MAX_TICK_PACKETS;
 use crate::messages::{Notice, Standing};
@@ -69,6 +70,7 @@ pub(super) struct Survey<'w> {
     pub(super) driving: ResMut<'w, Driving>,
     pub(super) requests: ResMut<'w, Requests>,
     pub(super) tally: ResMut<'w, Tally>,
+    pub(super) gaps: ResMut<'w, PositionGaps>,
     pub(super) cursor: ResMut<'w, Cursor>,
     pub(super) plan: Res<'w, Plan>,
 }

@@ -56,7 +56,8 @@ fn note_update(
     survey: &mut Survey<'_>,
     outputs: &mut Outputs<'_>,
 ) {
-    let Survey { coverage, driving, requests, plan, .. } = survey;
+    let Survey { coverage, driving, requests, plan, tally, gaps, .. } = survey;
+    gaps.note(*at, situation, tally.without_fix);
     let (said, seen) = ((*at, situation, doubts), (&**coverage, &*heads));
     if let Some(between_m) = navigation_doubts::note(said, seen, &mut outputs.refs()) {
         due::suspect(coverage, between_m, (heads, *at), requests);

@@ -204,7 +204,7 @@ pub struct Advice {
     ///
     /// `Some` only if this strip is the reason why a lower speed does not help.
     pub unseen_m: Option<[f64; 2]>,
-    /// Remedy if a lower speed does not help.
+    /// Remedy if a lower speed does not help, or if only the passes of several swings meet the target.
     pub remedy: Option<Remedy>,
     /// Largest speeds in the modes that all heads have.
     pub alternatives: [Option<Alternative>; MAX_MODES],

@@ -327,7 +327,7 @@ fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
 fn cached_rings_of_rays_change_the_advice_by_at_most_2_percent() {
     let around = || Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let (still, swing) =
-        (Swing::default(), Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 });
+        (Swing::default(), Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01, history: None });
     for (name, case, swing, wanted, casts) in [
         ("four heads", around(), still, 0.005, 0..200),
         ("hiding each other", hiding_each_other(), still, 0.002, 0..100),
@@ -347,7 +347,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
     let case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     let advise = |swing: Swing| case.advisor().advise(&case.situation, swing, None);
     let still = advise(Swing::default());
-    let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01, history: None };
     let swung = advise(swing);
     // The advised speed is reduced by the speed of the swinging beams along the wall at that range.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
@@ -355,9 +355,9 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
     assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
     // A fast swing of small extent reduces the pass distance by no more than its extent.
-    let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01, apart_rate_radps: 0.05 });
+    let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01, apart_rate_radps: 0.05, history: None });
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
-    let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0, apart_rate_radps: 0.2 });
+    let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0, apart_rate_radps: 0.2, history: None });
     assert_eq!((wild.v_max_mps, wild.reason), (0.0, Reason::AngularStep));
     assert_eq!(wild.remedy, Some(Remedy::HoldHeading));
     assert!(wild.will_exceed && !still.will_exceed);
@@ -367,7 +367,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
 fn vehicle_swing_widens_pass_distances_of_heads_apart_along_the_hull() {
     let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
     let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
-    let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01, history: None };
     let t_m = |case: &Case| {
         let advice = case.advisor().advise(&case.situation, swing, None);
         assert!((advice.pass_gap_s - 4.0).abs() < 1e-9, "{advice:?}");

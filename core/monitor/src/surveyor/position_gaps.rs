@@ -1,0 +1,167 @@
+//! Position gaps: stretches of the dive in which the heads pinged, but the vehicle had no position.
+//!
+//! Their returns have no place on the wall, so the coverage extent excludes them. The list tells how long they lasted
+//! and where the vehicle probably was.
+
+use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
+
+use crate::advice_log::ADVICE_PERIOD;
+use headrace_geometry::snapshot::stateful;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::passes::Situation;
+
+/// Maximum number of listed gaps. A further gap extends the last one.
+const MOST_GAPS: usize = 32;
+/// Duration of the shortest listed gap. The alignment of the filter takes a second at the start of a dive.
+const SHORTEST: DurNs = DurNs(5_000_000_000);
+/// Time constant of the mean speed from which the end of a gap is predicted, seconds.
+///
+/// The speed of the last fix alone is uncertain, because the fixes before a gap often come from the inertial unit.
+const SPEED_TAU_S: f64 = 30.0;
+
+/// A stretch of the dive without a position.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PositionGap {
+    /// First and last advice update without a position.
+    pub span: [MonoNs; 2],
+    /// Number of pings without a position.
+    pub pings: u64,
+    /// Chainage of the last fix before the gap, m; `None` if there was none.
+    pub from_m: Option<f64>,
+    /// Chainage at the end of the gap, m; `None` if it can't be predicted.
+    ///
+    /// After the gap this is the first fix. Until then it is predicted from the mean speed before the gap.
+    pub to_m: Option<f64>,
+    /// Whether a fix has ended the gap, so that `to_m` is measured.
+    pub is_over: bool,
+}
+
+/// Position gaps of the dive, in order.
+#[derive(Debug, Resource)]
+pub struct PositionGaps {
+    gaps: Vec<PositionGap>,
+    /// Chainage of the last fix, m, and mean speed at this fix, m/s.
+    last: Option<(f64, f64)>,
+    /// Number of pings without a position until the last update.
+    pings: u64,
+}
+
+stateful!(PositionGaps { state: last, pings; lists: gaps; });
+
+impl PositionGaps {
+    /// Creates an empty list. Allocates: all memory of the list.
+    pub(super) fn with_room() -> Self {
+        Self { gaps: Vec::with_capacity(MOST_GAPS), last: None, pings: 0 }
+    }
+
+    /// Position gaps of at least five seconds, in order.
+    pub fn iter(&self) -> impl Iterator<Item = &PositionGap> {
+        self.gaps.iter().filter(|gap| gap.is_listed())
+    }
+
+    /// Notes an advice update. `pings` is the number of pings without a position so far.
+    pub(super) fn note(&mut self, at: MonoNs, situation: &Situation, pings: u64) {
+        debug_assert!(pings >= self.pings, "counts only grow: {pings} after {}", self.pings);
+        let new = pings - self.pings;
+        self.pings = pings;
+        match situation.pose {
+            Some(pose) => self.end(pose.position.x(), situation.speed_mps),
+            None if new > 0 => self.extend(at, new),
+            None => {}
+        }
+    }
+
+    fn end(&mut self, x_m: f64, speed_mps: f64) {
+        let share = ADVICE_PERIOD.as_secs_f64() / SPEED_TAU_S;
+        let mean_mps = self.last.map_or(speed_mps, |(_, mean_mps)| mean_mps + share * (speed_mps - mean_mps));
+        self.last = Some((x_m, mean_mps));
+        if let Some(gap) = self.gaps.pop_if(|gap| !gap.is_over)
+            && gap.is_listed()
+        {
+            self.gaps.push(PositionGap { to_m: Some(x_m), is_over: true, ..gap });
+        }
+    }
+
+    fn extend(&mut self, at: MonoNs, new: u64) {
+        let is_full = self.gaps.len() == self.gaps.capacity();
+        let open = self.gaps.pop_if(|gap| is_full || !gap.is_over);
+        let from_m = self.last.map(|(x_m, _)| x_m);
+        let mut gap =
+            open.unwrap_or(PositionGap { span: [at; 2], pings: 0, from_m, to_m: None, is_over: false });
+        gap.span[1] = at;
+        gap.pings += new;
+        gap.is_over = false;
+        // Within a full list, the mean speed is that before the latest part of the gap.
+        gap.to_m = self.last.map(|(x_m, mean_mps)| x_m + mean_mps * gap.duration().as_secs_f64());
+        self.gaps.push(gap);
+    }
+}
+
+impl PositionGap {
+    /// Time between the first and the last advice update without a position.
+    pub fn duration(&self) -> DurNs {
+        let [from, to] = self.span;
+        to.since(from)
+    }
+
+    fn is_listed(&self) -> bool {
+        self.duration().0 >= SHORTEST.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::situation;
+
+    fn at(seconds: f64) -> MonoNs {
+        MonoNs(0) + DurNs::from_secs_f64(seconds)
+    }
+
+    /// Gaps after updates five times a second with ten pings each. `x_m` gives the chainage of the fix, if there is one.
+    fn gaps(updates: u32, x_m: impl Fn(f64) -> Option<f64>) -> Vec<PositionGap> {
+        let (mut gaps, mut pings) = (PositionGaps::with_room(), 0);
+        for update in 0..updates {
+            let seconds = 0.2 * f64::from(update);
+            let here = Situation { speed_mps: 0.1, ..situation(x_m(seconds)) };
+            pings += if here.pose.is_none() { 10 } else { 0 };
+            gaps.note(at(seconds), &here, pings);
+        }
+        gaps.iter().copied().collect()
+    }
+
+    /// The vehicle drives at 0.1 m/s from chainage 5 m and has no position from 20 to 60 s.
+    #[test]
+    fn gap_ends_at_the_predicted_chainage_until_a_fix_measures_it() {
+        let is_lost = |seconds: f64| (20.0..60.0).contains(&seconds);
+        let found = |updates| gaps(updates, |s| (!is_lost(s)).then_some(5.0 + 0.1 * s));
+        let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 0.05;
+        let [open] = found(250)[..] else { panic!("one gap") };
+        assert!(near(open.from_m, 7.0) && near(open.to_m, 10.0) && !open.is_over, "{open:?}");
+        assert_eq!((open.span, open.pings), ([at(20.0), at(49.8)], 1500));
+        let [over] = found(400)[..] else { panic!("one gap") };
+        assert!(near(over.from_m, 7.0) && near(over.to_m, 11.0) && over.is_over, "{over:?}");
+        assert_eq!((over.span, over.pings), ([at(20.0), at(59.8)], 2000));
+    }
+
+    #[test]
+    fn short_gaps_and_times_without_pings_are_not_listed() {
+        let short = |s: f64| (!(20.0..24.8).contains(&s)).then_some(5.0);
+        assert_eq!(gaps(400, short), []);
+        let mut silent = PositionGaps::with_room();
+        (0..400_u32).for_each(|update| silent.note(at(0.2 * f64::from(update)), &situation(None), 7));
+        assert_eq!(silent.iter().count(), 0, "{silent:?}");
+    }
+
+    #[test]
+    fn gap_before_the_first_fix_has_no_chainages_and_a_further_gap_extends_the_last_one() {
+        let first = gaps(100, |_| None);
+        assert_eq!(first.iter().map(|gap| (gap.from_m, gap.to_m)).collect::<Vec<_>>(), [(None, None)]);
+        let every_other = |s: f64| ((s / 6.0).floor() % 2.0 < 1.0).then_some(5.0);
+        let many = gaps(3000, every_other);
+        assert_eq!(many.len(), MOST_GAPS);
+        let pings: u64 = many.iter().map(|gap| gap.pings).sum();
+        assert_eq!(pings, 15_000, "each ping is in a gap");
+    }
+}
