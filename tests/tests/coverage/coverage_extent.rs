@@ -363,7 +363,9 @@ fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainag
         let begun_s = report.dive.start_s;
         let true_m = |at_s: f64| START_M + SPEED_MPS * (at_s - begun_s);
         let end_s = if is_over { 120.0 } else { 20.0 / SPEED_MPS };
-        assert!((gap.to_s - begun_s - end_s).abs() < 2.0 && gap.is_over == is_over, "{span}: {gap:?}");
+        // After the counter is back, its distance to the estimate is checked before there is a fix.
+        let late_s = gap.to_s - begun_s - end_s;
+        assert!((-2.0..15.0).contains(&late_s) && gap.is_over == is_over, "{span}: {gap:?}");
         assert!((60.0..100.0).contains(&(gap.from_s - begun_s)), "{span}: {gap:?}");
         // 50 pings per second of each of the four heads.
         let pings = 200.0 * (gap.to_s - gap.from_s);

@@ -6,7 +6,6 @@
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
-use crate::advice_log::ADVICE_PERIOD;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::passes::Situation;
@@ -15,10 +14,10 @@ use headrace_sampling::passes::Situation;
 const MOST_GAPS: usize = 32;
 /// Duration of the shortest listed gap. The alignment of the filter takes a second at the start of a dive.
 const SHORTEST: DurNs = DurNs(5_000_000_000);
-/// Time constant of the mean speed from which the end of a gap is predicted, seconds.
+/// Number of latest advice updates, two minutes, over which the speed is averaged to predict the end of a gap.
 ///
-/// The speed of the last fix alone is uncertain, because the fixes before a gap often come from the inertial unit.
-const SPEED_TAU_S: f64 = 30.0;
+/// The last fixes before a gap often come from the inertial unit alone, so their speed is uncertain.
+const AVERAGED: u32 = 600;
 
 /// A stretch of the dive without a position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -37,12 +36,19 @@ pub struct PositionGap {
     pub is_over: bool,
 }
 
+/// The last fix: its chainage, the mean speed until then, and the number of updates in this mean.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct LastFix {
+    x_m: f64,
+    mean_mps: f64,
+    updates: u32,
+}
+
 /// Position gaps of the dive, in order.
 #[derive(Debug, Resource)]
 pub struct PositionGaps {
     gaps: Vec<PositionGap>,
-    /// Chainage of the last fix, m, and mean speed at this fix, m/s.
-    last: Option<(f64, f64)>,
+    last: Option<LastFix>,
     /// Number of pings without a position until the last update.
     pings: u64,
 }
@@ -73,9 +79,10 @@ impl PositionGaps {
     }
 
     fn end(&mut self, x_m: f64, speed_mps: f64) {
-        let share = ADVICE_PERIOD.as_secs_f64() / SPEED_TAU_S;
-        let mean_mps = self.last.map_or(speed_mps, |(_, mean_mps)| mean_mps + share * (speed_mps - mean_mps));
-        self.last = Some((x_m, mean_mps));
+        let (mean_mps, before) = self.last.map_or((0.0, 0), |last| (last.mean_mps, last.updates));
+        let updates = (before + 1).min(AVERAGED);
+        let mean_mps = mean_mps + (speed_mps - mean_mps) / f64::from(updates);
+        self.last = Some(LastFix { x_m, mean_mps, updates });
         if let Some(gap) = self.gaps.pop_if(|gap| !gap.is_over)
             && gap.is_listed()
         {
@@ -86,14 +93,14 @@ impl PositionGaps {
     fn extend(&mut self, at: MonoNs, new: u64) {
         let is_full = self.gaps.len() == self.gaps.capacity();
         let open = self.gaps.pop_if(|gap| is_full || !gap.is_over);
-        let from_m = self.last.map(|(x_m, _)| x_m);
+        let from_m = self.last.map(|last| last.x_m);
         let mut gap =
             open.unwrap_or(PositionGap { span: [at; 2], pings: 0, from_m, to_m: None, is_over: false });
         gap.span[1] = at;
         gap.pings += new;
         gap.is_over = false;
         // Within a full list, the mean speed is that before the latest part of the gap.
-        gap.to_m = self.last.map(|(x_m, mean_mps)| x_m + mean_mps * gap.duration().as_secs_f64());
+        gap.to_m = self.last.map(|last| last.x_m + last.mean_mps * gap.duration().as_secs_f64());
         self.gaps.push(gap);
     }
 }
