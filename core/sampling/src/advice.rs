@@ -252,9 +252,10 @@ impl Advisor {
         self.last_mps = possible.map(|fastest| fastest.speed_mps);
         self.still_m = self.still_m_for(&fastest, &going);
         let mut predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
-        if chosen.by_several_swings && situation.speed_mps.abs() <= self.swung_mps {
-            // Passes of later swings fill the gaps of this turn.
-            predicted_t_m = predicted_t_m.min(sure_m);
+        if chosen.by_several_swings {
+            // Passes of later swings fill the gaps of this turn. The remaining gaps grow with the speed.
+            let over = (situation.speed_mps.abs() / self.swung_mps).max(1.0);
+            predicted_t_m = predicted_t_m.min(sure_m * over);
         }
         self.think_over(&phasing, &lossy, &going, situation, sure);
         let unseen_m = unseen_m(&fastest);
