@@ -16,7 +16,7 @@ use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
 use super::spacing;
 use super::strips::{Going, PARTS, Strips, View};
-use super::swing::Swing;
+use super::swing::{self, Swing};
 use super::swung_passes::{self, Place};
 use super::target::Target;
 use headrace_geometry::frames::{Point3, Pose, Rot};
@@ -323,10 +323,12 @@ impl Advisor {
         const LEAST_SHARE: f64 = 0.5;
         /// Shortest history that shows how the vehicle swings, seconds.
         const LEAST_S: f64 = 30.0;
-        let Some(looks) = swing.history.filter(|looks| looks.span_s() >= LEAST_S) else { return 0.0 };
-        if going.swing_most_m.is_none_or(|most_m| most_m < LEAST_SHARE * sure.most_m()) {
+        let is_small = |most_m: f64| most_m < LEAST_SHARE * sure.most_m();
+        if sure.most_m() <= 0.0 || going.swing_most_m.is_none_or(is_small) {
             return 0.0;
         }
+        let recent = swing.history.map(swing::Looks::uninterrupted);
+        let Some(recent) = recent.filter(|recent| recent.span_s() >= LEAST_S) else { return 0.0 };
         let perimeter_m = self.profile.perimeter_m();
         let mut places = [Place::default(); PLACES as usize];
         for (slot, number) in places.iter_mut().zip(0..PLACES) {
@@ -341,7 +343,8 @@ impl Advisor {
             spacing::t_max_m(gap_m * needed, advance_m, t_y_m) <= sure.at_m(speed_mps)
         };
         let bound_mps = sure.most_m() / (sure.even_gap_s + going.ping_period_s);
-        let speed_mps = swung_passes::highest_mps(bound_mps, (looks, phasing), &places, sure.most_m(), meets);
+        let speed_mps =
+            swung_passes::highest_mps(bound_mps, (&recent, phasing), &places, sure.most_m(), meets);
         speed_mps * (1.0 - SPEED_MARGIN)
     }
 

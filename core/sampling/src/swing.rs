@@ -16,6 +16,8 @@ const WINDOW: DurNs = DurNs(30_000_000_000);
 ///
 /// A rotation of twice this value or more counts fully.
 const DEAD_RAD: f64 = 0.0075;
+/// Time between two stored directions from which on the history counts as interrupted.
+const INTERRUPTED: DurNs = DurNs(1_000_000_000);
 /// Smallest part of a direction along the tunnel for which displacements are computed: 60 degrees off.
 const LEAST_ALONG: f64 = 0.5;
 
@@ -40,6 +42,17 @@ pub struct Swing<'a> {
 pub struct Looks {
     looks: Vec<(MonoNs, Vec3<Tunnel>)>,
     count: usize,
+}
+
+/// Latest directions of the vehicle's x axis, stored at about equal intervals.
+///
+/// Directions from before a time without a position are excluded.
+#[derive(Debug, Clone, Copy)]
+pub struct RecentSwing<'a> {
+    looks: &'a Looks,
+    /// Index of the oldest of these directions, from the newest one.
+    last: usize,
+    span_s: f64,
 }
 
 stateful!(Looks { state: count; lists: looks; });
@@ -112,42 +125,14 @@ impl Looks {
         turned_rad
     }
 
-    /// Displacement along the tunnel of the beams to a place on the wall, m, some seconds from now.
-    ///
-    /// `from_vehicle_m` is the place relative to the vehicle: to the left and up. The vehicle is assumed to swing as
-    /// before: backwards through the history, then forwards, and so on.
-    pub fn displacement_m(&self, seconds: f64, from_vehicle_m: Yz) -> f64 {
-        let (last, step_s) = (self.looks.len().saturating_sub(1), self.step_s());
-        if last == 0 || step_s <= 0.0 {
-            return 0.0;
-        }
-        let back = math::wrap(seconds / step_s, 2.0 * last as f64);
-        let back = back.min(2.0 * last as f64 - back);
-        let before = math::floor_to_i64(back);
-        let look = |k: i64| self.nth_newest(usize::try_from(k).unwrap_or(0).min(last));
-        let (newer, older) = (look(before), look(before + 1));
-        let share = back - before as f64;
-        displaced_m(newer, from_vehicle_m) * (1.0 - share) + displaced_m(older, from_vehicle_m) * share
-    }
-
-    /// Smallest and largest displacement of the beams to a place in the stored history, m.
-    pub fn displacements_m(&self, from_vehicle_m: Yz) -> [f64; 2] {
-        let all = || self.looks.iter().map(|(_, look)| displaced_m(Some(*look), from_vehicle_m));
-        if self.looks.is_empty() {
-            return [0.0; 2];
-        }
-        [all().fold(f64::MAX, f64::min), all().fold(f64::MIN, f64::max)]
-    }
-
-    /// Length of the stored history, seconds.
-    pub fn span_s(&self) -> f64 {
-        let (newest, oldest) = (self.newest_first().next(), self.newest_first().last());
-        newest.zip(oldest).map_or(0.0, |((to, _), (from, _))| to.since(*from).as_secs_f64())
-    }
-
-    /// Mean time between two stored directions, seconds.
-    fn step_s(&self) -> f64 {
-        self.span_s() / (self.looks.len().saturating_sub(1)).max(1) as f64
+    /// Returns the latest directions that were stored without an interruption.
+    pub fn uninterrupted(&self) -> RecentSwing<'_> {
+        let pairs = self.newest_first().zip(self.newest_first().skip(1));
+        let last =
+            pairs.take_while(|((newer, _), (older, _))| newer.since(*older).0 <= INTERRUPTED.0).count();
+        let ends = self.newest_first().next().zip(self.newest_first().nth(last));
+        let span_s = ends.map_or(0.0, |((to, _), (from, _))| to.since(*from).as_secs_f64());
+        RecentSwing { looks: self, last, span_s }
     }
 
     fn nth_newest(&self, k: usize) -> Option<Vec3<Tunnel>> {
@@ -161,6 +146,41 @@ impl Looks {
 
     fn newest_first(&self) -> impl Iterator<Item = &(MonoNs, Vec3<Tunnel>)> {
         (0..self.looks.len()).filter_map(|k| self.looks.get((self.count - 1 - k) % BEATS))
+    }
+}
+
+impl RecentSwing<'_> {
+    /// Length of this part of the history, seconds.
+    pub fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
+    /// Displacement along the tunnel of the beams to a place on the wall, m, some seconds from now.
+    ///
+    /// `from_vehicle_m` is the place relative to the vehicle: to the left and up. The vehicle is assumed to swing as
+    /// before: backwards through the history, then forwards, and so on.
+    pub fn displacement_m(&self, seconds: f64, from_vehicle_m: Yz) -> f64 {
+        if self.last == 0 || self.span_s <= 0.0 {
+            return 0.0;
+        }
+        let last = self.last as f64;
+        let back = math::wrap(seconds / self.span_s * last, 2.0 * last);
+        let back = back.min(2.0 * last - back);
+        let before = math::floor_to_i64(back);
+        let at_m = |k: i64| {
+            let look = self.looks.nth_newest(usize::try_from(k).unwrap_or(0).min(self.last));
+            displaced_m(look, from_vehicle_m)
+        };
+        let share = back - before as f64;
+        at_m(before) * (1.0 - share) + at_m(before + 1) * share
+    }
+
+    /// Smallest and largest displacement of the beams to a place, m.
+    pub fn displacements_m(&self, from_vehicle_m: Yz) -> [f64; 2] {
+        let looks = self.looks.newest_first().take(self.last + 1);
+        let all = looks.map(|(_, look)| displaced_m(Some(*look), from_vehicle_m));
+        let ends = |ends: Option<[f64; 2]>, m: f64| Some(ends.map_or([m; 2], |[a, b]| [a.min(m), b.max(m)]));
+        all.fold(None, ends).unwrap_or_default()
     }
 }
 
@@ -179,6 +199,7 @@ fn counted(turned_rad: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use headrace_geometry::frames::{Body, Rot};
     use headrace_geometry::math::TAU;
 
     const BEAT: i64 = 200_000_000;
@@ -263,5 +284,29 @@ mod tests {
         let turned_rad = looks.swing(now, 60.0, 0.0).rate_radps * 60.0;
         assert!((turned_rad - 0.09).abs() < 0.01, "{turned_rad}");
         assert_eq!(Swing { history: None, ..looks.swing(now, f64::NAN, 0.0) }, Swing::default());
+    }
+
+    /// The vehicle yaws by 0.1 rad, has no position for a minute, and then lies along the tunnel, turning at the end.
+    #[test]
+    fn recent_swing_begins_after_an_interruption_and_is_continued_backwards() {
+        let mut looks = Looks::default();
+        let mut keep = |seconds: f64, yaw: f64| {
+            let look = Rot::from_roll_pitch_yaw(0.0, 0.0, yaw) * Vec3::<Body>::new(1.0, 0.0, 0.0);
+            looks.keep(MonoNs(0) + DurNs::from_secs_f64(seconds), look);
+        };
+        (0..100).for_each(|beat| keep(0.2 * f64::from(beat), 0.1));
+        (0..=50).for_each(|beat| keep(80.0 + 0.2 * f64::from(beat), if beat == 50 { 0.01 } else { 0.0 }));
+        let recent = looks.uninterrupted();
+        assert!((recent.span_s() - 10.0).abs() < 1e-9, "{}", recent.span_s());
+        let left_m = [3.0, 0.0];
+        let [least_m, most_m] = recent.displacements_m(left_m);
+        assert!((least_m + 0.03).abs() < 1e-4 && most_m.abs() < 1e-9, "{least_m} to {most_m} m");
+        for (seconds, expected_m) in
+            [(0.0, -0.03), (0.1, -0.015), (0.2, 0.0), (10.0, 0.0), (20.0, -0.03), (20.1, -0.015)]
+        {
+            let found_m = recent.displacement_m(seconds, left_m);
+            assert!((found_m - expected_m).abs() < 1e-4, "{seconds} s: {found_m} m");
+        }
+        assert!(Looks::default().uninterrupted().displacement_m(1.0, left_m).abs() <= 0.0);
     }
 }

@@ -5,7 +5,7 @@
 
 use super::head::HeadSet;
 use super::passes::{HeadPasses, Phasing};
-use super::swing::Looks;
+use super::swing::RecentSwing;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Yz;
 
@@ -30,18 +30,18 @@ pub(crate) struct Place {
 
 /// Returns the largest speed up to `bound_mps` at which all gaps between passes meet the target, m/s; zero if there is none.
 ///
-/// `meets` tells whether a gap, m, meets the target at a speed, m/s. Lower speeds meet the target, too. The vehicle is
-/// assumed to go on swinging as before.
+/// `meets` tells whether a gap, m, meets the target at a speed, m/s. Speeds around the result meet the target, too. The
+/// vehicle is assumed to go on swinging as before.
 /// Allocates: never.
 pub(crate) fn highest_mps(
     bound_mps: f64,
-    (looks, phasing): (&Looks, &Phasing),
+    (swing, phasing): (&RecentSwing<'_>, &Phasing),
     places: &[Place],
     target_m: f64,
     meets: impl Fn(f64, f64) -> bool,
 ) -> f64 {
     let met = |speed_mps: f64| {
-        let gap_m = |place: &Place| largest_gap_m(speed_mps, looks, phasing, place, target_m);
+        let gap_m = |place: &Place| largest_gap_m(speed_mps, (swing, phasing), place, target_m);
         places.iter().all(|place| meets(gap_m(place), speed_mps))
     };
     let mut slower = (0..TRIED).scan(bound_mps, |speed_mps, _| {
@@ -55,12 +55,17 @@ pub(crate) fn highest_mps(
 /// Largest distance along the tunnel between neighbouring passes over a place, m.
 ///
 /// Infinite if more passes would have to be simulated than there is room for.
-fn largest_gap_m(speed_mps: f64, looks: &Looks, phasing: &Phasing, place: &Place, target_m: f64) -> f64 {
+fn largest_gap_m(
+    speed_mps: f64,
+    (swing, phasing): (&RecentSwing<'_>, &Phasing),
+    place: &Place,
+    target_m: f64,
+) -> f64 {
     let [y_m, z_m] = place.from_vehicle_m;
     let of_heads = || phasing.first_passes().filter(|passes| place.seen_by.has(passes.head));
     let ahead =
         |of: fn(f64, f64) -> f64, start: f64| of_heads().fold(start, |so_far, head| of(so_far, head.ahead_m));
-    let [least_m, most_m] = looks.displacements_m(place.from_vehicle_m);
+    let [least_m, most_m] = swing.displacements_m(place.from_vehicle_m);
     // Outside this stretch, some passes come before the present or after the end of the simulation.
     let from_m = ahead(f64::max, f64::MIN) + most_m;
     let until_m = from_m + STRETCH * target_m;
@@ -73,7 +78,7 @@ fn largest_gap_m(speed_mps: f64, looks: &Looks, phasing: &Phasing, place: &Place
         let mut at_s = math::wrap(first_s + turned * turn_s, turn_s);
         while at_s <= takes_s {
             let Some(slot) = places_m.get_mut(count) else { return f64::INFINITY };
-            *slot = speed_mps * at_s + ahead_m + looks.displacement_m(at_s, place.from_vehicle_m);
+            *slot = speed_mps * at_s + ahead_m + swing.displacement_m(at_s, place.from_vehicle_m);
             count += 1;
             at_s += turn_s;
         }
@@ -94,6 +99,7 @@ mod tests {
     use crate::layout::HeadLayout;
     use crate::losses::LossRate;
     use crate::passes::Situation;
+    use crate::swing::Looks;
     use headrace_geometry::frames::{Body, Rot, Vec3};
     use headrace_geometry::math::TAU;
     use headrace_geometry::time::MonoNs;
@@ -144,7 +150,9 @@ mod tests {
         let places = WALL_M.map(|from_vehicle_m| Place { from_vehicle_m, seen_by });
         let bound_mps = TARGET_M / (TURN_S / 2.0);
         let (looks, phasing) = (looks(yaw_rad, period_s), phasing(apart_m));
-        highest_mps(bound_mps, (&looks, &phasing), &places, TARGET_M, |gap_m, _| gap_m <= TARGET_M + 1e-9)
+        highest_mps(bound_mps, (&looks.uninterrupted(), &phasing), &places, TARGET_M, |gap_m, _| {
+            gap_m <= TARGET_M + 1e-9
+        })
     }
 
     /// Largest gap along 10 m of a wall at `y_m` to the left, from a sine of yaw that goes on for ever.
@@ -201,8 +209,13 @@ mod tests {
     #[test]
     fn place_that_no_head_sees_allows_no_speed() {
         let places = [Place { from_vehicle_m: [3.5, 0.0], seen_by: HeadSet::default() }];
-        let found =
-            highest_mps(0.1, (&looks(0.1, 20.0), &phasing(0.0)), &places, TARGET_M, |gap_m, _| gap_m <= 0.5);
+        let found = highest_mps(
+            0.1,
+            (&looks(0.1, 20.0).uninterrupted(), &phasing(0.0)),
+            &places,
+            TARGET_M,
+            |gap_m, _| gap_m <= 0.5,
+        );
         assert!(found <= 0.0, "{found} m/s");
     }
 }

@@ -10,7 +10,7 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::passes::Situation;
 
-/// Maximum number of listed gaps. A further gap extends the last one.
+/// Maximum number of listed gaps. Beyond it, the two oldest gaps become one.
 const MOST_GAPS: usize = 32;
 /// Duration of the shortest listed gap. The alignment of the filter takes a second at the start of a dive.
 const SHORTEST: DurNs = DurNs(5_000_000_000);
@@ -36,9 +36,10 @@ pub struct PositionGap {
     pub is_over: bool,
 }
 
-/// The last fix: its chainage, the mean speed until then, and the number of updates in this mean.
+/// The last fix: its time and chainage, the mean speed until then, and the number of updates in this mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct LastFix {
+    at: MonoNs,
     x_m: f64,
     mean_mps: f64,
     updates: u32,
@@ -72,17 +73,17 @@ impl PositionGaps {
         let new = pings - self.pings;
         self.pings = pings;
         match situation.pose {
-            Some(pose) => self.end(pose.position.x(), situation.speed_mps),
+            Some(pose) => self.end(at, pose.position.x(), situation.speed_mps),
             None if new > 0 => self.extend(at, new),
             None => {}
         }
     }
 
-    fn end(&mut self, x_m: f64, speed_mps: f64) {
+    fn end(&mut self, at: MonoNs, x_m: f64, speed_mps: f64) {
         let (mean_mps, before) = self.last.map_or((0.0, 0), |last| (last.mean_mps, last.updates));
         let updates = (before + 1).min(AVERAGED);
         let mean_mps = mean_mps + (speed_mps - mean_mps) / f64::from(updates);
-        self.last = Some(LastFix { x_m, mean_mps, updates });
+        self.last = Some(LastFix { at, x_m, mean_mps, updates });
         if let Some(gap) = self.gaps.pop_if(|gap| !gap.is_over)
             && gap.is_listed()
         {
@@ -91,17 +92,28 @@ impl PositionGaps {
     }
 
     fn extend(&mut self, at: MonoNs, new: u64) {
-        let is_full = self.gaps.len() == self.gaps.capacity();
-        let open = self.gaps.pop_if(|gap| is_full || !gap.is_over);
-        let from_m = self.last.map(|last| last.x_m);
-        let mut gap =
-            open.unwrap_or(PositionGap { span: [at; 2], pings: 0, from_m, to_m: None, is_over: false });
+        if self.gaps.last().is_none_or(|gap| gap.is_over) {
+            self.join_oldest_if_full();
+            let from_m = self.last.map(|last| last.x_m);
+            self.gaps.push(PositionGap { span: [at; 2], pings: 0, from_m, to_m: None, is_over: false });
+        }
+        let Some(gap) = self.gaps.last_mut() else { return };
         gap.span[1] = at;
         gap.pings += new;
-        gap.is_over = false;
-        // Within a full list, the mean speed is that before the latest part of the gap.
-        gap.to_m = self.last.map(|last| last.x_m + last.mean_mps * gap.duration().as_secs_f64());
-        self.gaps.push(gap);
+        gap.to_m = self.last.map(|last| last.x_m + last.mean_mps * at.since(last.at).as_secs_f64());
+    }
+
+    /// Makes room for a gap. The latest gaps are kept apart, because the pilot may have to go back there.
+    fn join_oldest_if_full(&mut self) {
+        if self.gaps.len() < MOST_GAPS {
+            return;
+        }
+        let oldest = self.gaps.remove(0);
+        if let Some(next) = self.gaps.first_mut() {
+            next.span[0] = oldest.span[0];
+            next.pings += oldest.pings;
+            next.from_m = oldest.from_m;
+        }
     }
 }
 
@@ -162,12 +174,17 @@ mod tests {
     }
 
     #[test]
-    fn gap_before_the_first_fix_has_no_chainages_and_a_further_gap_extends_the_last_one() {
+    fn gap_before_the_first_fix_has_no_chainages_and_the_oldest_of_many_gaps_are_joined() {
         let first = gaps(100, |_| None);
         assert_eq!(first.iter().map(|gap| (gap.from_m, gap.to_m)).collect::<Vec<_>>(), [(None, None)]);
         let every_other = |s: f64| ((s / 6.0).floor() % 2.0 < 1.0).then_some(5.0);
         let many = gaps(3000, every_other);
         assert_eq!(many.len(), MOST_GAPS);
+        let durations: Vec<_> = many.iter().map(|gap| gap.duration().as_secs_f64().round()).collect();
+        assert!(
+            durations[0] > 200.0 && durations[1..].iter().all(|s| (*s - 6.0).abs() < 0.1),
+            "{durations:?}"
+        );
         let pings: u64 = many.iter().map(|gap| gap.pings).sum();
         assert_eq!(pings, 15_000, "each ping is in a gap");
     }
