@@ -230,20 +230,21 @@ fn unsure(stretch: &UnsureStretch) -> String {
     format!("  {from} to {to}{of_it}  {what}: {}{helps}", unsure_text(stretch))
 }
 
-/// Line about a position gap that no fix has ended, with its first chainage. The sections of other gaps have verdicts.
+/// Line about a position gap that no fix has ended, with its lower chainage. The sections of other gaps have verdicts.
 fn without_position(gap: &PositionGapReport, report: &Report) -> Option<(f64, String)> {
     let (from_m, to_m, back_to_m) = (gap.from_m?, gap.to_m?, gap.back_to_m?);
     if gap.is_over {
         return None;
     }
     let action = actions_text(&[Action::Position], back_to_m, 0.0, &report.heads);
-    let text = format!(
-        "  {} to about {}  NO POSITION: scanned for {:.0} s  -> {action}",
-        station(from_m),
-        station(to_m),
-        gap.to_s - gap.from_s
-    );
-    Some((from_m, text))
+    // As in all lines, the lower chainage comes first, also if the vehicle was on its way back.
+    let place = if from_m <= to_m {
+        format!("{} to about {}", station(from_m), station(to_m))
+    } else {
+        format!("about {} to {}", station(to_m), station(from_m))
+    };
+    let text = format!("  {place}  NO POSITION: scanned for {:.0} s  -> {action}", gap.to_s - gap.from_s);
+    Some((from_m.min(to_m), text))
 }
 
 /// A line broken to `columns` columns, if given. Continuation lines are indented.

@@ -534,6 +534,8 @@ impl Advisor {
 
     /// Returns the largest speeds as the margins of the target are added one after the other.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
+        /// Number of speeds that don't allow for swing.
+        const BEFORE_SWING: usize = 3;
         let target_m = self.task.target.max_hole_m;
         let known = RemainingTarget { pass_error_m: 0.0, ..sure };
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
@@ -551,7 +553,12 @@ impl Advisor {
             fastest(passes, going, sure),
             fastest(lossy, going, sure),
         ];
-        Margins::of(speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN)), sure.pass_error_m)
+        let mut advised = speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN));
+        // With all margins, the speed is the advised one, which may rest on the passes of several swings.
+        for speed_mps in advised.iter_mut().skip(BEFORE_SWING) {
+            *speed_mps = speed_mps.max(self.swung_mps);
+        }
+        Margins::of(advised, sure.pass_error_m)
     }
 
     fn measure_modes(&mut self) {

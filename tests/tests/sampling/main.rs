@@ -11,3 +11,4 @@ mod oracle;
 mod phase;
 mod plan_holes;
 mod survey;
+mod swinging;

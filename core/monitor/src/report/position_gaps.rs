@@ -35,7 +35,7 @@ pub(super) fn position_gaps(dive: &Loop) -> Vec<PositionGapReport> {
             to_s: gap.span[1].as_secs_f64(),
             pings: gap.pings,
             from_m: gap.from_m,
-            to_m: gap.to_m.map(|to_m| to_m.clamp(0.0, end_m)),
+            to_m: gap.to_m.map(|to_m| if gap.is_over { to_m } else { to_m.clamp(0.0, end_m) }),
             is_over: gap.is_over,
             back_to_m: ends_m.map(|(from_m, to_m)| sections.back_to_m(from_m.min(to_m))),
         }
