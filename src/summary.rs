@@ -10,6 +10,7 @@ use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{
     DiveReport, NotInspectedReport, PositionGapReport, Report, RunReport, SourceReport,
+    SuggestedOpeningReport, WallStretchReport,
 };
 
 use crate::terminal;
@@ -46,6 +47,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
         for stretch in stretches(report) {
             line(stretch);
         }
+        report.suggested_openings.iter().flat_map(declaration).for_each(&mut line);
         for other in &report.other_targets {
             let OtherTargetReport { target_m, section_m, .. } = other;
             line(format!("  with target {target_m} m in sections of {section_m} m: {}", metres(other)));
@@ -196,6 +198,7 @@ fn stretches(report: &Report) -> Vec<String> {
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);
     let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
     all.extend(report.no_verdict.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
+    all.extend(report.wall_stretches.iter().map(|stretch| (stretch.from_m, off_design(stretch))));
     all.extend(report.position_gaps.iter().filter_map(|gap| without_position(gap, report)));
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().map(|(_, text)| text).collect()
@@ -228,6 +231,28 @@ fn unsure(stretch: &UnsureStretch) -> String {
     }
     let of_it = of_it_text(stretch.metres_m, stretch.to_m - stretch.from_m);
     format!("  {from} to {to}{of_it}  {what}: {}{helps}", unsure_text(stretch))
+}
+
+fn off_design(stretch: &WallStretchReport) -> String {
+    let WallStretchReport { from_m, to_m, mean_m, inmost_m, outmost_m } = *stretch;
+    let (side, most_m) = if mean_m > 0.0 { ("outside", outmost_m) } else { ("inside", inmost_m) };
+    let (from, to) = (station(from_m), station(to_m));
+    format!("  {from} to {to}  WALL: {:.2} m {side} the design, up to {:.2} m", mean_m.abs(), most_m.abs())
+}
+
+/// Lines for the vehicle file that declare a suggested opening.
+fn declaration(opening: &SuggestedOpeningReport) -> Vec<String> {
+    let SuggestedOpeningReport { name, from_m, to_m, clock_from, clock_to } = opening;
+    let place = format!("{} to {}", station(*from_m), station(*to_m));
+    vec![
+        format!("  If the wall has an opening at {place}, append to the vehicle file:"),
+        "    [[openings]]".to_owned(),
+        format!("    name = \"{name}\""),
+        format!("    from_m = {from_m}"),
+        format!("    to_m = {to_m}"),
+        format!("    clock_from = {clock_from}"),
+        format!("    clock_to = {clock_to}"),
+    ]
 }
 
 /// Line about a position gap that no fix has ended, with its lower chainage. The sections of other gaps have verdicts.

@@ -39,6 +39,7 @@ impl Missed {
             | Condition::Fish
             | Condition::Rough
             | Condition::AsBuilt
+            | Condition::Altered
             | Condition::Lively => {
                 Some(Bounds { false_fails: 0.005, cannot_say: 0.08, passed: 0.88, advice: 0.8 })
             }

@@ -67,8 +67,9 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if !told_apart && arguments.cell.is_empty() {
         return false;
     }
-    // Results under the conditions `Told` and `AsBuilt` don't depend on the place.
-    if [Condition::Told, Condition::AsBuilt].contains(&condition) && arguments.cell.is_empty() {
+    // Results under these conditions don't depend on the place.
+    let anywhere = [Condition::Told, Condition::AsBuilt, Condition::Altered];
+    if anywhere.contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);
     }
     let graded = [

@@ -10,6 +10,8 @@ pub struct Deviation {
     samples: u32,
     /// Number of samples that deviate by more than the contradiction limit.
     contradicting: u32,
+    /// Number of those samples that confirm the wall found by another head.
+    confirming: u32,
     sum_m: f64,
     /// Largest inward deviation, m; never above zero.
     inmost_m: f64,
@@ -22,22 +24,25 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Adds a sample at `point` with arc length `arc_m`, and returns its outward deviation, m.
+    /// Adds a sample at `point` with arc length `arc_m`.
     ///
     /// `before` is the previous sample of the same head, one step earlier, with its arc length. Deviation and arc
-    /// length are both measured along the ray from the profile's reference point.
+    /// length are both measured along the ray from the profile's reference point. `is_confirming` means that
+    /// another head has found wall with the same deviation there.
     pub fn add(
         &mut self,
         profile: &Profile,
         (point, arc_m): (Yz, f64),
         before: Option<(Yz, f64)>,
-        contradiction_m: f64,
-    ) -> f64 {
+        (contradiction_m, is_confirming): (f64, bool),
+    ) {
         let centre = profile.reference();
         let design = profile.point_at(arc_m);
         let off_m = off_m(profile, point, arc_m);
         self.samples += 1;
-        self.contradicting += u32::from(off_m.abs() > contradiction_m);
+        let contradicts = off_m.abs() > contradiction_m;
+        self.contradicting += u32::from(contradicts);
+        self.confirming += u32::from(contradicts && is_confirming);
         self.sum_m += off_m;
         self.inmost_m = self.inmost_m.min(off_m);
         self.outmost_m = self.outmost_m.max(off_m);
@@ -45,7 +50,18 @@ impl Deviation {
             self.swept_m2 += triangle_m2(centre, last, point);
             self.design_m2 += triangle_m2(centre, profile.point_at(last_arc_m), design);
         }
-        off_m
+    }
+
+    /// Adds the samples of another stretch.
+    pub fn merge(&mut self, other: &Self) {
+        self.samples += other.samples;
+        self.contradicting += other.contradicting;
+        self.confirming += other.confirming;
+        self.sum_m += other.sum_m;
+        self.inmost_m = self.inmost_m.min(other.inmost_m);
+        self.outmost_m = self.outmost_m.max(other.outmost_m);
+        self.swept_m2 += other.swept_m2;
+        self.design_m2 += other.design_m2;
     }
 
     /// Mean deviation, m; `None` without samples.
@@ -63,11 +79,13 @@ impl Deviation {
         (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
     }
 
-    /// Whether most samples deviate from the design by more than the contradiction limit.
+    /// Whether most samples deviate from the design by more than the contradiction limit, without another head that
+    /// found the same wall.
     ///
-    /// In that case, either the profile or the position is wrong.
+    /// In that case, the profile, the position or the head may be wrong. A confirming sample vouches for two: itself, and
+    /// the earlier one that it confirms.
     pub fn contradicts(&self) -> bool {
-        2 * self.contradicting > self.samples
+        2 * self.contradicting.saturating_sub(2 * self.confirming) > self.samples
     }
 }
 
@@ -104,7 +122,7 @@ mod tests {
             let angle = TAU * f64::from(k) / f64::from(samples);
             let point = [y + true_m * math::sin(angle), z - true_m * math::cos(angle)];
             let at = (point, profile.arc_of(point));
-            deviation.add(&profile, at, before, 0.5);
+            deviation.add(&profile, at, before, (0.5, false));
             before = Some(at);
         }
         deviation
@@ -127,10 +145,36 @@ mod tests {
         let profile = shapes::circle(3.0).unwrap();
         let point = [0.0, 1.0];
         for _ in 0..40 {
-            rock.add(&profile, (point, profile.arc_of(point)), None, 0.5);
+            rock.add(&profile, (point, profile.arc_of(point)), None, (0.5, false));
         }
         assert!(!rock.contradicts(), "a heap on the floor doesn't contradict the profile");
         assert!((rock.extremes_m().unwrap()[0] + 1.0).abs() < 1e-9);
+    }
+
+    /// A wall 0.6 m outside the design: only samples after the first `alone` find it confirmed by another head.
+    #[test]
+    fn wall_that_another_head_confirms_does_not_contradict_the_profile() {
+        let profile = shapes::circle(3.0).unwrap();
+        let contradicts = |alone: u32| {
+            let mut deviation = Deviation::default();
+            for k in 0..100 {
+                let at = ([3.6, 3.0], profile.arc_of([3.6, 3.0]));
+                deviation.add(&profile, at, None, (0.5, k >= alone));
+            }
+            deviation.contradicts()
+        };
+        assert_eq!([50, 75, 76, 100].map(contradicts), [false, false, true, true]);
+        let whole = |split: u32| {
+            let [mut first, mut second] = [Deviation::default(); 2];
+            for k in 0..100 {
+                let off_m = f64::from(k) / 50.0 - 1.0;
+                let at = ([3.0 + off_m, 3.0], profile.arc_of([3.0 + off_m, 3.0]));
+                if k < split { &mut first } else { &mut second }.add(&profile, at, None, (0.5, false));
+            }
+            first.merge(&second);
+            (first.contradicts(), first.extremes_m(), first.mean_m().map(|mean_m| (mean_m * 1e9).round()))
+        };
+        assert_eq!(whole(37), whole(100), "merging parts gives the whole");
     }
 
     #[test]

@@ -58,7 +58,7 @@ pub use passage::{Drive, Loss, OtherSettings, PassError, Passage};
 pub use relief::Relief;
 pub use runs::{Run, RunChange, RunId, Runs};
 pub use section::{Judgement, Metres, Section, Spread, Verdict};
-pub use sections::{Judging, Request, Sections, back_to_m};
+pub use sections::{Judging, Request, Sections, WallStretch, back_to_m};
 pub use soundings::{GridLayout, GridNode, GridSummary, Soundings};
 pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};
 pub use trust::{Beam, Distrust};

@@ -155,6 +155,11 @@ impl Relief {
         self.near(placed, limits, 1.0).any(|found| found.is_wall)
     }
 
+    /// Whether another head found wall near this return with the same deviation from the design.
+    pub(super) fn is_wall_of_another(&self, placed: &PlacedReturn, head: u8, limits: &WallLimits) -> bool {
+        self.near(placed, limits, 1.0).any(|found| found.is_wall && found.pass.head != head)
+    }
+
     /// Number of earlier passes that met the same thing near this return, whether it is wall or not.
     pub(super) fn confirmed(&self, placed: &PlacedReturn, pass: &Pass, limits: &WallLimits) -> u8 {
         let others = self.near(placed, limits, 0.5).filter(|found| found.pass.is_other(pass));

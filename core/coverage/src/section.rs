@@ -208,6 +208,11 @@ impl Section {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
+    /// Whether the section can't pass because its samples or its area contradict the design profile.
+    pub fn is_of_another_wall(&self) -> bool {
+        matches!(self.wall_doubt(), Some(Unsure::ContradictedProfile | Unsure::OtherSize))
+    }
+
     /// Records the error between passes at a ping that has a fix in the section.
     pub fn note_pass(&mut self, visit: &Visit, profile: &Profile) {
         if self.passed_in != visit.number {

@@ -35,6 +35,8 @@ pub struct Sorted {
     pub waiting: Option<Taken>,
     /// Classification of the newest return.
     pub this: Taken,
+    /// Whether another head has found wall with the same deviation at the newest return.
+    pub is_confirming: bool,
     /// Reason if the newest return makes the head distrusted, and the chainages of the head's recent returns,
     /// m.
     pub distrusted: Option<(Distrust, [f64; 2])>,
@@ -175,8 +177,10 @@ impl HeadWall {
             self.run = Run::default();
             self.last[0] = Some((placed, Taken::Other));
             let waiting = (waited.count() > 0).then_some(Taken::Other);
-            return Sorted { waiting, this: Taken::Other, distrusted };
+            return Sorted { waiting, this: Taken::Other, is_confirming: false, distrusted };
         }
+        let is_confirming =
+            this == Taken::Wall && !is_design && relief.is_wall_of_another(&placed, pass.head, limits);
         if let Some(taken) = waiting {
             let found = |(other, passes)| Found::new(other, taken == Taken::Wall, passes, pass);
             waited.returns().for_each(|other| relief.remember(&found(other), limits));
@@ -184,7 +188,7 @@ impl HeadWall {
         if this == Taken::Wall {
             relief.remember(&Found::new(&placed, true, confirmed, pass), limits);
         }
-        Sorted { waiting, this, distrusted }
+        Sorted { waiting, this, is_confirming, distrusted }
     }
 
     /// Turns the head to the next beam; returns its pass.

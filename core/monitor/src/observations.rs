@@ -16,7 +16,7 @@ use headrace_sensor::reading::SourceId;
 pub(crate) enum ObservedKind {
     /// Samples fall beyond either end of the tunnel.
     OutsideTunnel,
-    /// Most samples of a section deviate from the design profile by more than the contradiction limit.
+    /// A section can't pass, because its samples or its area contradict the design profile.
     ProfileContradicted,
     /// Successive returns of a head disagree, so they are noise.
     HeadScattered,

@@ -209,7 +209,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         Action::LongerRange => return format!("set {}, then {back}", heads.longer_range()),
         // A speed is stated, because a lower speed helps in other parts of the stretch.
         Action::HigherGain if at_most_mps > 0.0 => format!("{back}, then with a higher gain,"),
-        Action::HigherGain => return "slower won't help, a higher gain may".to_owned(),
+        Action::HigherGain => return "slower won't help: raise the gain, or declare an opening".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
@@ -325,7 +325,7 @@ pub(super) fn observation_text(kind: ObservedKind, head: &str, occurrence: Occur
             format!("ch {x}  samples {off_m:.2} m outside the tunnel: check the tether's zero")
         }
         ObservedKind::ProfileContradicted => format!(
-            "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; no section passes"
+            "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; no pass there"
         ),
         ObservedKind::HeadScattered => {
             format!("ch {x}  returns of {head} differ by {:.2} m: noise; they are ignored", off_m.abs())
@@ -498,7 +498,10 @@ mod tests {
             actions_text(&lossy, 1240.5, 0.25, &two()),
             "go back to 1+240.50, then with a higher gain, at most 0.25 m/s"
         );
-        assert_eq!(actions_text(&lossy, 1240.5, 0.0, &two()), "slower won't help, a higher gain may");
+        assert_eq!(
+            actions_text(&lossy, 1240.5, 0.0, &two()),
+            "slower won't help: raise the gain, or declare an opening"
+        );
         let lost = [Action::Slower, Action::Position];
         let back = "once the position is back, go back to 1+240.50";
         assert_eq!(actions_text(&lost, 1240.5, 0.25, &two()), format!("{back}, at most 0.25 m/s"));

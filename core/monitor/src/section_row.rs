@@ -88,7 +88,7 @@ pub struct DeviationReport {
     pub outmost_m: f64,
     /// Ratio of the cross-section area to the design's; `None` without sweeps.
     pub area_ratio: Option<f64>,
-    /// Whether most samples deviate by more than the contradiction limit.
+    /// Whether most samples deviate by more than the contradiction limit, and no other head found that wall.
     pub contradicts: bool,
 }
 

@@ -98,6 +98,8 @@ pub enum Condition {
     Rough,
     /// The wall deviates from the design by some centimetres, inwards and outwards.
     AsBuilt,
+    /// On a stretch, the wall is wider by 5 or 10 %, or has a ditch, or a side tunnel that the vehicle file doesn't declare.
+    Altered,
     /// A pilot who wanders, stops and turns back.
     Lively,
     /// The speed of sound in the water is 4 % above the value in the vehicle file.
@@ -121,7 +123,7 @@ pub enum Condition {
 }
 
 /// All conditions with the names that the table uses.
-pub const CONDITIONS: [(&str, Condition); 18] = [
+pub const CONDITIONS: [(&str, Condition); 19] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
     ("told", Condition::Told),
@@ -130,6 +132,7 @@ pub const CONDITIONS: [(&str, Condition); 18] = [
     ("fish", Condition::Fish),
     ("rough", Condition::Rough),
     ("as-built", Condition::AsBuilt),
+    ("altered", Condition::Altered),
     ("lively", Condition::Lively),
     ("wrong-sound", Condition::WrongSound),
     ("mounts", Condition::Mounts),
@@ -394,6 +397,7 @@ impl Cell {
         let rough = match self.condition {
             Condition::Rough => format!("[[tunnel.rough]]\nsd_m = {ROUGH_M}\nseed = {seed}\n"),
             Condition::AsBuilt => self.as_built(seed, length_m),
+            Condition::Altered => self.altered(seed, length_m),
             _ => String::new(),
         };
         format!(
@@ -420,6 +424,40 @@ impl Cell {
             .unwrap();
         }
         text
+    }
+
+    /// A third of the dive with another wall: wider, with a ditch or with a side tunnel. Only tunnels with a floor have
+    /// ditches and side tunnels.
+    fn altered(&self, seed: u64, length_m: f64) -> String {
+        let mut draw = Draw::new(seed ^ 0xa17e);
+        let from_m = self.start_m + length_m / 3.0;
+        let to_m = from_m + (length_m / 3.0).max(4.0);
+        let kinds = if matches!(self.vehicle.name, "pipe" | "bluerov2") { 2 } else { 4 };
+        let middle_m = f64::midpoint(from_m, to_m);
+        match seed % kinds {
+            2 => format!(
+                "[[tunnel.features]]\nkind = \"rock_trap\"\nchainage_m = {middle_m:.2}\nlength_m = {:.2}\ndepth_m = 1.5\n",
+                to_m - from_m
+            ),
+            3 => format!(
+                "[[tunnel.features]]\nkind = \"side_tunnel\"\nchainage_m = {middle_m:.2}\nside = \"left\"\n\
+                 width_m = 4\nheight_m = 4\nlength_m = 12\n"
+            ),
+            kind => {
+                let (scale, edge_m) = (if kind == 0 { 1.05 } else { 1.1 }, draw.between(1.0, 3.0));
+                let station = |chainage_m: f64, scale: f64| {
+                    format!("[[tunnel.stations]]\nchainage_m = {chainage_m:.2}\nscale = {scale}\n")
+                };
+                let ends = [
+                    (0.0, 1.0),
+                    (from_m, 1.0),
+                    (from_m + edge_m, scale),
+                    (to_m, scale),
+                    (to_m + edge_m, 1.0),
+                ];
+                ends.map(|(chainage_m, scale)| station(chainage_m, scale)).concat()
+            }
+        }
     }
 
     /// Limits an offset from the centre line, m, so that it keeps clear of the wall of a narrow pipe.

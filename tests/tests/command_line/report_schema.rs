@@ -102,9 +102,12 @@ fn wrong_report_violates_the_schema() {
 }
 
 /// Suffixes of report keys, each with its unit. The description of a key with this suffix must contain the unit.
-const UNITS: [(&str, &str); 11] = [
+const UNITS: [(&str, &str); 13] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),
+    // Keys of the vehicle file.
+    ("clock_from", "hours"),
+    ("clock_to", "hours"),
     ("_deg", "degrees"),
     ("_h", "Hours"),
     ("_m", "metres"),

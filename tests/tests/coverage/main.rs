@@ -18,6 +18,7 @@ mod memory;
 mod metamorphic;
 mod observed;
 mod oracle;
+mod other_wall;
 mod settings;
 mod stuck_sensors;
 mod true_holes;

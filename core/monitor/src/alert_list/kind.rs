@@ -68,7 +68,7 @@ pub enum ListKind {
     SettingDoubted,
     /// Samples fall beyond either end of the tunnel.
     OutsideTunnel,
-    /// Most samples of a section deviate from the design profile by more than the contradiction limit.
+    /// A section can't pass, because its samples or its area contradict the design profile.
     ProfileContradicted,
     /// A log recording fails.
     NotRecorded,

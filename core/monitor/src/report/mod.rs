@@ -22,6 +22,7 @@ mod sources;
 pub(crate) mod spread;
 mod survey;
 mod unsure;
+mod wall;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use inspected::{CoverageExtentReport, NotInspectedReport};
@@ -32,6 +33,7 @@ pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport}
 pub use spread::SpreadReport;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::NoVerdictReport;
+pub use wall::{SuggestedOpeningReport, WallStretchReport};
 
 /// Version of the report's JSON schema.
 pub const REPORT_VERSION: u32 = 9;
@@ -69,6 +71,10 @@ pub struct Report {
     pub go_back: Vec<ReturnReport>,
     /// Stretches of the dive without a position, in order of time.
     pub position_gaps: Vec<PositionGapReport>,
+    /// Stretches of wall off the design profile, in the order of chainage.
+    pub wall_stretches: Vec<WallStretchReport>,
+    /// Openings not declared that explain missed stretches, by number of the run.
+    pub suggested_openings: Vec<SuggestedOpeningReport>,
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,
     /// Metres by verdict for the additional targets and section lengths requested.
@@ -247,6 +253,8 @@ impl Report {
             no_verdict: unsure::unsure_reports(coverage),
             go_back: runs::go_back(sections),
             position_gaps: position_gaps::position_gaps(dive),
+            wall_stretches: wall::wall_stretches(coverage, &dive.mission().profile),
+            suggested_openings: wall::suggested_openings(coverage, &dive.mission().profile),
             survey: survey::survey(coverage, &dive.mission().profile),
             other_targets: Vec::new(),
             heads: dive.head_descriptions().clone(),

@@ -57,7 +57,7 @@ fn judge_one(
         return;
     };
     section_judgement::record(&mut digests.judgements, request.at, request.section, change, section);
-    if section.contradicts() {
+    if section.is_of_another_wall() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
         let occurrence = Occurrence { x_m: sections.bounds_m(request.section).0, off_m };
         let kind = ObservedKind::ProfileContradicted;

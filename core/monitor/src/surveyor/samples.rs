@@ -11,11 +11,14 @@ use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
 /// Stores a sample, and adds its spacings to its section.
+///
+/// `is_confirming` means that another head has found wall with the same deviation from the design there.
 pub(super) fn note_sample(
     coverage: &mut Coverage,
     sweep: &mut HeadSweep,
     tunnel: &TunnelDesign,
     ping: &PlacedPing,
+    is_confirming: bool,
 ) -> Result<(), StoreError> {
     let slot = &mut sweep.last;
     if ping.new_sweep {
@@ -54,7 +57,8 @@ pub(super) fn note_sample(
     section.samples += 1;
     let yz = |point: &Point3<Tunnel>| [point.y(), point.z()];
     let from = step_from.map(|last| (yz(&last.point), last.arc_m));
-    section.deviation.add(&tunnel.profile, (yz(&point), arc_m), from, tunnel.contradiction_m);
+    let limits = (tunnel.contradiction_m, is_confirming);
+    section.deviation.add(&tunnel.profile, (yz(&point), arc_m), from, limits);
     if let Some(t_x_m) = t_x_m {
         section.t_x_m.add(t_x_m);
     }
@@ -85,7 +89,7 @@ mod tests {
     fn consecutive_samples_form_single_steps_until_a_ping_is_lost() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         let mut note = |ping: &PlacedPing| {
-            assert_eq!(note_sample(&mut coverage, &mut sweep, &tunnel, ping), Ok(()));
+            assert_eq!(note_sample(&mut coverage, &mut sweep, &tunnel, ping, false), Ok(()));
             let section = coverage.sections.get(20).unwrap();
             let (samples, steps, t_y_m) = (section.samples, section.t_y_m.count, section.t_y_m.max);
             // Looks for a pass at the centre of each angular step. A pass is a single step that crosses an
@@ -123,7 +127,7 @@ mod tests {
     fn distance_to_the_previous_pass_is_along_the_tunnel() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         for ping in [at(0), at(1), at(2), PlacedPing { new_sweep: true, ..heard(5.235, 0.05, 3.0) }] {
-            note_sample(&mut coverage, &mut sweep, &tunnel, &ping).unwrap();
+            note_sample(&mut coverage, &mut sweep, &tunnel, &ping, false).unwrap();
         }
         let section = coverage.sections.get(20).unwrap();
         // At the new sample's arc length, the first turn's pass was at 5.055 m. Each sample of that turn ends
@@ -135,10 +139,10 @@ mod tests {
     #[test]
     fn sample_outside_the_store_extent_interrupts_the_sweep() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
-        note_sample(&mut coverage, &mut sweep, &tunnel, &at(0)).unwrap();
-        let outside = note_sample(&mut coverage, &mut sweep, &tunnel, &heard(33.0, 0.1, 3.0));
+        note_sample(&mut coverage, &mut sweep, &tunnel, &at(0), false).unwrap();
+        let outside = note_sample(&mut coverage, &mut sweep, &tunnel, &heard(33.0, 0.1, 3.0), false);
         assert_eq!((outside, sweep.last.is_none()), (Err(StoreError::Outside), true));
-        note_sample(&mut coverage, &mut sweep, &tunnel, &at(2)).unwrap();
+        note_sample(&mut coverage, &mut sweep, &tunnel, &at(2), false).unwrap();
         let section = coverage.sections.get(20).unwrap();
         assert_eq!((section.samples, section.t_y_m.count, coverage.store.usage().kept), (2, 0, 2));
     }

@@ -44,7 +44,7 @@ pub(super) fn note_ping(
             waiting.broken = true;
             waiting.new_sweep |= ping.new_sweep;
         } else {
-            store(context, sweep, ping);
+            store(context, sweep, ping, false);
         }
         return None;
     };
@@ -54,7 +54,7 @@ pub(super) fn note_ping(
         }
     }
     match sorted.this {
-        Taken::Wall => wall(context, sweep, ping),
+        Taken::Wall => wall(context, sweep, ping, sorted.is_confirming),
         Taken::Waits if sweep.waiting.add(ping) => {}
         taken => rejected(context, sweep, ping, (taken != Taken::Other, *is_distrusted)),
     }
@@ -107,7 +107,7 @@ fn settle(
     (taken, is_distrusted): (Taken, bool),
 ) {
     if taken == Taken::Wall {
-        wall(context, sweep, &waiting.ping);
+        wall(context, sweep, &waiting.ping, false);
     } else {
         rejected(context, sweep, &waiting.ping, (taken != Taken::Other, is_distrusted));
     }
@@ -119,7 +119,8 @@ fn settle(
     }
 }
 
-fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+/// Applies a return from wall. `is_confirming` as in [`Sorted`](headrace_coverage::Sorted).
+fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_confirming: bool) {
     context.tally.samples += 1;
     digest(context.outputs.digests, ping, RecordKind::Sample);
     let OutputRefs { digests, observations, .. } = &mut context.outputs;
@@ -129,12 +130,12 @@ fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     {
         digest_observation(digests, kind, None, ping.received, occurrence);
     }
-    store(context, sweep, ping);
+    store(context, sweep, ping, is_confirming);
 }
 
 /// Stores a ping's sample. Without a sample the sweep is broken.
-fn store(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
-    match note_sample(context.coverage, sweep, context.tunnel, ping) {
+fn store(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_confirming: bool) {
+    match note_sample(context.coverage, sweep, context.tunnel, ping, is_confirming) {
         Ok(()) => {}
         Err(StoreError::Outside) => context.tally.outside += 1,
         Err(StoreError::Full) => context.tally.not_stored += 1,
@@ -157,7 +158,7 @@ fn rejected(
     };
     let aim = ping.origin.and_then(|origin| aim(context.tunnel, &origin, &point));
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
-    store(context, sweep, &lost);
+    store(context, sweep, &lost, false);
     let Coverage { lacks, sections, .. } = &mut *context.coverage;
     // A head whose returns are all rejected counts as silent.
     if let Some(reach) = ping.reach

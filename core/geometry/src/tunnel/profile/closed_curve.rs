@@ -208,13 +208,17 @@ impl Profile {
     /// 6 is the floor's centre, 9 the left wall, 12 the crown. The position is seen from the reference point, looking
     /// along the tunnel.
     pub fn clock(&self, arc_m: f64) -> String {
+        let half_hours = math::round_to_i64(2.0 * self.hour(arc_m)).rem_euclid(24);
+        let hour = if half_hours / 2 == 0 { 12 } else { half_hours / 2 };
+        format!("{hour}:{}", if half_hours % 2 == 0 { "00" } else { "30" })
+    }
+
+    /// Clock position of a place on the wall, hours from 0 to 12, as in [`clock`](Self::clock).
+    pub fn hour(&self, arc_m: f64) -> f64 {
         let place = sub(self.point_at(arc_m), self.reference);
         // Head angle: 0 is down, and angles grow to the left.
         let angle = math::wrap(math::atan2(place[0], -place[1]), TAU);
-        let half_hours = math::round_to_i64(angle / TAU * 24.0) + 12;
-        let half_hours = half_hours.rem_euclid(24);
-        let hour = if half_hours / 2 == 0 { 12 } else { half_hours / 2 };
-        format!("{hour}:{}", if half_hours % 2 == 0 { "00" } else { "30" })
+        math::wrap(angle / TAU * 12.0 + 6.0, 12.0)
     }
 
     /// Upper bound of the distance from `origin` to the wall, m.
