@@ -63,16 +63,16 @@ fn wider_wall_seen_by_two_heads_passes_and_is_reported() {
 const SIDE_TUNNEL: &str = "[[tunnel.features]]\nkind = \"side_tunnel\"\nchainage_m = 12\nside = \"left\"\nwidth_m = 4\n\
                            height_m = 4\nlength_m = 12\n";
 
-/// The vehicle of the other tests with four heads in the `ceran` tunnel, in which it leaves holes of 0.42 m.
+/// The shipped vehicle with four heads, with a target well above the holes that it leaves.
 fn in_ceran() -> String {
     let text = include_str!("../../../deploy/vehicles/vita2-4.toml");
     text.replace("target_m = 0.5", "target_m = 0.6")
 }
 
-/// The lines of a summary after which they are to be appended.
+/// The lines that a summary suggests to append to the vehicle file.
 fn declaration(summary: &str) -> String {
     let lines = summary.lines().skip_while(|line| !line.contains("append to the vehicle file"));
-    lines.skip(1).take_while(|line| line.starts_with("    ")).map(|line| format!("{line}\n")).collect()
+    lines.skip(1).take_while(|line| line.starts_with("    ")).collect::<Vec<_>>().join("\n")
 }
 
 #[test]
