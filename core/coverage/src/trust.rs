@@ -257,6 +257,11 @@ impl HeadTrust {
         self.one_range_rad += turned_rad;
     }
 
+    /// Whether the last returns have an exactly constant range, as those of a frozen head.
+    pub(super) fn repeats(&self) -> bool {
+        self.one_range.repeats(RUN)
+    }
+
     /// Whether the last returns have an exactly constant range although the range to the design varies.
     pub(super) fn is_stuck(&self, limits: &WallLimits) -> bool {
         self.one_range.is_stuck(RUN, STUCK_VARIES * limits.tolerance_m)

@@ -35,7 +35,7 @@ pub struct Sorted {
     pub waiting: Option<Taken>,
     /// Classification of the newest return.
     pub this: Taken,
-    /// Whether another head has found wall with the same deviation at the newest return.
+    /// Whether another head has found wall with the same deviation at the newest return, and this head's range varies.
     pub is_confirming: bool,
     /// Reason if the newest return makes the head distrusted, and the chainages of the head's recent returns,
     /// m.
@@ -179,8 +179,11 @@ impl HeadWall {
             let waiting = (waited.count() > 0).then_some(Taken::Other);
             return Sorted { waiting, this: Taken::Other, is_confirming: false, distrusted };
         }
-        let is_confirming =
-            this == Taken::Wall && !is_design && relief.is_wall_of_another(&placed, pass.head, limits);
+        // Heads that are frozen at one range don't confirm each other.
+        let is_confirming = this == Taken::Wall
+            && !is_design
+            && !self.trust.repeats()
+            && relief.is_wall_of_another(&placed, pass.head, limits);
         if let Some(taken) = waiting {
             let found = |(other, passes)| Found::new(other, taken == Taken::Wall, passes, pass);
             waited.returns().for_each(|other| relief.remember(&found(other), limits));

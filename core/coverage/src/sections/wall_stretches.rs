@@ -9,7 +9,7 @@ use headrace_geometry::math;
 /// design has it, deviates by 4.5 %.
 const LEAST_SHARE: f64 = 0.04;
 
-/// A stretch of wall whose mean deviation from the design is at least a twentieth of the equivalent radius.
+/// A stretch of wall whose mean deviation from the design is at least 4 % of the equivalent radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallStretch {
     /// Index of the stretch's first section.

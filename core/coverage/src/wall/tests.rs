@@ -19,6 +19,8 @@ struct Turning {
 struct Count {
     wall: usize,
     doubtful: usize,
+    /// Returns at wall that another head has found, too.
+    confirming: usize,
     named: Vec<Distrust>,
 }
 
@@ -62,6 +64,7 @@ impl Turning {
                     let is_rejected = matches!(taken, Some(Taken::Doubtful | Taken::Other));
                     count.doubtful += if is_rejected { returns } else { 0 };
                 }
+                count.confirming += usize::from(sorted.is_confirming);
                 count.named.extend(sorted.distrusted.map(|(why, _)| why));
             }
         }
@@ -263,6 +266,24 @@ fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_the_centre() {
         }
         assert_eq!(names, named, "{out_m}");
     }
+}
+
+/// Heads that are frozen at one range in the centre of a pipe seem to find the same wall, 22 % outside the design. Ranges to
+/// a true wall vary by their noise.
+#[test]
+fn frozen_heads_confirm_no_wall_and_heads_at_a_true_wall_do() {
+    let confirming_share = |noise_m: f64| {
+        let heard = |head: usize, _: f64, _: f64, [turn, step]: [u32; 2]| {
+            let noise = math::sin(f64::from(turn * STEPS + step) * 2.3 + head as f64);
+            Some(1.22 + noise_m * noise)
+        };
+        let counts = Turning::new(1.0, 2).turn(10, heard);
+        let [confirming, wall] = [|count: &Count| count.confirming, |count: &Count| count.wall]
+            .map(|of| counts.iter().map(of).sum::<usize>() as f64);
+        confirming / wall
+    };
+    let [frozen, noisy] = [0.0, 0.01].map(confirming_share);
+    assert!(frozen < 0.15 && noisy > 0.9, "frozen {frozen}, noisy {noisy}");
 }
 
 /// Off the centre, a constant range agrees with the wall for a part of each turn.

@@ -254,7 +254,11 @@ impl Report {
             go_back: runs::go_back(sections),
             position_gaps: position_gaps::position_gaps(dive),
             wall_stretches: wall::wall_stretches(coverage, &dive.mission().profile),
-            suggested_openings: wall::suggested_openings(coverage, &dive.mission().profile),
+            suggested_openings: wall::suggested_openings(
+                coverage,
+                &dive.mission().profile,
+                dive.mission().length_m,
+            ),
             survey: survey::survey(coverage, &dive.mission().profile),
             other_targets: Vec::new(),
             heads: dive.head_descriptions().clone(),

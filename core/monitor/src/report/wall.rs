@@ -8,7 +8,7 @@ use headrace_coverage::{Run, WallStretch};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// A stretch of wall that differs from the design profile by at least a twentieth of the equivalent radius.
+/// A stretch of wall that differs from the design profile, on average by at least 4 % of the equivalent radius.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WallStretchReport {
     /// Beginning of the stretch, m.
@@ -49,15 +49,20 @@ pub(super) fn wall_stretches(coverage: &Coverage, profile: &Profile) -> Vec<Wall
     sections.wall_stretches(frontier.way(), profile.perimeter_m()).into_iter().map(report).collect()
 }
 
-pub(super) fn suggested_openings(coverage: &Coverage, profile: &Profile) -> Vec<SuggestedOpeningReport> {
+pub(super) fn suggested_openings(
+    coverage: &Coverage,
+    profile: &Profile,
+    end_m: f64,
+) -> Vec<SuggestedOpeningReport> {
     let sections = &coverage.sections;
     let open = sections.runs().all().iter().filter(|run| run.is_open());
     let suggested = open.filter_map(|run: &Run| sections.suggested_opening(run, profile));
-    suggested.filter_map(|opening| suggestion(&opening, profile)).collect()
+    suggested.filter_map(|opening| suggestion(&opening, profile, end_m)).collect()
 }
 
-/// The opening in the vehicle file's keys, rounded outward to decimetres and tenths of an hour.
-fn suggestion(opening: &Opening, profile: &Profile) -> Option<SuggestedOpeningReport> {
+/// The opening in the vehicle file's keys, rounded outward to decimetres and tenths of an hour, but within the
+/// tunnel.
+fn suggestion(opening: &Opening, profile: &Profile, end_m: f64) -> Option<SuggestedOpeningReport> {
     let (arc_m, length_m) = opening.arc_m?;
     let below = |value: f64| math::floor_to_i64(value * 10.0) as f64 / 10.0;
     let above = |value: f64| -below(-value);
@@ -65,7 +70,7 @@ fn suggestion(opening: &Opening, profile: &Profile) -> Option<SuggestedOpeningRe
     Some(SuggestedOpeningReport {
         name: opening.name.clone(),
         from_m: below(opening.from_m).max(0.0),
-        to_m: above(opening.to_m),
+        to_m: above(opening.to_m).min(end_m),
         clock_from: below(hour(arc_m)),
         clock_to: above(hour(arc_m + length_m)),
     })
