@@ -56,6 +56,10 @@ struct HalfTurn {
     jumps: u32,
     jump_sum_m: f64,
     turned_rad: f64,
+    /// Sums over the half turn: range, its square, and the square of its change from the previous return, m and m2.
+    range_sum_m: f64,
+    range_square_m2: f64,
+    change_square_m2: f64,
     /// Least and greatest chainage of the half turn's returns, m.
     between_m: Option<[f64; 2]>,
     /// Number of returns within runs of constant range.
@@ -74,6 +78,9 @@ impl HalfTurn {
             jumps: self.jumps + other.jumps,
             jump_sum_m: self.jump_sum_m + other.jump_sum_m,
             turned_rad: self.turned_rad + other.turned_rad,
+            range_sum_m: self.range_sum_m + other.range_sum_m,
+            range_square_m2: self.range_square_m2 + other.range_square_m2,
+            change_square_m2: self.change_square_m2 + other.change_square_m2,
             between_m: joined(self.between_m, other.between_m),
             unchanged: self.unchanged + other.unchanged,
             unchanged_m: joined(self.unchanged_m, other.unchanged_m),
@@ -95,12 +102,29 @@ impl HalfTurn {
             && span_m(self.design_m) > VARIES * limits.tolerance_m
     }
 
+    /// Whether the range follows a wall: it varies with the direction by more than from one return to the next.
+    ///
+    /// If a range is constant with independent noise, the ratio of both sums is about 2 for any noise (von Neumann 1941,
+    /// doi 10.1214/aoms/1177731677). A frozen head can't be told from one in the centre of a round pipe, and counts as frozen.
+    fn follows_a_wall(&self) -> bool {
+        let mean_m = self.range_sum_m / f64::from(self.returns.max(1));
+        let variation_m2 = self.range_square_m2 - mean_m * self.range_sum_m;
+        let resolution_m2 = f64::from(self.returns) * RESOLUTION_M * RESOLUTION_M;
+        self.returns >= FEW && self.change_square_m2 + resolution_m2 < NOISE_RATIO * variation_m2
+    }
+
     /// Whether more than one in `parts` returns disagrees with its neighbours.
     fn has_one_in(&self, parts: u32) -> bool {
         parts * self.jumps.max(self.doubtful) > self.returns
     }
 }
 
+/// Least ratio of squared changes to squared deviations from the mean at which a range counts as noise.
+///
+/// Independent noise has 2 +- 0.2 in the returns of half a turn. Range to a wall has 0.1 or less.
+const NOISE_RATIO: f64 = 1.0;
+/// Resolution of a profiling sonar's range, m. Changes below it show nothing.
+const RESOLUTION_M: f64 = 0.002;
 /// Minimum number of returns in half a turn for a decision on the head.
 const FEW: u32 = 20;
 /// A range counts as unchanged if it varies by less than this share of the tolerance.
@@ -160,6 +184,7 @@ pub(super) struct HeadTrust {
     /// Counts of the present half turn, and of the two half turns before.
     halves: [HalfTurn; 3],
     angle_rad: Option<f64>,
+    range_m: Option<f64>,
     unchanged: Unchanged,
     one_range: ConstantRange,
     /// Chainages of the returns with an exactly constant range, m.
@@ -182,7 +207,7 @@ impl HeadTrust {
         &mut self,
         placed: &PlacedReturn,
         beam: &Beam<'_>,
-        Disagreement { jump_m, doubtful }: Disagreement,
+        disagreement: Disagreement,
         limits: &WallLimits,
         others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {
@@ -190,23 +215,9 @@ impl HeadTrust {
         if beam.standing {
             return None;
         }
-        let before = self.angle_rad.replace(beam.angle_rad).unwrap_or(beam.angle_rad);
-        let turned_rad = math::wrap_signed(beam.angle_rad - before, math::TAU).abs();
-        let unchanged = self.unchanged.add(beam.range_m, limits);
-        let is_run = |range_m: f64| unchanged.then_some([range_m; 2]);
-        let one = HalfTurn {
-            returns: 1,
-            doubtful,
-            jumps: u32::from(jump_m.is_some()),
-            jump_sum_m: jump_m.unwrap_or(0.0).abs(),
-            turned_rad,
-            between_m: Some([placed.x_m; 2]),
-            unchanged: u32::from(unchanged),
-            unchanged_m: is_run(beam.range_m),
-            design_m: if unchanged { (beam.design_range_m)().and_then(is_run) } else { None },
-        };
+        let one = self.counts(placed, beam, disagreement, limits);
         self.halves[0] = self.halves[0].with(&one);
-        self.note_range(placed, beam, turned_rad, limits);
+        self.note_range(placed, beam, one.turned_rad, limits);
         let is_stuck = others.change && self.is_stuck(limits);
         let is_full = self.halves[0].is_full();
         let turn = self.halves[0].with(&self.halves[1]);
@@ -240,6 +251,35 @@ impl HeadTrust {
         Some((why, between_m))
     }
 
+    /// Counts of one return.
+    fn counts(
+        &mut self,
+        placed: &PlacedReturn,
+        beam: &Beam<'_>,
+        Disagreement { jump_m, doubtful }: Disagreement,
+        limits: &WallLimits,
+    ) -> HalfTurn {
+        let before = self.angle_rad.replace(beam.angle_rad).unwrap_or(beam.angle_rad);
+        let turned_rad = math::wrap_signed(beam.angle_rad - before, math::TAU).abs();
+        let change_m = beam.range_m - self.range_m.replace(beam.range_m).unwrap_or(beam.range_m);
+        let unchanged = self.unchanged.add(beam.range_m, limits);
+        let is_run = |range_m: f64| unchanged.then_some([range_m; 2]);
+        HalfTurn {
+            returns: 1,
+            doubtful,
+            jumps: u32::from(jump_m.is_some()),
+            jump_sum_m: jump_m.unwrap_or(0.0).abs(),
+            turned_rad,
+            range_sum_m: beam.range_m,
+            range_square_m2: beam.range_m * beam.range_m,
+            change_square_m2: change_m * change_m,
+            between_m: Some([placed.x_m; 2]),
+            unchanged: u32::from(unchanged),
+            unchanged_m: is_run(beam.range_m),
+            design_m: if unchanged { (beam.design_range_m)().and_then(is_run) } else { None },
+        }
+    }
+
     /// Records a return for the check of an exactly constant range.
     ///
     /// After half a turn, the record starts again, unless the constant range contradicts the design.
@@ -257,9 +297,9 @@ impl HeadTrust {
         self.one_range_rad += turned_rad;
     }
 
-    /// Whether the last returns have an exactly constant range, as those of a frozen head.
-    pub(super) fn repeats(&self) -> bool {
-        self.one_range.repeats(RUN)
+    /// Whether the last turn's ranges show that the head isn't frozen, see [`HalfTurn::follows_a_wall`].
+    pub(super) fn follows_a_wall(&self) -> bool {
+        self.halves[0].with(&self.halves[1]).follows_a_wall()
     }
 
     /// Whether the last returns have an exactly constant range although the range to the design varies.

@@ -35,7 +35,8 @@ pub struct Sorted {
     pub waiting: Option<Taken>,
     /// Classification of the newest return.
     pub this: Taken,
-    /// Whether another head has found wall with the same deviation at the newest return, and this head's range varies.
+    /// Whether another head has found wall with the same deviation at the newest return, and this head's range follows
+    /// a wall.
     pub is_confirming: bool,
     /// Reason if the newest return makes the head distrusted, and the chainages of the head's recent returns,
     /// m.
@@ -182,7 +183,7 @@ impl HeadWall {
         // Heads that are frozen at one range don't confirm each other.
         let is_confirming = this == Taken::Wall
             && !is_design
-            && !self.trust.repeats()
+            && self.trust.follows_a_wall()
             && relief.is_wall_of_another(&placed, pass.head, limits);
         if let Some(taken) = waiting {
             let found = |(other, passes)| Found::new(other, taken == Taken::Wall, passes, pass);

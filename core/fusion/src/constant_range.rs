@@ -29,16 +29,11 @@ impl ConstantRange {
         }
     }
 
-    /// Whether at least `fewest` returns have the same range.
-    pub fn repeats(&self, fewest: u32) -> bool {
-        self.returns >= fewest
-    }
-
     /// Whether at least `fewest` returns have the same range while the design range varies by more than `varies_m`.
     ///
     /// A real wall whose design range varies never keeps its range constant to within 2 mm.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
-        self.repeats(fewest) && self.off_m[1] - self.off_m[0] > varies_m
+        self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
 
     /// Whether any return has been recorded.

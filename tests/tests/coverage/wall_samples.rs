@@ -118,6 +118,17 @@ fn no_section_passes_with_a_head_stuck_at_one_range() {
     assert_eq!(kinds, ["profile_contradicted"]);
 }
 
+/// In the centre of a pipe, two heads at one range seem to agree on a wider wall, whatever their noise.
+#[test]
+fn no_section_passes_with_all_heads_stuck_at_one_range() {
+    for range_m in [0.78, 1.22] {
+        let effects =
+            format!("stuck_range = {{ range_m = {range_m}, sensors = [\"sonar_0\", \"sonar_1\"] }}\n");
+        let dive = dive(2, &effects);
+        assert!(dive.report.summary.pass_m <= 0.0, "{range_m}: {:?}", dive.report.summary);
+    }
+}
+
 #[test]
 fn one_stuck_head_of_several_is_reported_and_the_others_are_used() {
     for (heads, stuck, least_m) in [(2, 0, 1.0), (2, 1, 2.5), (3, 0, 2.0), (3, 1, 3.0)] {
