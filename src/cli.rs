@@ -8,6 +8,7 @@ mod value_parsers;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
+use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use headrace_geometry::time::DurNs;
 use headrace_replay::log::Every;
@@ -560,7 +561,7 @@ impl Following {
 #[derive(Debug, Args)]
 pub(crate) struct Output {
     /// Report file to write.
-    #[arg(long, value_name = "R.json")]
+    #[arg(long, value_name = "R.json", value_parser = PathBufValueParser::new().try_map(report_path))]
     pub(crate) report: Option<PathBuf>,
     /// Print the report as JSON.
     #[arg(long)]
@@ -571,6 +572,19 @@ pub(crate) struct Output {
     /// (docs/reference/live-state.md).
     #[arg(long, conflicts_with_all = ["json", "tui"])]
     pub(crate) json_lines: bool,
+}
+
+/// Path of a report. Its extension is .json or none; pipes and devices may have any name.
+fn report_path(path: PathBuf) -> Result<PathBuf, String> {
+    let is_json = path.extension().is_none_or(|name| name.is_empty() || name.eq_ignore_ascii_case("json"));
+    // The reader of a pipe or device knows its format, whatever its name is.
+    let is_special = || path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir());
+    if is_json || is_special() {
+        return Ok(path);
+    }
+    Err("a report is JSON, so its name must end in .json or have no extension; for tables, use headrace campaign DIR \
+         --sql SQL --out FILE.csv (docs/how-to/replay-many-dives.md)"
+        .to_owned())
 }
 
 impl Output {

@@ -30,7 +30,7 @@ use crate::output::{put_line, say, show};
 use crate::outputs::{self, Claims, Kind};
 use crate::page::{self, Of, Served, VoicesOf};
 use crate::play::{self, Directors, Playing};
-use crate::report_output::{exit_code, finish, note_losses};
+use crate::report_output::{exit_code, finish, note_losses, state_utc};
 use crate::screen::Screen;
 use crate::smooth;
 use crate::summary::summary;
@@ -160,6 +160,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let mut watch = followers.join(watch, Joining::new(&vehicle, tui::Mode::Source, &interrupted))?;
     let mut report = dive.run(&mut feed, pace, &mut watch, &mut |_| ())?;
     note_losses(&mut report, log, &player);
+    state_utc(&mut report, page::utc_of_zero_s(&player.info().metadata));
     if let Some(served) = served {
         served.end(&report);
     }
@@ -223,6 +224,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         served.end(&report);
     }
     note_losses(&mut report, log, &player);
+    state_utc(&mut report, page::utc_of_zero_s(&player.info().metadata));
     if player.coming()?.is_none() {
         report.other_targets = other_targets::reports(args, &files, (vehicle, &text), &report)?;
     } else if other_targets::is_asked(args) {

@@ -12,8 +12,8 @@ use crate::logging::complain;
 /// Maximum number of differences between two reports that are listed.
 const SHOWN: usize = 20;
 
-/// A golden report, which replays are compared with. It lacks the log's name and hash, and the history of
-/// ports.
+/// A golden report, which replays are compared with. It lacks the log's name and hash, the program's version, and
+/// the history of ports.
 pub(crate) struct Golden {
     expected: Value,
     allowed: Allowed,
@@ -37,7 +37,7 @@ impl Golden {
     /// Whether a report differs from the golden one by more than the tolerances. Lists the differences on
     /// stderr.
     ///
-    /// The log and the ports aren't compared.
+    /// The log, the program's version and the ports aren't compared.
     pub(crate) fn differs(&self, report: &Report) -> Result<bool, Failure> {
         Ok(tell(&self.expected, &without_log(report)?, &self.allowed))
     }
@@ -45,7 +45,7 @@ impl Golden {
 
 /// Replaces the golden report, keeps its tolerances, and lists the differences on stderr.
 ///
-/// The new report has no name and hash of the log.
+/// The new report has no name and hash of the log, and no version of the program.
 pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
     let mut got = without_log(report)?;
     let old: Option<Value> =
@@ -132,6 +132,7 @@ fn without_log(report: &Report) -> Result<Value, Failure> {
 fn drop_log(report: &mut Value) {
     if let Some(object) = report.as_object_mut() {
         object.insert("log".to_owned(), Value::Null);
+        object.insert("program".to_owned(), Value::Null);
     }
     let sources = report.get_mut("sources").and_then(Value::as_array_mut);
     for source in sources.into_iter().flatten().filter_map(Value::as_object_mut) {

@@ -22,7 +22,7 @@ use crate::output;
 use crate::outputs::{self, Claims};
 use crate::page::{self, Of, Served, VoicesOf};
 use crate::recordings::InRecordings;
-use crate::report_output::finish;
+use crate::report_output::{finish, state_utc};
 use crate::screen::Screen;
 use crate::summary::broken;
 use crate::tui;
@@ -90,11 +90,12 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
             || until.is_some_and(|until| now >= until)
             || states.borrow().missing(now).is_some()
     };
-    let report = dive.run_live(supervisor, &ended, &mut watch, &mut |supervisor, watch| {
+    let mut report = dive.run_live(supervisor, &ended, &mut watch, &mut |supervisor, watch| {
         while let Some(status) = supervisor.next_status() {
             states.borrow_mut().show(&status, watch);
         }
     });
+    state_utc(&mut report, Some(utc_of_zero_s()));
     if let Some(served) = served {
         served.end(&report);
     }
@@ -105,6 +106,12 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     }
 }
 
+/// UTC of the zero of this machine's clock, seconds.
+fn utc_of_zero_s() -> f64 {
+    let (monotonic, utc) = headrace_ports::clock_anchor();
+    (utc.0 - monotonic.0.cast_signed()) as f64 / 1e9
+}
+
 /// Serves the page of a dive on ports.
 fn live_page(
     args: &Run,
@@ -113,7 +120,6 @@ fn live_page(
     dive: &Dive,
     watch: &mut Watch,
 ) -> Option<Served> {
-    let (monotonic, utc) = headrace_ports::clock_anchor();
     let log = logs.first().filter(|_| !args.no_record).map(|log| log.display().to_string());
     let of = Of {
         vehicle,
@@ -121,7 +127,7 @@ fn live_page(
         dive: log.clone().unwrap_or_else(|| vehicle.name.clone()),
         recorded_to: log,
         compared_m: None,
-        utc_of_zero_s: Some((utc.0 - monotonic.0.cast_signed()) as f64 / 1e9),
+        utc_of_zero_s: Some(utc_of_zero_s()),
         span: None,
         is_playback: false,
         console: dive.console(),

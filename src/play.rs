@@ -22,7 +22,6 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::logging::complain;
 use crate::output::aside;
-use crate::phase::Phase;
 use crate::watch::Watch;
 use keys::Keyboard;
 pub(crate) use keys::{Hand, Key};
@@ -68,8 +67,9 @@ impl Playing {
             let mut playback = Playback::new(armed, player, store, pace)?;
             screen.begun = playback.begun();
             if let Some(from) = from {
-                let _phase = Phase::start("seek");
-                playback.seek(screen.begun + from, &mut screen)?;
+                // As a command, so that followers show the state after the jump, as after any other jump. The receiver
+                // lives as long as this function.
+                let _received = sender.send(PlaybackCommand::Seek(screen.begun + from));
             }
             screen.watch.mode(false, pace.speed);
             // A terminal gives keys; a pipe or a file gives lines.

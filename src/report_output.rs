@@ -26,6 +26,34 @@ pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) {
     report.log = Some(log);
 }
 
+/// States the date and time of the dive in the report. `utc_of_zero_s` is the UTC of the clock's zero, s.
+pub(crate) fn state_utc(report: &mut Report, utc_of_zero_s: Option<f64>) {
+    report.begun_utc = utc_of_zero_s.map(|zero_s| utc_text(zero_s + report.dive.start_s));
+}
+
+/// A UTC time in seconds since 1970 as text, to whole seconds.
+fn utc_text(utc_s: f64) -> String {
+    let seconds = headrace_geometry::math::floor_to_i64(utc_s);
+    let (mut days, of_day) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
+    let is_leap = |year: i64| year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    // 400 years of the Gregorian calendar have 146,097 days, so the loops stay short.
+    let mut year = 1970 + 400 * days.div_euclid(146_097);
+    days = days.rem_euclid(146_097);
+    while days >= 365 + i64::from(is_leap(year)) {
+        days -= 365 + i64::from(is_leap(year));
+        year += 1;
+    }
+    let mut month = 1;
+    for length in [31, 28 + i64::from(is_leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30] {
+        if days < length {
+            break;
+        }
+        (days, month) = (days - length, month + 1);
+    }
+    let (day, h, min, s) = (days + 1, of_day / 3600, of_day / 60 % 60, of_day % 60);
+    format!("{year:04}-{month:02}-{day:02}T{h:02}:{min:02}:{s:02}Z")
+}
+
 /// Entry of the report for a log's files.
 ///
 /// A file that can't be read back counts as a loss, and its digest is missing.
@@ -78,5 +106,26 @@ pub(crate) fn exit_code(report: &Report) -> u8 {
         failure::OK
     } else {
         failure::FAILED
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::utc_text;
+
+    /// Expected texts by `date -u -d @SECONDS +%FT%TZ`.
+    #[test]
+    fn utc_is_stated_as_date_and_time() {
+        for (utc_s, text) in [
+            (0.0, "1970-01-01T00:00:00Z"),
+            (951_782_399.9, "2000-02-28T23:59:59Z"),
+            (951_868_800.0, "2000-03-01T00:00:00Z"),
+            (1_709_164_800.0, "2024-02-29T00:00:00Z"),
+            (1_796_015_553.2, "2026-11-30T05:12:33Z"),
+            (4_107_542_400.0, "2100-03-01T00:00:00Z"),
+            (-1.0, "1969-12-31T23:59:59Z"),
+        ] {
+            assert_eq!(utc_text(utc_s), text, "{utc_s}");
+        }
     }
 }

@@ -1,9 +1,8 @@
 //! Summary of a report as text.
 
 use headrace_config::plain::one_line;
-use headrace_coverage::{Action, Unsure, Verdict};
+use headrace_coverage::{Action, Metres, Unsure, Verdict};
 use headrace_monitor::live_messages::UnsureStretch;
-use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, of_it_text, unsure_text};
 use headrace_monitor::other_targets::OtherTargetReport;
 use headrace_monitor::pilot_text::{actions_text, cause_text, station};
@@ -184,7 +183,7 @@ fn outside_text(dive: &DiveReport) -> String {
 /// Metres of tunnel by verdict, as text.
 fn metres(judged: &OtherTargetReport) -> String {
     let OtherTargetReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
-    metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
+    metres_text(&Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 
 /// Lines about the missed and the unsure stretches, in the order of chainage: place, problem and action.

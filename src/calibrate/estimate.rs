@@ -45,15 +45,35 @@ pub(crate) enum NotEstimated {
         /// Minimum time for which the vehicle must stand still, s.
         least_s: usize,
     },
+    /// A head has turned less than once.
+    #[error(
+        "no full turn: the head turned by only {swept_deg:.0} degrees while the vehicle was stationary; 360 are \
+         needed, so that it sees opposite walls; stand still {missing_s:.0} s longer"
+    )]
+    PartOfTurn {
+        /// Angle by which the head has turned, degrees.
+        swept_deg: f64,
+        /// Time that the rest of the turn takes, whole seconds.
+        missing_s: f64,
+    },
+    /// A head sweeps a sector to and fro, or doesn't turn.
+    #[error(
+        "no full turn: the head sweeps only {swept_deg:.0} degrees; 360 are needed, so that it sees opposite \
+         walls; let it turn all the way round"
+    )]
+    OnlySector {
+        /// Sector that the head sweeps, degrees.
+        swept_deg: f64,
+    },
     /// A head has seen too little of the wall.
     #[error(
-        "no full turn: the head covered only {seen_deg:.0} degrees of wall; at least {least_deg:.0} are \
-         needed"
+        "too little wall: the head had returns from opposite walls over only {opposite_deg:.0} degrees of its \
+         turn; at least {least_deg:.0} are needed"
     )]
     LittleWall {
-        /// Sector that the head has seen, degrees.
-        seen_deg: f64,
-        /// Minimum sector that the head must have seen, degrees.
+        /// Sectors in which the head has seen wall, and also in the opposite direction, degrees.
+        opposite_deg: f64,
+        /// Minimum of these sectors, degrees.
         least_deg: f64,
     },
     /// The cross-section looks the same at every angle of the head about its axis.

@@ -11,8 +11,8 @@ use headrace_geometry::frames::{Mount, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Minimum sector that a head must have seen to be calibrated, degrees.
-const LEAST_SEEN_DEG: f64 = 120.0;
+/// Minimum sector that a head must have seen to be calibrated, opposite walls only, degrees.
+const LEAST_OPPOSITE_DEG: f64 = 120.0;
 /// Largest allowed median of the absolute range residuals, m. Above it, the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
 /// An estimate is reported only if its standard deviation is at most this share of that of the file's value.
@@ -72,15 +72,20 @@ pub(crate) struct Heads {
 
 /// Calibrates the heads from the longest time at rest.
 ///
-/// Errors: the vehicle never stands still for long enough, or the wall doesn't match the profile.
+/// Errors: the vehicle never stands still for long enough, no head turns once in that time, or the wall doesn't match
+/// the profile.
 pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
     let still = longest(material)?;
     let scan = gather(material, &still)?;
-    let (scans, little): (Vec<HeadScan>, Vec<HeadScan>) =
-        scan.heads.iter().cloned().partition(|head| head.seen_rad().to_degrees() >= LEAST_SEEN_DEG);
-    if scans.is_empty() {
-        let seen_deg = little.iter().map(|head| head.seen_rad().to_degrees()).fold(0.0, f64::max);
-        return Err(NotEstimated::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG });
+    let (mut scans, mut refused) = (Vec::new(), Vec::new());
+    for head in &scan.heads {
+        match check_evidence(head) {
+            Ok(()) => scans.push(head.clone()),
+            Err(why) => refused.push((head, why)),
+        }
+    }
+    if let (true, Some(why)) = (scans.is_empty(), hardest(&refused)) {
+        return Err(why);
     }
     let scan = Scan { heads: scans, ..scan };
     let mut found = match scan.heads.len() {
@@ -89,20 +94,48 @@ pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
         3 | 4 => solve::<{ COMMON + 4 * OWN }>(material, &scan, still),
         _ => solve::<{ COMMON + MAX_HEADS * OWN }>(material, &scan, still),
     }?;
-    found.heads.extend(little.iter().map(unseen));
+    found.heads.extend(refused.into_iter().map(|(head, why)| unseen(head, why)));
     found.heads.sort_unstable_by_key(|head| head.source);
     Ok(found)
 }
 
-/// Result for a head that has seen too little of the wall.
-fn unseen(head: &HeadScan) -> Head {
-    let seen_deg = head.seen_rad().to_degrees();
-    let why = NotEstimated::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG };
+/// Checks that a head has turned once, and seen opposite walls.
+///
+/// From less of a turn, a fit may have a small standard deviation and still be wrong: it counts the errors of
+/// neighbouring returns as independent. Errors that many returns share (footprint, wall, profile) then look like another
+/// position of the vehicle and another angle of the head. Opposite walls separate them.
+fn check_evidence(head: &HeadScan) -> Result<(), NotEstimated> {
+    let swept_deg = head.sweep.swept_rad().to_degrees();
+    if !head.sweep.is_whole() {
+        return Err(match head.sweep.missing_s() {
+            Some(missing_s) => NotEstimated::PartOfTurn { swept_deg, missing_s: missing_s.ceil() },
+            None => NotEstimated::OnlySector { swept_deg },
+        });
+    }
+    let opposite_deg = head.opposite_rad().to_degrees();
+    if opposite_deg < LEAST_OPPOSITE_DEG {
+        return Err(NotEstimated::LittleWall { opposite_deg, least_deg: LEAST_OPPOSITE_DEG });
+    }
+    Ok(())
+}
+
+/// Reason that stands for those of all heads: the longest missing time, otherwise the first reason.
+fn hardest(refused: &[(&HeadScan, NotEstimated)]) -> Option<NotEstimated> {
+    let missing_s = |why: &NotEstimated| match why {
+        NotEstimated::PartOfTurn { missing_s, .. } => *missing_s,
+        _ => 0.0,
+    };
+    // Of equal ones, `max_by` returns the last.
+    refused.iter().rev().map(|(_, why)| *why).max_by(|a, b| missing_s(a).total_cmp(&missing_s(b)))
+}
+
+/// Result for a head that is not calibrated, for this reason.
+fn unseen(head: &HeadScan, why: NotEstimated) -> Head {
     Head {
         source: head.source,
         filed: head.mount,
         found: head.mount,
-        seen_deg,
+        seen_deg: head.seen_rad().to_degrees(),
         used: 0,
         rejected: head.returns.len(),
         rms_m: 0.0,

@@ -12,6 +12,7 @@ mod fit;
 mod heads;
 mod scan;
 mod still;
+mod sweep;
 mod table;
 #[cfg(test)]
 mod tests;

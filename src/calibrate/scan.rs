@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{NotEstimated, median};
 use crate::calibrate::still::Still;
+use crate::calibrate::sweep::Sweep;
 use headrace_fusion::filter::updates::in_tunnel;
 use headrace_geometry::frames::{Body, Mount, Rot, Tunnel};
 use headrace_geometry::math::{self, TAU};
@@ -41,6 +42,8 @@ pub(crate) struct HeadScan {
     pub(crate) source: usize,
     /// Mount of the head in the vehicle file.
     pub(crate) mount: Mount,
+    /// Motion of the head, from all pings.
+    pub(crate) sweep: Sweep,
     /// Returns of the head.
     pub(crate) returns: Vec<Return>,
 }
@@ -68,13 +71,29 @@ pub(crate) struct Scan {
 impl HeadScan {
     /// Total angle of the sectors in which the head has seen wall, radians.
     pub(crate) fn seen_rad(&self) -> f64 {
+        self.seen().iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
+    }
+
+    /// Total angle of the sectors in which the head has seen wall, and also in the opposite direction, radians.
+    ///
+    /// Errors that all ranges share move the vehicle and turn the head if only one side is seen. Between opposite
+    /// walls, they cancel.
+    pub(crate) fn opposite_rad(&self) -> f64 {
+        let seen = self.seen();
+        let (first, second) = seen.split_at(SECTORS / 2);
+        let pairs = first.iter().zip(second).filter(|(here, there)| **here && **there).count();
+        2.0 * pairs as f64 * SAME_WALL_RAD
+    }
+
+    /// Whether the head has seen wall, by sector.
+    fn seen(&self) -> [bool; SECTORS] {
         let mut seen = [false; SECTORS];
         for one in &self.returns {
             if let Some(slot) = seen.get_mut(sector(one.angle_rad)) {
                 *slot = true;
             }
         }
-        seen.iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
+        seen
     }
 
     /// Drops returns beyond the limit per piece of wall, and weights the rest.
@@ -142,21 +161,23 @@ fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunne
     let mut heads: BTreeMap<usize, HeadScan> = BTreeMap::new();
     for (event, sensor) in material.during(still.from, still.to) {
         let (SensorKind::Head, Reading::Sonar(sonar)) = (sensor.kind, event.reading) else { continue };
-        let before = attitudes.partition_point(|(at, _)| *at <= event.valid_at).saturating_sub(1);
-        let (Some(range_m), Some((_, attitude)), true) =
-            (sonar.range_m, attitudes.get(before), event.reading.is_finite())
-        else {
+        if !event.reading.is_finite() {
             continue;
-        };
-        let range_m = material.site.rescaled_range_m(range_m, sonar.sound_speed_mps);
+        }
         let source = event.source.index();
         let head = heads.entry(source).or_insert_with(|| HeadScan {
             source,
             mount: sensor.mount,
+            sweep: Sweep::default(),
             returns: Vec::new(),
         });
+        head.sweep.add(sonar.angle_rad, event.valid_at);
+        let before = attitudes.partition_point(|(at, _)| *at <= event.valid_at).saturating_sub(1);
+        let (Some(range_m), Some((_, attitude))) = (sonar.range_m, attitudes.get(before)) else { continue };
+        let range_m = material.site.rescaled_range_m(range_m, sonar.sound_speed_mps);
         head.returns.push(Return { angle_rad: sonar.angle_rad, range_m, attitude: *attitude, share: 1.0 });
     }
+    heads.retain(|_, head| !head.returns.is_empty());
     heads.values_mut().for_each(HeadScan::thin);
     heads.into_values().collect()
 }

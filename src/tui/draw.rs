@@ -216,18 +216,8 @@ impl Page {
         rows.to.set_stringn(1, middle, format!("{shape} {words} {shape}"), width, style);
         let indent = "  ";
         rows.to.set_stringn(1, middle + 1, format!("{indent}{action}"), width, style);
-        if large
-            && let Some(v_max_mps) =
-                shot.state.v_max_mps().filter(|_| self.late.is_none() && panels::is_now(shot))
-        {
-            panels::large_digits(
-                &format!("{v_max_mps:.2}"),
-                "m/s at most",
-                (area.width, top),
-                style,
-                self.ink,
-                rows.to,
-            );
+        if large && let Some(limit) = shot.state.speed_texts().limit.filter(|_| self.late.is_none()) {
+            panels::large_digits(&limit, "m/s at most", (area.width, top), style, self.ink, rows.to);
         }
         if let Some((words, is_alarm)) = &shot.recording {
             let lamp = if *is_alarm { Lamp::Red } else { Lamp::Amber };

@@ -1,10 +1,10 @@
 //! Draws the panels of the screen.
 
 use headrace_config::plain::one_line;
-use headrace_coverage::Verdict;
+use headrace_coverage::{Metres, Verdict};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
-use headrace_monitor::live_state::{Condition, Lamp, LiveMetres, PositionState, SensorState};
+use headrace_monitor::live_state::{Condition, Lamp, PositionState, SensorState};
 use headrace_monitor::pilot_text::station;
 use headrace_monitor::words::{NOT_INSPECTED, sensor_words as state_words, verdict_words};
 use ratatui::buffer::Buffer;
@@ -28,13 +28,15 @@ const LABEL: usize = 6;
 pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let is_known = is_now(shot);
-    let (speed_mps, v_max_mps) =
-        (state.speed_mps.filter(|_| is_known), state.v_max_mps().filter(|_| is_known));
-    let figure = |mps: Option<f64>| mps.map_or_else(|| "-.--".to_owned(), |mps| format!("{mps:.2}"));
-    let words = format!("SPEED  {} m/s (limit {})  ", figure(speed_mps), figure(v_max_mps));
+    let texts = state.speed_texts();
+    let speed = texts.speed.unwrap_or_else(|| "-.--".to_owned());
+    let back = if state.is_driving_back() { " back" } else { "" };
+    let limit = texts.limit.map_or_else(String::new, |limit| format!("(limit {limit})  "));
+    let words = format!("SPEED  {speed} m/s{back} {limit}");
+    let v_max_mps = state.v_max_mps().filter(|_| !limit.is_empty());
     let mut spans = vec![Span::styled(words.clone(), Style::default().add_modifier(Modifier::BOLD))];
     let columns = usize::from(rows.width()).saturating_sub(words.chars().count() + 2).min(60);
-    if let (Some(speed_mps), Some(v_max_mps)) = (speed_mps, v_max_mps)
+    if let (Some(speed_mps), Some(v_max_mps)) = (state.speed_mps, v_max_mps)
         && columns >= 10
     {
         // The bar ends at one and a half times v_max.
@@ -91,11 +93,13 @@ pub(super) fn is_now(shot: &ScreenFrame) -> bool {
 /// Draws the vehicle's position with its error, and the metres of wall by verdict.
 pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
-    let has_position = !matches!(state.position, PositionState::None(_));
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
     let mut spans =
         vec![Span::styled(format!("AT     {place}"), Style::default().add_modifier(Modifier::BOLD))];
     let pm = if ink.unicode { "±" } else { "+-" };
+    let along = state
+        .sd
+        .map_or_else(|| "error unknown".to_owned(), |sd| format!("{pm}{:.2} m (95 %)", 2.0 * sd.along_m));
     let (words, lamp) = match state.position {
         _ if !is_now(shot) => {
             let age =
@@ -104,21 +108,12 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
         }
         PositionState::None(_) => ("no position".to_owned(), Lamp::Red),
         PositionState::Doubtful(_) => {
-            (format!("doubtful: {pm}{:.2} m between passes", state.pass_sd_m), Lamp::Amber)
+            let between_m = state.target.error_m(state.pass_sd_m);
+            (format!("doubtful: {along}, {pm}{between_m:.2} m between passes"), Lamp::Amber)
         }
-        PositionState::Ok => (format!("ok: {pm}{:.2} m between passes", state.pass_sd_m), Lamp::Green),
+        PositionState::Ok => (format!("ok: {along}"), Lamp::Green),
     };
     spans.push(Span::styled(format!("  {} {words}", ink.shape(lamp)), ink.style(lamp)));
-    if let Some(sd) = state.sd.filter(|_| has_position) {
-        let errors = format!("  {pm}{:.2} m along, {pm}{:.2} across", sd.along_m, sd.place_m);
-        let used: usize = spans.iter().map(Span::width).sum();
-        // The errors are shown in full or not at all.
-        spans.extend(
-            Some(errors)
-                .filter(|text| used + text.chars().count() <= usize::from(rows.width()))
-                .map(Span::raw),
-        );
-    }
     rows.line(Line::from(spans));
     let style = if state.metres.fail_m > 0.0 { ink.style(Lamp::Red) } else { Style::default() };
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
@@ -126,8 +121,8 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
 
 /// Text with the metres by verdict: failed, unsure and uninspected metres first. Dots stand for omitted
 /// figures.
-fn metres_text(metres: &LiveMetres, columns: usize) -> String {
-    let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
+fn metres_text(metres: &Metres, columns: usize) -> String {
+    let Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let missed = verdict_words(Verdict::Fail).to_uppercase();
     let all = [
         (fail_m, missed.as_str()),

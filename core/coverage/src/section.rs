@@ -303,7 +303,7 @@ impl Section {
 }
 
 /// Metres of tunnel by verdict. Each metre is counted once.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Metres {
     /// Metres that have passed.
     pub pass_m: f64,
@@ -320,6 +320,11 @@ pub struct Metres {
 }
 
 impl Metres {
+    /// Length of all metres together, m.
+    pub fn way_m(&self) -> f64 {
+        self.pass_m + self.fail_m + self.cannot_say_m + self.open_m + self.not_inspected_m
+    }
+
     /// Adds metres of tunnel with a verdict.
     pub fn add(&mut self, verdict: Verdict, metres_m: f64) {
         *match verdict {

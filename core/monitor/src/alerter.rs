@@ -5,14 +5,16 @@ use super::adviser::Advised;
 use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};
 use super::console::command::Command;
 use super::console::packets::ReceivedCommand;
-use super::live_state::{LiveMetres, LiveState, PositionDoubt, PositionState, source_bits};
+use super::live_state::{LiveState, PositionDoubt, PositionState, source_bits};
 use super::merge::MAX_TICK_PACKETS;
 use super::messages::{Doubts, Event, Notice, PlacedItem, Placement, Standing, Update};
 use super::notes::{Note, Notes, Spoken};
 use super::observations::Observations;
 use super::placer::Placed;
+use super::resources::Coverage;
 use super::result_stream::{RecordKind, ResultStream};
 use super::surveyor::Found;
+use headrace_coverage::Metres;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful as _};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::advice::Advice;
@@ -102,6 +104,12 @@ impl Alerter {
         }
     }
 
+    /// Brings the metres by verdict up to date after the last judgement of a dive.
+    pub(super) fn take_metres_at_end(&mut self, coverage: &Coverage) {
+        self.state.metres = coverage.metres();
+        self.state.missed_from_m = coverage.sections.missed_from_m();
+    }
+
     /// Applies the observations after the last judgement of a dive.
     pub(super) fn take_observations_at_end(&mut self, observations: &Observations, at: MonoNs) {
         self.notices.clear();
@@ -129,8 +137,10 @@ impl Alerter {
             pass_sd_m: situation.pass_error_m,
             stand_s: doubts.stand_s,
             speed_mps: situation.pose.map(|_| situation.speed_mps),
+            last_band: self.state.speed_band(),
             advice: Some(*advice),
             metres: standing.metres,
+            missed_from_m: standing.missed_from_m,
             unsure: standing.unsure,
             passed: standing.passed,
             back_to_m: standing.back_to_m,
@@ -140,6 +150,9 @@ impl Alerter {
             deaf: source_bits(self.heads.iter().copied(), situation.deaf),
             ..self.state
         };
+        if self.state.position == PositionState::Ok {
+            self.state.sure_v_max_mps = self.state.v_max_mps();
+        }
         digest(&mut self.states, *at, situation, &self.state);
         let as_of = LiveState { now: *at, ..self.state };
         let Doubts { setting, unverified_mounts, .. } = *doubts;
@@ -174,7 +187,7 @@ impl Alerter {
 }
 
 fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &LiveState) {
-    let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = state.metres;
+    let Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = state.metres;
     let (why, from, to) = state.unsure.map_or((u64::MAX, 0, 0), |of| (of.why as u64, of.from, of.to));
     let advice = state.advice.as_ref();
     stream
@@ -302,6 +315,10 @@ impl Alerter {
             }
             Command::Recording { fails } => {
                 self.list.set_recording(fails, at, &mut to);
+                true
+            }
+            Command::Stalled { seconds } => {
+                self.list.set_stalled(seconds, at, &mut to);
                 true
             }
             Command::Limits { battery_pct } => {

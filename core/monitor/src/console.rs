@@ -26,7 +26,11 @@ pub use text::ShortText;
 pub use headrace_vehicle::CONSOLE_ID;
 /// Maximum number of commands that wait for the loop.
 const MOST_WAITING: usize = 256;
-/// Interval of [`Command::Time`] while no sensor delivers data. The commands let the loop notice stale data.
+/// Least time between two calls of a live loop that counts as a stall of the computer.
+const STALL: DurNs = DurNs(500_000_000);
+/// Longest duration that [`Command::Stalled`] states, seconds.
+const MAX_STALL_S: u32 = 60;
+/// Interval of [`Command::Time`] while no sensor delivers readings. The commands let the loop notice stale data.
 const TIME_EVERY: DurNs = DurNs(500_000_000);
 
 /// Reason for refusing a command at the console.
@@ -85,6 +89,8 @@ pub struct ConsoleInput {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     port: Port,
     time_told: MonoNs,
+    /// Time of the last call of a live dive's loop.
+    called: Option<MonoNs>,
 }
 
 impl ConsoleInput {
@@ -94,7 +100,7 @@ impl ConsoleInput {
     pub fn new(dive: &mut Loop, clock: Option<Arc<DiveClock>>) -> Option<(Self, ConsolePort)> {
         let port = dive.take_console()?;
         let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
-        let input = Self { waiting: Arc::clone(&waiting), port, time_told: MonoNs(0) };
+        let input = Self { waiting: Arc::clone(&waiting), port, time_told: MonoNs(0), called: None };
         Some((input, ConsolePort { waiting, clock, notes: Arc::default() }))
     }
 
@@ -106,12 +112,20 @@ impl ConsoleInput {
         }
     }
 
-    /// Moves waiting commands into the ring of a live dive. While no sensor delivers data, also sends the
-    /// time to the loop.
+    /// Moves waiting commands into the ring of a live dive. While no sensor delivers readings, also sends the
+    /// time to the loop. It is called many times per second; a long time between two calls was a stall of the computer.
     pub fn take_in_live(&mut self, dive: &Loop, now: MonoNs) {
         self.take_in(now);
-        let Some((_, last)) = dive.view().span() else { return };
-        let since = now.since(last.max(self.time_told));
+        let idle = self.called.replace(now).map_or(DurNs(0), |called| now.since(called));
+        if idle.0 >= STALL.0 && self.port.has_room(MAX_COMMAND_BYTES) {
+            let seconds = u32::try_from(idle.0 / 1_000_000_000 + 1).unwrap_or(MAX_STALL_S).min(MAX_STALL_S);
+            self.put(now, &Command::Stalled { seconds });
+        }
+        if self.time_told == MonoNs(0) {
+            self.time_told = now;
+        }
+        let last = dive.view().live_state().heard.iter().flatten().max();
+        let since = now.since(last.copied().unwrap_or(self.time_told).max(self.time_told));
         if since.0 >= TIME_EVERY.0 && self.port.has_room(MAX_COMMAND_BYTES) {
             self.time_told = now;
             self.put(now, &Command::Time);

@@ -6,13 +6,13 @@
 use serde::Serialize;
 
 use super::alert_list::{AlertChange, AlertState, Figures, ListedAlert, ListedAlertJson, NoteJson};
-use super::live_state::{LiveMetres, LiveState};
+use super::live_state::LiveState;
 use super::messages::Notice;
 use super::pilot_text::Missed;
 use super::run::Loop;
 pub use super::unsure_stretch::UnsureStretch;
 use headrace_coverage::{
-    Cause, Causes, Evidence, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict,
+    Cause, Causes, Evidence, Metres, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict,
 };
 use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::math::TAU;
@@ -86,7 +86,7 @@ pub enum LiveMessage {
         /// End of the extent.
         to_m: f64,
         /// Metres of the extent by verdict.
-        metres: LiveMetres,
+        metres: Metres,
     },
 }
 

@@ -3,11 +3,11 @@
 use super::alert_list::{AlertChange, ListedAlertJson};
 use super::head_descriptions::HeadDescriptions;
 use super::live_messages::LiveMessage;
-use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt, SensorState};
+use super::live_state::{Condition, Lamp, LiveState, PositionDoubt, SensorState};
 use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, clock_text, station};
 pub use super::unsure_stretch::{helps_text, unsure_text};
 use super::words::{NOT_INSPECTED, STAND_STILL, STARTING, condition_words, sensor_words, verdict_words};
-use headrace_coverage::Verdict;
+use headrace_coverage::{Metres, Verdict};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
@@ -105,10 +105,8 @@ pub fn status_line(
 ) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
-    // If the speed exceeds the limit by less than the measurement error, the condition is `Good`.
-    let is_over = matches!(condition, Condition::TooFast | Condition::Over | Condition::TurnUnsure);
-    let decimals = if is_over { speed_decimals(state.speed_mps, state.v_max_mps()) } else { 2 };
-    let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
+    let texts = state.speed_texts();
+    let v_max = texts.limit.map_or_else(String::new, |limit| format!("{limit} m/s"));
     let what = condition_text(condition, state, &v_max, (profile, heads));
     let action = match condition {
         _ if state.asks_to_stand() => format!("{STAND_STILL} {} s", state.stand_s),
@@ -117,18 +115,13 @@ pub fn status_line(
         _ => condition_words(condition).action_text(&v_max),
     };
     let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
-    let speed = match state.speed_mps {
-        // A speed of zero gets no minus sign.
-        Some(speed_mps) if !is_old => {
-            format!("{:.decimals$} m/s", if speed_mps.abs() < 0.005 { 0.0 } else { speed_mps })
-        }
-        _ => String::new(),
-    };
+    let is_back = state.is_driving_back();
+    let speed = texts.speed.map_or_else(String::new, |speed| {
+        if is_back { format!("{speed} m/s back") } else { format!("{speed} m/s") }
+    });
     let mut parts = vec![what];
     // Failed metres come first, since a narrow screen leaves out the last parts.
-    if state.metres.fail_m > 0.0 {
-        parts.push(format!("{} {:.2} m", verdict_words(Verdict::Fail), state.metres.fail_m));
-    }
+    parts.extend(state.outstanding_text());
     if !is_old {
         let silent: Vec<usize> = state.silent().collect();
         match silent.as_slice() {
@@ -170,7 +163,7 @@ fn condition_text(
             format!("{}: the tunnel {which} at {}", words.name, station(end_m))
         }
         Condition::Passed => words.name.to_owned(),
-        Condition::GoingBack(to_m) => format!("{} to {}", words.name, station(to_m)),
+        Condition::GoingBack(to_m) => format!("{} to {}: {}", words.name, station(to_m), words.detail),
         Condition::NoSpeed => no_speed_text(state, profile, heads),
         Condition::TurnFails | Condition::TurnUnsure => turn_text(words.name, state),
         Condition::CannotSay(PositionDoubt::Spread) => {
@@ -184,17 +177,6 @@ fn condition_text(
         | Condition::CannotSay(PositionDoubt::Cable)
         | Condition::Over => words.text(),
     }
-}
-
-/// Number of decimals needed to tell the present speed from the limit.
-///
-/// A speed that reads like the limit would not seem too fast.
-fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
-    let hundredths = |mps: f64| (mps * 100.0).round();
-    let is_over = |(speed_mps, v_max_mps): (f64, f64)| {
-        speed_mps > v_max_mps && (hundredths(speed_mps) - hundredths(v_max_mps)).abs() < 0.5
-    };
-    if speed_mps.zip(v_max_mps).is_some_and(is_over) { 3 } else { 2 }
 }
 
 fn age_text(age: DurNs) -> String {
@@ -235,8 +217,8 @@ fn forecast_text(state: &LiveState) -> Option<String> {
 }
 
 /// Metres of the coverage extent by verdict, without zeros.
-pub fn metres_text(metres: &LiveMetres) -> String {
-    let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
+pub fn metres_text(metres: &Metres) -> String {
+    let Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [
         (fail_m, verdict_words(Verdict::Fail)),
         (cannot_say_m, verdict_words(Verdict::CannotSay)),

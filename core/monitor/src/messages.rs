@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::advice_log::AdviceEntry;
 use super::notes::Note;
 use crate::alert_list::alert::{AlertChange, ListedAlert};
-use crate::live_state::state::{ActiveObservations, LiveMetres};
-use headrace_coverage::{Judgement, Loss, Reach, RunChange, RunId, Stretch};
+use crate::live_state::state::ActiveObservations;
+use headrace_coverage::{Judgement, Loss, Metres, Reach, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_fusion::filter::setting_check::SettingDoubt;
@@ -148,7 +148,9 @@ pub struct PlacedItem {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
     /// Metres of the coverage extent by verdict.
-    pub metres: LiveMetres,
+    pub metres: Metres,
+    /// Chainage at which the first missed stretch begins, m; `None` if no stretch is missed.
+    pub missed_from_m: Option<f64>,
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
     /// Whether every part of the wall visible to the heads here has the verdict pass.

@@ -27,6 +27,29 @@ pub fn station(chainage_m: f64) -> String {
     format!("{sign}{kilometres:.0}+{metres:06.2}")
 }
 
+/// Number of decimals of a speed, and steps per m/s: hundredths, or thousandths below 0.1 m/s.
+pub(crate) fn speed_steps(limit_mps: f64) -> (usize, f64) {
+    if limit_mps < 0.1 { (3, 1000.0) } else { (2, 100.0) }
+}
+
+/// Speed limit in whole steps, rounded down.
+pub(crate) fn limit_steps(limit_mps: f64, steps_per_mps: f64) -> f64 {
+    // Without the small addition, 0.29 m/s would become 28 steps.
+    (limit_mps * steps_per_mps + 1e-6).floor()
+}
+
+/// Speed limit with its unit, rounded down, so that a pilot who drives at the stated speed stays within it.
+pub fn limit_text(limit_mps: f64) -> String {
+    let (decimals, steps) = speed_steps(limit_mps);
+    format!("{:.decimals$} m/s", limit_steps(limit_mps, steps) / steps)
+}
+
+/// Measured speed with its unit, with as many decimals as a limit of that size.
+pub(super) fn measured_speed_text(mps: f64) -> String {
+    let (decimals, _) = speed_steps(mps);
+    format!("{mps:.decimals$} m/s")
+}
+
 /// Clock position of an arc length, in words: "3 o'clock", or "3:30" between two hours.
 pub fn clock_text(profile: &Profile, arc_m: f64) -> String {
     let clock = profile.clock(arc_m);
@@ -136,7 +159,7 @@ pub fn cause_text(figures: &CauseFigures, heads: &HeadDescriptions) -> String {
 
 fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions) -> String {
     match cause {
-        Cause::TooFast => format!("too fast ({:.2} m/s)", figures.speed_mps),
+        Cause::TooFast => format!("too fast ({})", measured_speed_text(figures.speed_mps)),
         Cause::AngularStep => format!("steps of {:.2} m along the wall", figures.t_y_m),
         Cause::MissingReturns => format!("{:.0} % of returns missing", figures.missing_share * 100.0),
         Cause::OutOfRange => "wall out of range".to_owned(),
@@ -147,7 +170,7 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions
         Cause::OffAxis => format!("off-centre (steps of {:.2} m along the wall)", figures.t_y_m),
         Cause::HeadStalled => "a head stopped turning".to_owned(),
         Cause::HeadSilent => heads.silent(figures.silent_heads),
-        Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
+        Cause::Phase => format!("heads out of phase ({})", measured_speed_text(figures.speed_mps)),
         Cause::PositionLost => "position lost".to_owned(),
         Cause::NotPassed => "not passed on both sides".to_owned(),
         Cause::Unknown => "cause unknown".to_owned(),
@@ -217,7 +240,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         // The exact speed is stated, because below it heads at different places along the hull are out of
         // phase again.
         Action::InPhase if at_most_mps > 0.0 => {
-            return format!("{back}, then with the heads in phase, at {at_most_mps:.2} m/s");
+            return format!("{back}, then with the heads in phase, at {}", limit_text(at_most_mps));
         }
         Action::InPhase => format!("{back}, then with the heads in phase,"),
         Action::Head => format!("{back}, then with that head repaired,"),
@@ -226,7 +249,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         Action::Again => format!("{back}, then drive right through it,"),
     };
     if at_most_mps > 0.0 {
-        format!("{text} at most {at_most_mps:.2} m/s")
+        format!("{text} at most {}", limit_text(at_most_mps))
     } else {
         text.trim_end_matches(',').to_owned()
     }
@@ -263,13 +286,14 @@ pub fn gain_text(advice: &Advice, heads: &HeadDescriptions) -> Option<String> {
     let others = advice.alternatives.iter().flatten();
     let best = others.max_by(|one, other| one.v_max_mps.total_cmp(&other.v_max_mps))?;
     let gains = best.v_max_mps > GAIN * advice.v_max_mps && best.v_max_mps > 0.0;
-    gains
-        .then(|| format!("set the heads to {}: {:.2} m/s", best.mode.as_str().to_uppercase(), best.v_max_mps))
+    gains.then(|| {
+        format!("set the heads to {}: {}", best.mode.as_str().to_uppercase(), limit_text(best.v_max_mps))
+    })
 }
 
 /// Text of a speed to keep; empty if there is none.
 pub(super) fn speed_text(what: &str, mps: f64) -> String {
-    if mps > 0.0 { format!("{what} {mps:.2} m/s") } else { String::new() }
+    if mps > 0.0 { format!("{what} {}", limit_text(mps)) } else { String::new() }
 }
 
 /// Minimum ratio of a faster mode's speed to the present v_max for the mode to be displayed.
@@ -423,13 +447,13 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadDescri
     match advice.reason {
         Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => no_speed.detail.to_owned(),
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {
-            format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps)
+            format!("TOO FAST: at most {}", limit_text(advice.v_max_mps))
         }
         Reason::HelixPitch if advice.will_exceed => {
             let error_deg = advice.phase_error_rad.to_degrees().abs();
-            format!("OUT OF PHASE by {error_deg:.0} degrees: go {:.2} m/s", advice.v_max_mps)
+            format!("OUT OF PHASE by {error_deg:.0} degrees: go {}", limit_text(advice.v_max_mps))
         }
-        Reason::HelixPitch => format!("may go {:.2} m/s ({limit})", advice.v_max_mps),
+        Reason::HelixPitch => format!("may go {} ({limit})", limit_text(advice.v_max_mps)),
         Reason::AngularStep => {
             let more_seen =
                 heads.seeing_more().filter(|_| advice.remedy.is_none() && advice.unseen_m.is_some());
@@ -453,6 +477,14 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadDescri
 mod tests {
     use super::*;
     use crate::head_descriptions::tests::two;
+
+    #[test]
+    fn speed_limit_is_rounded_down_to_two_digits() {
+        let limits = [0.0049, 0.0184, 0.0939, 0.0994, 0.0996, 0.1, 0.29, 0.297, 1.1449];
+        let texts = limits.map(limit_text);
+        let expected = ["0.004", "0.018", "0.093", "0.099", "0.099", "0.10", "0.29", "0.29", "1.14"];
+        assert_eq!(texts, expected.map(|text| format!("{text} m/s")));
+    }
 
     #[test]
     fn stationing_has_kilometres_and_metres() {

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
 use headrace_coverage::{
-    Frontier, HoleFinder, MissingSamples, OtherSettings, Reach, SampleStore, Sections, Soundings, Stretch,
-    WallLimits,
+    Frontier, HoleFinder, Metres, MissingSamples, OtherSettings, Reach, SampleStore, Sections, Soundings,
+    Stretch, WallLimits,
 };
 use headrace_fusion::NoFix;
 use headrace_geometry::frames::{Mount, Pose, Vec3};
@@ -82,6 +82,13 @@ pub struct Coverage {
     pub unsure: Option<Stretch>,
     /// Most recent missing samples: points where a sample was expected but not obtained.
     pub lacks: MissingSamples,
+}
+
+impl Coverage {
+    /// Metres of the coverage extent by verdict.
+    pub fn metres(&self) -> Metres {
+        self.sections.metres(self.frontier.way())
+    }
 }
 
 stateful!(Coverage { state: store, sections, frontier, soundings, unsure, lacks; });

@@ -291,6 +291,7 @@ impl Loop {
                 hear(notice, self);
             }
         }
+        self.alerter.take_metres_at_end(self.surveyor.coverage());
         self.list_last_observations(hear);
     }
 

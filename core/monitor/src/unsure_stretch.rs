@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use crate::pilot_text::limit_text;
 use headrace_coverage::{Driven, Sections, Stretch, Unsure};
 
 /// A stretch that neither passes nor fails.
@@ -82,11 +83,11 @@ pub fn helps_text(stretch: &UnsureStretch) -> String {
             } else if is_short {
                 "pass it again slower, or with the silent head restored".to_owned()
             } else if fits_mps > 0.0 && speed_mps > most_mps {
-                format!("at most {fits_mps:.2} m/s, or {surer}")
+                format!("at most {}, or {surer}", limit_text(fits_mps))
             } else if speed_mps > 0.0 && speed_mps < least_mps && is_uneven {
                 // Below this speed, heads at different places along the hull are out of phase with each
                 // other.
-                format!("at {fits_mps:.2} m/s, or {surer}")
+                format!("at {}, or {surer}", limit_text(fits_mps))
             } else {
                 surer.to_owned()
             };

@@ -55,7 +55,7 @@ pub fn condition_words(condition: Condition) -> ConditionWords {
         Condition::Outside(_) => ["OUTSIDE", "no head is within the tunnel", "", ""],
         Condition::NoSonar => ["NO SONAR", "no returns", "stop", ""],
         Condition::Passed => ["passed here", "any speed will do", "", ""],
-        Condition::GoingBack(_) => ["going back", "to a missed section: any speed will do", "", ""],
+        Condition::GoingBack(_) => ["going back", "at any speed", "", ""],
         Condition::NoSpeed => ["slower won't help", "no speed meets the target here", "", ""],
         Condition::TooFast => ["TOO FAST", "", "", "at most"],
         // Below v_max, heads at different places along the hull can be out of phase and miss wall. Going

@@ -38,6 +38,8 @@ const SECTIONS_AT_ONCE: usize = 4096;
 const EVERY: DurNs = DurNs(200_000_000);
 /// Averaging window for the sensors' rates of readings.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
+/// Least change of the length of the way back that is sent, m.
+const WAY_STEP_M: f64 = 0.5;
 /// Minimum interval between two lists of missed stretches to go back to.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
 
@@ -84,7 +86,10 @@ pub struct Collector {
     skips: bool,
     back_due: bool,
     notes_due: bool,
-    back_told: Option<(MonoNs, Value)>,
+    /// The last list of missed stretches that was sent, with its time and the length of the way.
+    back_told: Option<(MonoNs, f64, Value)>,
+    /// Depth by the last reading of the pressure sensor, m.
+    depth_m: Option<f64>,
     recording: RecordingJson,
     playback: Option<PlaybackState>,
     compared: Option<Compared>,
@@ -127,6 +132,7 @@ impl Collector {
             back_due: false,
             notes_due: false,
             back_told: None,
+            depth_m: None,
             recording: RecordingJson {
                 on: recorded_to.is_some(),
                 fails: false,
@@ -231,6 +237,7 @@ impl Collector {
             compared.forget();
         }
         self.sensors.iter_mut().for_each(|sensor| sensor.ping = None);
+        self.depth_m = None;
         self.samples.clear();
         self.told.clear();
         self.played = Some(now);
@@ -261,10 +268,16 @@ impl Collector {
     fn gather(&mut self, dive: &Loop) {
         self.begun = self.begun.or_else(|| dive.view().span().map(|(first, _)| first));
         for event in dive.view().readings() {
-            if let Reading::Echo(echo) = &event.reading
-                && let Some(sensor) = self.sensors.get_mut(event.source.index())
-            {
-                sensor.ping = Some(Ping { at: event.received, range_m: echo.range_m });
+            match &event.reading {
+                Reading::Echo(echo) => {
+                    if let Some(sensor) = self.sensors.get_mut(event.source.index()) {
+                        sensor.ping = Some(Ping { at: event.received, range_m: echo.range_m });
+                    }
+                }
+                Reading::Pressure(water) => {
+                    self.depth_m = Some(rounded(dive.mission().site.depth_m(water.pressure_pa), 1e2));
+                }
+                _ => {}
             }
         }
         self.samples_of(dive);
@@ -461,6 +474,8 @@ impl Collector {
         let compared = self.compared.as_ref().map(Compared::json);
         Beside {
             pose,
+            begun_s: self.begun.map(MonoNs::as_secs_f64),
+            depth_m: self.depth_m,
             echosounders,
             rates: rates.collect(),
             recording: self.recording.clone(),
@@ -473,9 +488,11 @@ impl Collector {
     /// and is due.
     fn back(&mut self, dive: &Loop) -> Option<Value> {
         let now = dive.now();
-        let waits =
-            self.back_told.as_ref().is_some_and(|(told, _)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
-        if !self.back_due || waits {
+        let told = self.back_told.as_ref();
+        let waits = told.is_some_and(|(told, ..)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
+        // Even without new stretches, the way changes with the vehicle's place.
+        let has_legs = told.is_some_and(|(.., legs)| legs.as_array().is_some_and(|legs| !legs.is_empty()));
+        if waits || !self.back_due && !has_legs {
             return None;
         }
         self.back_due = false;
@@ -491,10 +508,16 @@ impl Collector {
             let at_most_mps = (leg.at_most_mps > 0.0).then_some(leg.at_most_mps);
             shown.push(json!({"from_m": leg.from_m, "to_m": leg.to_m, "at_most_mps": at_most_mps, "why": why.join(", ")}));
         }
-        let back = json!({"type": "back", "legs": shown, "way_m": rounded(way_m, 100.0), "time_s": time_s.map(|s| rounded(s, 10.0))});
-        let is_new = self.back_told.as_ref().is_none_or(|(_, told)| told.get("legs") != back.get("legs"));
-        self.back_told = Some((now, back.clone()));
-        is_new.then_some(back)
+        let legs = Value::from(shown);
+        let is_old =
+            |(_, told_m, told): &(MonoNs, f64, Value)| *told == legs && (told_m - way_m).abs() < WAY_STEP_M;
+        if self.back_told.as_ref().is_some_and(is_old) {
+            return None;
+        }
+        let time_s = time_s.map(|s| rounded(s, 10.0));
+        let back = json!({"type": "back", "legs": legs, "way_m": rounded(way_m, 100.0), "time_s": time_s});
+        self.back_told = Some((now, way_m, legs));
+        Some(back)
     }
 }
 

@@ -57,6 +57,10 @@ pub struct News {
 pub struct Beside {
     /// Pose of the vehicle in the cross-section.
     pub pose: Option<PoseJson>,
+    /// Time at which the dive began, seconds on the log's clock; `None` while unknown.
+    pub begun_s: Option<f64>,
+    /// Depth below the water level by the last reading of the pressure sensor, m; `None` without one.
+    pub depth_m: Option<f64>,
     /// Last pings of the echosounders.
     pub echosounders: Vec<EchoJson>,
     /// Rate of readings of each sensor.

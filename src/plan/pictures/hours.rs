@@ -7,12 +7,11 @@ use headrace_pictures::look::{self, Colour, Look};
 use headrace_pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 
+use super::advised;
 use super::modes::{self, Mode};
 use super::shown::Shown;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
-/// Ratio of successive speeds along a curve.
-const FASTER: f64 = 1.02;
 /// Number of values of T at which the fastest mode is determined.
 const LEAST: u32 = 300;
 /// Style of the band under the mode that takes the least time.
@@ -36,7 +35,7 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let chart = Chart::new(&canvas, FRAME, &x, &Axis::new("hours, one way", 0.0, most[1], 9));
     let words = modes::blind_words(&modes);
     if modes.iter().any(|mode| !mode.blind) {
-        curves(&chart, shown, &modes, &sought, most)?;
+        curves(&chart, shown, &modes, &sought, most[0]);
     }
     if !words.is_empty() {
         chart.instead(&words);
@@ -45,24 +44,17 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
 }
 
 /// Draws all curves and marks, if any mode gives a finite spacing T.
-fn curves(
-    chart: &Chart<'_>,
-    shown: &Shown<'_>,
-    modes: &[Mode],
-    sought: &Sought,
-    most: [f64; 2],
-) -> Result<(), SamplingError> {
-    chart.line(&least(shown, modes, most[0]), &BAND);
+fn curves(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought, most_m: f64) {
+    chart.line(&least(shown, modes, most_m), &BAND);
     legend(chart);
     let mut right: Vec<Label> = asked(chart, shown, sought).into_iter().collect();
     for mode in modes.iter().filter(|mode| !mode.blind) {
-        let pieces = chart.line(&curve(shown, mode, most)?, &mode.look);
+        let pieces = chart.line(&curve(shown, mode, most_m, sought.t_m), &mode.look);
         let end = pieces.last().and_then(|piece| piece.last()).copied();
         right.push(label(chart, mode, end, sought.hours.get(mode.number).copied().flatten()));
     }
     labels::at_right(chart.canvas, &FRAME, &right);
     marks(chart, shown, modes, sought);
-    Ok(())
 }
 
 /// The spacing T that the chart marks: the target, or else T at the requested speed.
@@ -103,21 +95,11 @@ fn legend(chart: &Chart<'_>) {
     chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL);
 }
 
-fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, SamplingError> {
-    /// Number of points of a curve. It is enough for the speed to increase a thousandfold.
-    const POINTS: u32 = 400;
+/// A mode's curve: the spacing T, m, and the hours for the whole length at the largest speed that meets it.
+pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64, marked_m: f64) -> Vec<[f64; 2]> {
     let length_m = shown.planner.inspection().length_m;
-    let mut v_mps = length_m / (1.02 * most_h * 3600.0);
-    let mut points = Vec::new();
-    for _ in 0..POINTS {
-        let t_m = shown.planner.t_max_m(mode.number, v_mps)?;
-        points.push([t_m, length_m / v_mps / 3600.0]);
-        if t_m > most_m {
-            break;
-        }
-        v_mps *= FASTER;
-    }
-    Ok(points)
+    let points = advised::curve(shown.planner, mode.number, most_m, Some(marked_m));
+    points.into_iter().map(|[t_m, v_mps]| [t_m, length_m / v_mps / 3600.0]).collect()
 }
 
 /// Fewest hours of any mode for each spacing T.

@@ -3,6 +3,7 @@
 //! They show the spacing around the wall, the pattern on the wall, the sample spacing T against speed, and the
 //! hours of a dive against T.
 
+mod advised;
 mod detail;
 mod hours;
 mod laid;

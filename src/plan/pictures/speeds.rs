@@ -7,11 +7,12 @@ use headrace_pictures::look;
 use headrace_pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 
+use super::advised;
 use super::modes::{self, Mode};
 use super::shown::Shown;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
-/// Number of speeds at which the spacing T is computed.
+/// Number of speeds at which the spacing T is computed for the range of its axis.
 const SPEEDS: u32 = 400;
 
 /// Draws the spacing T against speed for every mode, with the target and the requested speed.
@@ -19,7 +20,7 @@ pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let most_mps = most_mps(shown, &modes);
     let curves = modes.iter().filter(|mode| !mode.blind);
-    let curves = curves.map(|mode| Ok((mode, curve(shown, mode, most_mps)?)));
+    let curves = curves.map(|mode| Ok((mode, spacings(shown, mode, most_mps)?)));
     let curves = curves.collect::<Result<Vec<_>, SamplingError>>()?;
     let most_m = most_m(shown, &curves);
     let canvas = Canvas::new("T against speed: how fast each mode may go", &shown.subtitle());
@@ -31,8 +32,8 @@ pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     }
     let asked = asked(&chart, shown);
     let mut ends = Ends::default();
-    for (mode, points) in &curves {
-        ends.add(&chart, shown, mode, points);
+    for (mode, _) in &curves {
+        ends.add(&chart, shown, mode, &curve(shown, mode, most_m));
     }
     marks(&chart, shown, &modes);
     ends.draw(&canvas, shown.question.target_m.is_some());
@@ -75,9 +76,16 @@ fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     curves.iter().flat_map(|(_, points)| points).map(|[_, t_m]| *t_m).fold(0.0, f64::max)
 }
 
-fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>, SamplingError> {
+/// A mode's curve: the largest speed that meets a spacing T, m/s, and this T, m.
+pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64) -> Vec<[f64; 2]> {
+    let points = advised::curve(shown.planner, mode.number, most_m, shown.question.target_m);
+    points.into_iter().map(|[t_m, v_mps]| [v_mps, t_m]).collect()
+}
+
+/// The spacing T without position errors at each speed of the axis: speed, m/s, and T, m.
+fn spacings(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>, SamplingError> {
     let point = |k: u32| {
-        // T is undefined at rest, so the curves begin at a very low speed.
+        // T is undefined at rest, so the first speed is very low.
         let v_mps = most_mps * f64::from(k).max(0.01) / f64::from(SPEEDS);
         Ok([v_mps, shown.planner.t_max_m(mode.number, v_mps)?])
     };

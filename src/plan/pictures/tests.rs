@@ -27,11 +27,15 @@ type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;
 const PICTURES: [(&str, Picture); 4] =
     [("perimeter", perimeter), ("pattern", pattern), ("speeds", speeds), ("hours", hours)];
 
-/// The inspection described by these arguments of `headrace plan`.
-fn inspection(arguments: &str) -> Inspection {
+/// The plan described by these arguments of `headrace plan`.
+fn case(arguments: &str) -> Case {
     let cli = Cli::try_parse_from(["headrace", "plan"].into_iter().chain(arguments.split(' '))).unwrap();
     let Command::Plan(plan) = cli.command else { panic!("{arguments}") };
-    Case::of(&plan).unwrap().inspection
+    Case::of(&plan).unwrap()
+}
+
+fn inspection(arguments: &str) -> Inspection {
+    case(arguments).inspection
 }
 
 /// A vehicle whose hull occludes its head's beams, either to the left or all around.
@@ -189,6 +193,50 @@ fn duration_chart_marks_the_best_mode_and_the_available_time() {
     );
     let day = Question { time_s: Some(20.0 * 3600.0), ..TARGET };
     says(&draw(inspection(VITA_2), FAST, 0.097, day, "hours"), &["required: 20.0 h", "20 h required"]);
+}
+
+/// Checks that the hours and speeds of the table are those of labels and curves, position errors included.
+fn compare(planner: &Planner, target_m: f64, title: &str) {
+    let question = Question { target_m: Some(target_m), ..Question::default() };
+    let answers = planner.answers(&question, None).unwrap();
+    let fastest = answers.iter().position(|answer| answer.best);
+    let (number, speed_mps) = fastest.map_or((0, 0.1), |k| (k, answers[k].v_max_mps.unwrap()));
+    let shown = Shown { planner, mode: number, speed_mps, question, title: title.to_owned() };
+    let (hours_svg, speeds_svg) = (hours(&shown).unwrap(), speeds(&shown).unwrap());
+    for (mode, answer) in modes::all(&shown).unwrap().iter().zip(&answers).filter(|(mode, _)| !mode.blind) {
+        let name = format!("{title}, target {target_m} m, {}", mode.name);
+        // The first curve has no point at the target, so the line between its points is compared.
+        let most_m = 2.2 * target_m;
+        let by_hours = hours::curve(&shown, mode, most_m, f64::INFINITY);
+        let by_speeds = speeds::curve(&shown, mode, most_m).into_iter().map(|[v_mps, t_m]| [t_m, v_mps]);
+        let drawn_h = advised::at(&by_hours, target_m);
+        let drawn_mps = advised::at(&by_speeds.collect::<Vec<_>>(), target_m);
+        let (Some(needed_h), Some(v_max_mps)) = (answer.needed_h, answer.v_max_mps) else {
+            assert_eq!((drawn_h, drawn_mps), (None, None), "{name}");
+            says(&hours_svg, &[&format!("{}: never", mode.name)]);
+            continue;
+        };
+        let (drawn_h, drawn_mps) = (drawn_h.unwrap(), drawn_mps.unwrap());
+        assert!((drawn_h / needed_h - 1.0).abs() < 0.01, "{name}: {drawn_h} h drawn, {needed_h} h needed");
+        assert!((drawn_mps / v_max_mps - 1.0).abs() < 0.01, "{name}: {drawn_mps} drawn, {v_max_mps} planned");
+        says(&hours_svg, &[&format!("{}: {} h", mode.name, modes::hours(needed_h))]);
+        says(&speeds_svg, &[&format!("{}: {} m/s", mode.name, modes::speed(v_max_mps))]);
+    }
+}
+
+#[test]
+fn labels_and_curves_agree_for_every_mode_of_the_shipped_vehicles() {
+    let files = std::fs::read_dir("deploy/vehicles").unwrap().map(|file| file.unwrap().path());
+    let mut vehicles = 0;
+    for file in files.filter(|file| file.extension().is_some_and(|name| name == "toml")) {
+        let Case { inspection, question, errors, .. } = case(&format!("--vehicle {}", file.display()));
+        let planner = Planner::new(inspection).unwrap().with_errors(errors);
+        for target_m in [question.target_m.unwrap(), 0.5] {
+            compare(&planner, target_m, &file.display().to_string());
+        }
+        vehicles += 1;
+    }
+    assert!(vehicles >= 7, "{vehicles} vehicles");
 }
 
 #[test]

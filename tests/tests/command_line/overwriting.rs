@@ -83,8 +83,9 @@ fn report_overwrites_only_reports() {
     }
     folder.write("other.json", "{\"version\": 1}");
     folder.record("dive.mcap", "live.mcap", &[]);
-    folder.write("other.toml", VEHICLE);
-    for there in ["other.toml", "other.json", "live.mcap"] {
+    std::fs::rename(folder.path("live.mcap"), folder.path("live.json")).unwrap();
+    folder.write("other", VEHICLE);
+    for there in ["other", "other.json", "live.json"] {
         refuses(&folder, &to(there), there);
         refuses(
             &folder,
@@ -95,11 +96,31 @@ fn report_overwrites_only_reports() {
     refuses(&folder, &["replay", "dive.mcap", "--expect", "other.json", "--bless"], "other.json");
     accepts(&folder, &[&to("other.json")[..], &["--force"]].concat(), "other.json");
     assert!(folder.read("other.json").starts_with(b"{\n  \"report_version\":"));
-    // Even with `--force`, a report can't replace a log.
-    let before = folder.read("dive.mcap");
-    let answer = folder.headrace(&[&to("dive.mcap")[..], &["--force"]].concat());
+    // Even with `--force`, a report can't replace its own log.
+    let before = folder.read("live.json");
+    let answer = folder.headrace(&["replay", "live.json", "--report", "live.json", "--force"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stderr);
-    assert_eq!(folder.read("dive.mcap"), before);
+    assert_eq!(folder.read("live.json"), before);
+}
+
+/// A name that promises another format is refused before anything is read: the log doesn't even exist.
+#[test]
+fn report_with_another_extension_is_refused_before_the_dive_is_read() {
+    let folder = Folder::with_dive();
+    for command in [&["replay", "none.mcap"][..], &["run", "none.toml", "--source", "none.mcap"]] {
+        for report in ["out.csv", "out.html", "out.json.txt", "folder/OUT.CSV"] {
+            let answer = folder.headrace(&[command, &["--report", report, "--force"]].concat());
+            assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{report}: {}", answer.stderr);
+            for words in [report, "--report", "must end in .json", "headrace campaign DIR"] {
+                assert!(answer.stderr.contains(words), "{report}: no {words:?} in {}", answer.stderr);
+            }
+            assert!(!folder.path(report).exists(), "{report}");
+        }
+    }
+    for report in ["out.json", "OUT.JSON", "out"] {
+        accepts(&folder, &["replay", "dive.mcap", "--report", report], report);
+        assert!(folder.read(report).starts_with(b"{\n  \"report_version\":"), "{report}");
+    }
 }
 
 #[test]
@@ -208,17 +229,20 @@ fn command_never_writes_its_own_input() {
     folder.record("dive.mcap", "live.mcap", &[]);
     folder.write("candump.log", "(1700000000.000000) can0 020#0001\n");
     let run = ["run", "vehicle.toml", "--source", "live.mcap", "--speed", "max"];
-    for further in [["--record", "vehicle.toml"], ["--record", "live.mcap"], ["--report", "./vehicle.toml"]] {
+    for further in [["--record", "vehicle.toml"], ["--record", "live.mcap"]] {
         never(&folder, &[&run[..], &further].concat());
     }
+    // A vehicle file may have any name, also that of a report.
+    folder.write("vehicle.json", VEHICLE);
+    never(&folder, &["run", "vehicle.json", "--source", "live.mcap", "--report", "./vehicle.json"]);
     let import = ["import", "candump.log", "--source", "imu=can0", "--vehicle", "vehicle.toml", "-o"];
     for command in [
         &["run", "vehicle.toml", "--record", "vehicle.toml"][..],
-        &["run", "vehicle.toml", "--report", "vehicle.toml"],
+        &["run", "vehicle.json", "--report", "vehicle.json"],
         &["simulate", "scene.toml", "-o", "scene.toml"],
         &["simulate", "scene.toml", "-o", "vehicle.toml"],
         &["simulate", "scene.toml", "-o", "new.mcap", "--truth", "scene.toml"],
-        &["replay", "live.mcap", "--vehicle", "vehicle.toml", "--report", "vehicle.toml"],
+        &["replay", "live.mcap", "--vehicle", "vehicle.json", "--report", "vehicle.json"],
         &["export", "live.mcap", "--vehicle", "vehicle.toml", "--html", "vehicle.toml"],
         &["trim", "live.mcap", "--chainage", "0..9", "--vehicle", "vehicle.toml", "-o", "vehicle.toml"],
         &[&import[..], &["vehicle.toml"]].concat(),
@@ -238,8 +262,12 @@ fn output_that_links_to_an_input_is_refused() {
     for (read, written) in
         [("hard.mcap", "dive.mcap"), ("soft.mcap", "dive.mcap"), ("dive.mcap", "soft.mcap")]
     {
-        never(&folder, &["replay", read, "--report", written]);
         never(&folder, &["recover", read, "-o", written]);
+    }
+    std::fs::hard_link(folder.path("dive.mcap"), folder.path("hard.json")).unwrap();
+    symlink("dive.mcap", folder.path("soft.json")).unwrap();
+    for written in ["hard.json", "soft.json"] {
+        never(&folder, &["replay", "dive.mcap", "--report", written]);
     }
     let golden = folder.headrace(&["replay", "dive.mcap", "--report", "golden.json"]);
     assert_eq!(golden.code, Some(0), "{}", golden.stderr);
@@ -254,20 +282,21 @@ fn output_that_links_to_an_input_is_refused() {
 #[test]
 fn two_outputs_of_a_command_must_differ() {
     let folder = Folder::with_dive();
-    let run = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", "x.mcap"];
-    let live = ["run", "vehicle.toml", "--for", "1", "--record", "x.mcap"];
+    // The recording has the name of a report, because a report may have no other.
+    let run = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", "x.json"];
+    let live = ["run", "vehicle.toml", "--for", "1", "--record", "x.json"];
     for run in [&run[..], &live] {
-        for report in ["x.mcap", "./x.mcap", "x.part002.mcap", "x.part001.mcap"] {
+        for report in ["x.json", "./x.json", "x.part002.json", "x.part001.json"] {
             for rotate in [&[][..], &["--rotate", "5s"]] {
                 let command = [run, &["--report", report], rotate].concat();
                 two_files(&folder, &command, &["--record", "--report", report]);
             }
         }
-        for second in ["x.mcap", "./x.mcap"] {
+        for second in ["x.json", "./x.json"] {
             two_files(&folder, &[run, &["--record", second]].concat(), &["--record", second, "given twice"]);
         }
-        let part = [run, &["--record", "x.part002.mcap"]].concat();
-        two_files(&folder, &part, &["--record x.mcap", "x.part002.mcap", "name of a part"]);
+        let part = [run, &["--record", "x.part002.json"]].concat();
+        two_files(&folder, &part, &["--record x.json", "x.part002.json", "name of a part"]);
     }
     let simulate = ["simulate", "scene.toml", "-o", "new.mcap", "--truth", "./new.mcap"];
     two_files(&folder, &simulate, &["-o new.mcap", "./new.mcap (--truth)"]);

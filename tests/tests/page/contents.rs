@@ -76,6 +76,10 @@ fn viewer_state_at_the_end_equals_the_report() {
     }
     let summary = &report["summary"];
     let of = |key: &str| summary[key].as_f64().unwrap();
+    for key in ["pass_m", "fail_m", "cannot_say_m", "not_inspected_m", "open_m"] {
+        let shown_m = viewer.state["metres"][key].as_f64().unwrap();
+        assert!((shown_m - of(key)).abs() < 1e-6, "{key} of the last state: {shown_m}, {summary}");
+    }
     for (shown_m, reported_m) in [
         (metres[1], of("pass_m")),
         (metres[2], of("fail_m")),
@@ -85,6 +89,50 @@ fn viewer_state_at_the_end_equals_the_report() {
     ] {
         assert!((shown_m - reported_m).abs() < 1e-6, "{metres:?}, {summary}");
     }
+}
+
+/// Data that a paused viewer has: metres by verdict, missed stretches, verdicts of the sections, and stretches to go back to.
+fn seen(viewer: &Viewer) -> Value {
+    let state = &viewer.state;
+    let verdicts: Vec<_> = viewer.sections.iter().map(|(index, section)| (index, section.verdict)).collect();
+    let back = viewer.others.iter().rfind(|told| told["type"] == "back").map(|back| back["legs"].clone());
+    json!({"now_s": state["now_s"], "metres": state["metres"], "outstanding": state["outstanding"],
+        "sections": verdicts, "legs": back.unwrap_or_else(|| json!([]))})
+}
+
+#[test]
+fn replay_begun_in_the_middle_shows_the_same_as_one_from_the_beginning() {
+    let folder = Folder::with_dive();
+    let targets = ["--target", "0.25"];
+    let (serving, mut whole) = replayed_with(&folder, &targets);
+    let [from_s, to_s] = span_s(&whole);
+    whole.send(&json!({"do": "play", "command": "pause"}));
+    drop(whole);
+    let mut missed = 0;
+    for part in 1..20 {
+        let at_s = f64::from(part) / 20.0 * (to_s - from_s);
+        let from = format!("{at_s}s");
+        let arguments =
+            [&["replay", "dive.mcap", ANY, "--speed", "1x", "--from", &from][..], &targets].concat();
+        let middle = Serving::start(&folder, &arguments);
+        let mut late = Viewer::connect(&middle, "", &[]).unwrap();
+        late.until_type("ready");
+        late.send(&json!({"do": "play", "command": "pause"}));
+        late.until("the pause", |viewer| viewer.state["playback"]["paused"] == true);
+        // A viewer that is never read would be dropped, so each comparison has a new one.
+        let mut whole = Viewer::connect(&serving, "", &[]).unwrap();
+        whole.until_type("ready");
+        whole.send(&json!({"do": "play", "command": "seek", "to_s": late.state["now_s"]}));
+        let now_s = late.state["now_s"].clone();
+        whole.until("the jump", |viewer| viewer.state["now_s"] == now_s);
+        assert_eq!(seen(&late), seen(&whole), "{at_s} s");
+        missed += usize::from(!late.state["outstanding"].is_null());
+        late.send(&json!({"do": "play", "command": "end"}));
+        middle.end();
+    }
+    assert!(missed > 2, "{missed} times with missed sections");
+    let mut last = Viewer::connect(&serving, "", &[]).unwrap();
+    end(serving, &mut last);
 }
 
 #[test]

@@ -162,6 +162,12 @@ impl Sections {
         &self.runs
     }
 
+    /// Returns the chainage at which the first missed stretch begins, m; `None` if no section is flagged.
+    pub fn missed_from_m(&self) -> Option<f64> {
+        let open = self.runs.all().iter().filter(|run| run.is_open());
+        open.map(|run| run.from).min().map(|from| self.bounds_m(from).0)
+    }
+
     /// Masks a declared opening in the sections that it overlaps.
     pub fn mask(&mut self, opening: &Opening, profile: &Profile) {
         for index in self.index_of(opening.from_m)..=self.index_of(opening.to_m) {

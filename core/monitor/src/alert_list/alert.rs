@@ -87,6 +87,8 @@ pub enum Figures {
     Deviation(Occurrences),
     /// A vehicle file setting that the measurements contradict.
     Setting(SettingDoubt, Occurrences),
+    /// Time for which the computer stalled, seconds.
+    Stalled(u32),
     /// Remaining cable (m), time (seconds) or battery charge (percent).
     Left(f64),
 }

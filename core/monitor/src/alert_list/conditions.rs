@@ -19,7 +19,7 @@ use headrace_sensor::reading::SourceId;
 /// Grace period after the first advice update. Data or positions that haven't arrived by its end count as
 /// missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
-/// Time for which the alert `CannotSay` stays active after its stretch without a verdict last grew.
+/// Time for which the alerts `CannotSay` and `ComputerStalled` stay active after their situation last occurred.
 const GROWS: DurNs = DurNs(10_000_000_000);
 /// Thresholds for the remaining cable, time and charge, percent, at which a warning, an alarm and an
 /// emergency alarm are raised.
@@ -74,22 +74,36 @@ impl AlertList {
         self.take_sensors(at, state, to);
         self.take_left(at, state, begun, to);
         self.take_recording(at, to);
+        self.take_stall(at, to);
     }
 
     /// Checks sensors and remaining resources while no sensor delivers data.
     ///
     /// `state` is the live state of the last advice update, with `now` set to `at`.
     pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
-        let Some(begun) = self.begun else { return };
+        let begun = *self.begun.get_or_insert(at);
         self.take_sensors(at, state, to);
         self.take_left(at, state, begun, to);
         self.take_recording(at, to);
+        self.take_stall(at, to);
     }
 
     /// Records whether a log recording fails.
     pub(crate) fn set_recording(&mut self, fails: bool, at: MonoNs, to: &mut Telling<'_>) {
         self.recording_fails = fails;
         self.take_recording(at, to);
+    }
+
+    /// Records that the computer stalled for some seconds until `at`.
+    pub(crate) fn set_stalled(&mut self, seconds: u32, at: MonoNs, to: &mut Telling<'_>) {
+        self.stalled = Some((at, seconds));
+        self.take_stall(at, to);
+    }
+
+    fn take_stall(&mut self, at: MonoNs, to: &mut Telling<'_>) {
+        let last = self.stalled.filter(|(ended, _)| at.since(*ended).0 <= GROWS.0);
+        let figures = last.map_or(Figures::None, |(_, seconds)| Figures::Stalled(seconds));
+        self.observe(at, &Seen::of(ListKind::ComputerStalled, last.is_some(), figures), to);
     }
 
     /// Records the charge of the vehicle's battery, percent.

@@ -84,11 +84,13 @@ pub enum ListKind {
     SensorHung,
     /// The ranges have not shown yet that all heads point along their mounts.
     MountsUnverified,
+    /// The program got no computing time, so data arrived late or were lost.
+    ComputerStalled,
 }
 
 impl ListKind {
     /// All kinds of alerts.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::Missed,
         Self::CannotSay,
         Self::TooFast,
@@ -114,6 +116,7 @@ impl ListKind {
         Self::SensorDeaf,
         Self::SensorHung,
         Self::MountsUnverified,
+        Self::ComputerStalled,
     ];
 
     /// Word used for the alert kind in JSON.
@@ -144,6 +147,7 @@ impl ListKind {
             Self::SensorDeaf => "sensor_deaf",
             Self::SensorHung => "sensor_hung",
             Self::MountsUnverified => "mounts_unverified",
+            Self::ComputerStalled => "computer_stalled",
         }
     }
 
@@ -161,7 +165,8 @@ impl ListKind {
             | Self::SensorHung
             | Self::HeadScattered
             | Self::HeadConstant
-            | Self::HeadOutvoted => AlertClass::Sensor,
+            | Self::HeadOutvoted
+            | Self::ComputerStalled => AlertClass::Sensor,
             Self::NotRecorded => AlertClass::Recording,
             Self::SettingDoubted
             | Self::MountsUnverified
@@ -188,6 +193,7 @@ impl ListKind {
             | Self::HeadConstant
             | Self::HeadOutvoted
             | Self::SettingDoubted
+            | Self::ComputerStalled
             | Self::CableLeft
             | Self::TimeLeft
             | Self::BatteryLeft => Priority::Warning,

@@ -58,6 +58,7 @@ impl Figures {
             Self::Advice(figures) => figures.speed_mps,
             Self::MissingRequirement(lacking) => f64::from(lacking as u8),
             Self::Error(figure, _) | Self::Left(figure) => figure,
+            Self::Stalled(seconds) => f64::from(seconds),
             Self::Deviation(occurrences) => occurrences.worst_m,
             Self::Setting(doubt, _) => doubt.setting.figure(),
         }

@@ -49,13 +49,15 @@ pub struct AlertList {
     /// Chainage of the vehicle at the last advice update, m.
     pub(super) x_m: Option<f64>,
     pub(super) recording_fails: bool,
+    /// End and duration (seconds) of the computer's last stall.
+    pub(super) stalled: Option<(MonoNs, u32)>,
     pub(super) battery_pct: Option<f64>,
     pub(super) timing: AlertTiming,
     pub(super) limits: LimitsConfig,
 }
 
 stateful!(AlertList {
-    state: raised, dropped, begun, had, v_max_mps, x_m, recording_fails, battery_pct;
+    state: raised, dropped, begun, had, v_max_mps, x_m, recording_fails, stalled, battery_pct;
     lists: alerts, by_run;
     slots: timers;
     fixed: timing, limits;
@@ -78,6 +80,7 @@ impl AlertList {
             v_max_mps: 0.0,
             x_m: None,
             recording_fails: false,
+            stalled: None,
             battery_pct: None,
             timing,
             limits,

@@ -266,6 +266,27 @@ fn only_existing_unacknowledged_alerts_are_acknowledged() {
     assert_eq!(bench.list.get(1).unwrap().acknowledged, Some(Acknowledgement { by: Who::cut("AB"), at }));
 }
 
+/// The alert names the duration, and ends ten seconds after the stall.
+#[test]
+fn stall_of_the_computer_is_listed_for_a_while() {
+    let mut bench = Bench::new(0.0, 0.0);
+    let at = |seconds: u64| MonoNs(seconds * 1_000_000_000);
+    let mut state = crate::live_state::test_state();
+    let mut active = |seconds: u64, stalled: Option<u32>| {
+        state.now = at(seconds);
+        let state = &state;
+        bench.with(|list, to| match stalled {
+            Some(duration) => list.set_stalled(duration, state.now, to),
+            None => list.time(state.now, state, to),
+        });
+        let found = bench.list.iter().find(|alert| alert.kind == ListKind::ComputerStalled);
+        found.filter(|alert| alert.state == AlertState::Active).map(|alert| alert.figures)
+    };
+    assert_eq!(active(3, None), None);
+    assert_eq!(active(5, Some(2)), Some(Figures::Stalled(2)));
+    assert_eq!((active(15, None), active(16, None)), (Some(Figures::Stalled(2)), None));
+}
+
 #[test]
 fn higher_priority_needs_a_new_acknowledgement() {
     let mut bench = Bench::new(0.0, 5.0);

@@ -6,8 +6,8 @@ use super::kind::ListKind;
 use crate::head_descriptions::HeadDescriptions;
 use crate::observations::{Occurrence, Occurrences};
 use crate::pilot_text::{
-    actions_text, advice_text, cause_text, clock_text, no_position_text, observation_text, setting_text,
-    speed_text, station,
+    actions_text, advice_text, cause_text, clock_text, measured_speed_text, no_position_text,
+    observation_text, setting_text, speed_text, station,
 };
 use crate::source::SourceInfo;
 use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
@@ -75,7 +75,7 @@ impl ListedAlert {
             }
             (ListKind::TooFast, Figures::Advice(figures)) => {
                 // The text omits the present speed, which every screen shows.
-                format!("TOO FAST: up to {:.2} m/s", figures.speed_mps.abs())
+                format!("TOO FAST: up to {}", measured_speed_text(figures.speed_mps.abs()))
             }
             (ListKind::TurnFails, Figures::Advice(figures)) => {
                 format!(
@@ -102,6 +102,9 @@ impl ListedAlert {
                 min if min < 0.0 => format!("{:.0} min over the dive's time", -min),
                 min => format!("{min:.0} min of the dive left"),
             },
+            (_, Figures::Stalled(seconds)) => {
+                format!("computer stalled for {seconds} s: data came late, or were lost")
+            }
             (_, Figures::Left(left_pct)) => format!("battery at {left_pct:.0} %"),
             (kind, Figures::None) => plain_text(kind, &name, &place),
         }
@@ -128,6 +131,9 @@ impl ListedAlert {
             }
             (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
             (ListKind::MountsUnverified, _) => "drive slowly and swing 5 degrees left and right".to_owned(),
+            (ListKind::ComputerStalled, _) => {
+                "hold a steady speed; close other programs on the computer".to_owned()
+            }
             (ListKind::NotRecorded, _) => "free disk space, or change the medium".to_owned(),
             (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
             _ => String::new(),

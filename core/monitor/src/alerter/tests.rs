@@ -31,7 +31,8 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
     let placement = Placement::Update(Update { at: AT, situation, doubts, fix, sd: None });
     let placed = Placed { items: vec![PlacedItem { event: 0, placement }], ..Placed::default() };
     let standing = Standing {
-        metres: LiveMetres::default(),
+        missed_from_m: None,
+        metres: Metres::default(),
         unsure: None,
         passed: false,
         back_to_m: None,

@@ -58,6 +58,11 @@ pub enum Command {
         /// Whether a log recording fails at present.
         fails: bool,
     },
+    /// Sent by the program: it got no computing time for a while.
+    Stalled {
+        /// Duration, rounded up to whole seconds, 1 to 60; a longer stall counts as 60 s.
+        seconds: u32,
+    },
     /// Sent by other equipment: remaining battery charge of the vehicle.
     Limits {
         /// Charge of the vehicle's battery, percent.
@@ -114,7 +119,11 @@ impl Command {
             Self::Silence { .. } => Self::Silence { by },
             Self::Note { .. } => Self::Note { text: NoteText::default(), by },
             Self::Voice { id, .. } => Self::Voice { id, by },
-            Self::Voiced { .. } | Self::Recording { .. } | Self::Limits { .. } | Self::Time => self,
+            Self::Voiced { .. }
+            | Self::Recording { .. }
+            | Self::Stalled { .. }
+            | Self::Limits { .. }
+            | Self::Time => self,
         }
     }
 
@@ -164,6 +173,9 @@ impl Command {
             Self::Recording { fails } => {
                 write!(json, "{{\"do\":\"recording\",\"fails\":{fails}").unwrap_or_default();
             }
+            Self::Stalled { seconds } => {
+                write!(json, "{{\"do\":\"stalled\",\"seconds\":{seconds}").unwrap_or_default();
+            }
             Self::Limits { battery_pct } => {
                 write!(json, "{{\"do\":\"limits\",\"battery_pct\":{battery_pct:?}").unwrap_or_default();
             }
@@ -201,8 +213,17 @@ impl Values {
                 _ => Err("voiced with \"id\" and \"seconds\""),
             };
         }
+        if what.as_str() == "stalled" {
+            let others = (alert, id, by, text, fails, battery_pct);
+            return match seconds {
+                Some(seconds) if others == (None, None, None, None, None, None) => {
+                    Ok(Command::Stalled { seconds })
+                }
+                _ => Err("stalled with \"seconds\""),
+            };
+        }
         if id.is_some() || seconds.is_some() {
-            return Err("\"id\" and \"seconds\" with voice and voiced alone");
+            return Err("\"id\" and \"seconds\" with voice, voiced and stalled alone");
         }
         Ok(match (what.as_str(), alert, by, text, fails, battery_pct) {
             ("acknowledge", Some(alert), Some(by), None, None, None) => Command::Acknowledge { alert, by },
@@ -221,7 +242,11 @@ impl Values {
             ("limits", ..) => return Err("limits with \"battery_pct\""),
             ("time", None, None, None, None, None) => Command::Time,
             ("time", ..) => return Err("time without other keys"),
-            _ => return Err("acknowledge, silence, note, mark, voice, voiced, recording, limits or time"),
+            _ => {
+                return Err(
+                    "acknowledge, silence, note, mark, voice, voiced, recording, stalled, limits or time",
+                );
+            }
         })
     }
 }

@@ -24,6 +24,7 @@ fn console_commands_are_parsed_as_documented() {
         ),
         (r#"{"do":"voice","id":4294967295,"by":"AB"}"#, Command::Voice { id: u32::MAX, by: who("AB") }),
         (r#"{"do":"voiced","id":7,"seconds":60}"#, Command::Voiced { id: 7, seconds: 60 }),
+        (r#"{"do":"stalled","seconds":2}"#, Command::Stalled { seconds: 2 }),
         (r#"{"do":"recording","fails":true}"#, Command::Recording { fails: true }),
         (r#"{"do":"limits","battery_pct":63.5}"#, Command::Limits { battery_pct: 63.5 }),
         (r#"{"do":"time"}"#, Command::Time),

@@ -2,20 +2,14 @@
 
 use serde::Serialize;
 
+use super::speed_band::SpeedBand;
 use super::state::{LiveState, PositionDoubt, PositionState};
 use headrace_fusion::NoFix;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::advice::Reason;
 
-/// Ratio of the speed to v_max above which the condition is "over v_max".
-///
-/// The margin covers the measurement error and the advice's own margin.
-const OVER: f64 = 1.02;
 /// Ratio of the speed to v_max below which the speed is clearly below v_max.
 const UNDER: f64 = 0.97;
-/// Ratio of the speed to v_max above which the speed is too fast. A pilot who follows the advice stays below
-/// this ratio.
-const TOO_FAST: f64 = 1.05;
 
 /// Present condition. If several conditions hold, the first one in this list counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,19 +135,24 @@ impl LiveState {
                 }
             };
         };
-        let share = self.speed_mps.unwrap_or(0.0).abs() / v_max_mps;
-        if let Some(to_m) = going_back.filter(|_| share > OVER) {
+        let (share, band) = (self.speed_mps.unwrap_or(0.0).abs() / v_max_mps, self.speed_band());
+        let is_over = band != SpeedBand::Within;
+        if let Some(to_m) = going_back.filter(|_| is_over) {
             return Condition::GoingBack(to_m);
         }
         match self.position {
-            _ if share > TOO_FAST => Condition::TooFast,
+            _ if band == SpeedBand::TooFast => Condition::TooFast,
+            // Until the gyros' bias is known, the vehicle stays where it is.
+            PositionState::Doubtful(PositionDoubt::Spread) if self.stand_s > 0 => {
+                Condition::CannotSay(PositionDoubt::Spread)
+            }
             // `will_exceed` stays set for a second, although the forecast for the present turn may be within
             // the target again.
-            _ if advice.will_exceed && self.turn_exceeds(self.target.max_hole_m) && share <= OVER => {
+            _ if advice.will_exceed && self.turn_exceeds(self.target.max_hole_m) && !is_over => {
                 Condition::TurnFails
             }
             PositionState::Doubtful(doubt) => Condition::CannotSay(doubt),
-            _ if share > OVER => Condition::Over,
+            _ if is_over => Condition::Over,
             _ if advice.may_exceed && self.turn_exceeds(advice.sure_m) && share < UNDER => {
                 Condition::TurnUnsure
             }

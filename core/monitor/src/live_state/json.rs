@@ -6,11 +6,13 @@
 use serde::Serialize;
 
 use super::condition::Lamp;
-use super::state::{LIVE_STATE_VERSION, LiveMetres, LiveState, PositionState, SensorState};
+use super::state::{LIVE_STATE_VERSION, LiveState, PositionState, SensorState};
+use super::texts::SpeedTexts;
 use crate::alert_list::AlertList;
 use crate::alert_list::TextContext;
 use crate::alert_list::{AlertCountsJson, LeftJson, ListedAlertJson};
 use crate::pilot_text::{gain_text, station};
+use headrace_coverage::Metres;
 use headrace_geometry::time::{DurNs, MonoNs};
 
 /// The live state as JSON. The field names are a contract.
@@ -36,6 +38,10 @@ pub struct LiveStateJson {
     pub speed_mps: Option<f64>,
     /// Largest speed that meets the target, m/s; `None` if there is none.
     pub v_max_mps: Option<f64>,
+    /// Texts of the speed, its limit and their difference, the same on all screens.
+    pub speeds: SpeedTexts,
+    /// Text about missed stretches, the same on all screens; `None` if there are none.
+    pub outstanding: Option<String>,
     /// Reason that limits the speed; `None` before the first advice.
     pub reason: Option<&'static str>,
     /// Margins of speed and turn, the part of the target that position errors use up, and the share of lost
@@ -140,7 +146,7 @@ pub struct SensorJson {
 pub struct MetresJson {
     /// Metres by verdict.
     #[serde(flatten)]
-    pub by_state: LiveMetres,
+    pub by_state: Metres,
     /// Sum of the metres by verdict.
     pub way_m: f64,
 }
@@ -181,6 +187,8 @@ impl LiveState {
             position: self.position_json(pass_sd_m),
             speed_mps: self.speed_mps,
             v_max_mps: self.v_max_mps(),
+            speeds: self.speed_texts(),
+            outstanding: self.outstanding_text(),
             reason: advice.map(|advice| advice.reason.as_str()),
             margins: MarginsJson {
                 speed_mps: less(self.v_max_mps(), self.speed_mps.map(f64::abs)),

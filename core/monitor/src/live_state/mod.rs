@@ -8,13 +8,16 @@
 
 pub(crate) mod condition;
 pub mod json;
+pub(crate) mod speed_band;
 pub(crate) mod state;
+pub(crate) mod texts;
 
 #[cfg(test)]
 pub(crate) use condition::test_state;
 pub use condition::{Condition, Lamp};
+pub use speed_band::SpeedBand;
 pub(crate) use state::{ActiveObservation, ActiveObservations, source_bits};
 pub use state::{
-    LEAST_MPS, LIVE_STATE_VERSION, LiveMetres, LiveState, OLD_AFTER, PositionDoubt, PositionState,
-    SensorState,
+    LEAST_MPS, LIVE_STATE_VERSION, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState,
 };
+pub use texts::SpeedTexts;

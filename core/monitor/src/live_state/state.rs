@@ -3,8 +3,9 @@
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
+use super::speed_band::SpeedBand;
 use crate::observations::{MOST_OBSERVATIONS, ObservedKind, Occurrences};
-use headrace_coverage::Stretch;
+use headrace_coverage::{Metres, Stretch};
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_geometry::snapshot::stateful;
@@ -71,28 +72,6 @@ impl PositionState {
     }
 }
 
-/// Metres of the coverage extent by verdict. Their sum is the extent.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct LiveMetres {
-    /// Metres of sections that pass.
-    pub pass_m: f64,
-    /// Metres of sections that fail.
-    pub fail_m: f64,
-    /// Metres of sections without a verdict of pass or fail.
-    pub cannot_say_m: f64,
-    /// Metres still open: further driving may fill their holes.
-    pub open_m: f64,
-    /// Metres where some heads have not been, because the vehicle began or turned back there.
-    pub not_inspected_m: f64,
-}
-
-impl LiveMetres {
-    /// Length of the coverage extent, m.
-    pub fn way_m(&self) -> f64 {
-        self.pass_m + self.fail_m + self.cannot_say_m + self.open_m + self.not_inspected_m
-    }
-}
-
 /// An observation that holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ActiveObservation {
@@ -107,6 +86,9 @@ pub(crate) type ActiveObservations = [Option<ActiveObservation>; MOST_OBSERVATIO
 
 /// Slowest practical speed, m/s. A lower advised speed counts as no speed.
 pub const LEAST_MPS: f64 = 0.005;
+
+/// Speed below which the vehicle counts as driving back, m/s.
+pub(crate) const ASTERN_MPS: f64 = -0.02;
 
 /// State of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -164,8 +146,12 @@ pub struct LiveState {
     pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,
+    /// Band of the speed at the update before.
+    pub last_band: SpeedBand,
     /// Speed advice at the last update; `None` before the first.
     pub advice: Option<Advice>,
+    /// Largest speed advised when the position was last reliable; `None` if it never was.
+    pub sure_v_max_mps: Option<f64>,
     /// Coverage target, with the confidence of verdicts.
     pub target: Target,
     /// Length of the tunnel, m.
@@ -173,7 +159,9 @@ pub struct LiveState {
     /// Largest distance of a head before or behind the vehicle's origin, m.
     pub heads_reach_m: f64,
     /// Metres of the coverage extent by verdict.
-    pub metres: LiveMetres,
+    pub metres: Metres,
+    /// Chainage at which the first missed stretch begins, m; `None` if no stretch is missed.
+    pub missed_from_m: Option<f64>,
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
     /// Whether every part of the wall visible to the heads here has the verdict pass. The vehicle's chainage
@@ -199,7 +187,7 @@ pub struct LiveState {
 }
 
 stateful!(LiveState {
-    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, observations, turning, deaf, hung;
+    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, last_band, advice, sure_v_max_mps, metres, missed_from_m, unsure, passed, back_to_m, observations, turning, deaf, hung;
     slots: heard;
     fixed: target, length_m, heads_reach_m, heads, sources;
 });
@@ -216,11 +204,14 @@ impl LiveState {
             pass_sd_m: 0.0,
             stand_s: 0,
             speed_mps: None,
+            last_band: SpeedBand::default(),
             advice: None,
+            sure_v_max_mps: None,
             target,
             length_m: f64::INFINITY,
             heads_reach_m: 0.0,
-            metres: LiveMetres::default(),
+            metres: Metres::default(),
+            missed_from_m: None,
             unsure: None,
             passed: false,
             back_to_m: None,
@@ -293,9 +284,26 @@ impl LiveState {
     }
 
     /// Largest speed advised, m/s; `None` if there is none.
+    ///
+    /// While the position is doubtful, the advice may rise with the position error, since less time between passes
+    /// means a smaller error. A pilot must not be told to go faster then.
     pub fn v_max_mps(&self) -> Option<f64> {
         let advice = self.advice.as_ref().filter(|advice| advice.reason == Reason::HelixPitch)?;
-        Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
+        let sure_mps = self.sure_v_max_mps.filter(|_| self.position != PositionState::Ok);
+        let v_max_mps = sure_mps.map_or(advice.v_max_mps, |sure_mps| sure_mps.min(advice.v_max_mps));
+        Some(v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
+    }
+
+    /// The speed relative to v_max.
+    pub(crate) fn speed_band(&self) -> SpeedBand {
+        let share =
+            self.speed_mps.zip(self.v_max_mps()).map_or(0.0, |(mps, v_max_mps)| mps.abs() / v_max_mps);
+        SpeedBand::after(self.last_band, share)
+    }
+
+    /// Whether the vehicle drives back towards the portal.
+    pub fn is_driving_back(&self) -> bool {
+        self.speed_mps.is_some_and(|speed_mps| speed_mps < ASTERN_MPS)
     }
 
     /// Share of lost returns; `None` unless they reduce the largest speed by at least a fifth.

@@ -43,6 +43,10 @@ pub const REPORT_VERSION: u32 = 9;
 pub struct Report {
     /// Version of the report's JSON schema.
     pub report_version: u32,
+    /// Program that made the report, with its version.
+    pub program: &'static str,
+    /// UTC of the dive's first packet, such as 2026-11-30T05:12:33Z; `None` if the log doesn't state it.
+    pub begun_utc: Option<String>,
     /// Reason for which the dive is no inspection; `None` if the dive is an inspection.
     pub not_inspected: Option<NotInspectedReport>,
     /// Log that the dive was read from or written to; `None` without a log.
@@ -239,6 +243,8 @@ impl Report {
         let way = || sections.sections_of(coverage.frontier.way());
         let report = Self {
             report_version: REPORT_VERSION,
+            program: concat!("headrace ", env!("CARGO_PKG_VERSION")),
+            begun_utc: None,
             not_inspected: inspected::not_inspected(dive),
             log: None,
             digest: format!("{:016x}", dive.view().digest()),

@@ -5,7 +5,8 @@ use bevy_ecs::prelude::{Query, Res};
 use super::classify::{Class, Classified};
 use super::survey::{Cursor, Outputs};
 use crate::entities::{Head, HeadFrontier, Mounted};
-use crate::live_state::{ActiveObservation, ActiveObservations, LiveMetres};
+use crate::live_state::state::ASTERN_MPS;
+use crate::live_state::{ActiveObservation, ActiveObservations};
 use crate::messages::{Doubts, Placement, Standing};
 use crate::observations::{MOST_OBSERVATIONS, Observation, Observations, ObservedKind};
 use crate::placer::PlacedTick;
@@ -17,8 +18,6 @@ use headrace_sensor::reading::SourceId;
 
 /// Time that the pilot needs to slow down before the vehicle reaches wall that has not passed yet, seconds.
 const SOON_S: f64 = 5.0;
-/// Speed at or below which the vehicle counts as going back, m/s.
-const ASTERN_MPS: f64 = -0.02;
 /// Time for which an observation without a duration holds after its latest occurrence.
 const HOLDS: DurNs = DurNs(10_000_000_000);
 
@@ -39,15 +38,9 @@ pub(super) fn report_standing(
         return;
     };
     let Placement::Update(update) = &item.placement else { return };
-    let metres = coverage.sections.metres(coverage.frontier.way());
     let standing = Standing {
-        metres: LiveMetres {
-            pass_m: metres.pass_m,
-            fail_m: metres.fail_m,
-            cannot_say_m: metres.cannot_say_m,
-            open_m: metres.open_m,
-            not_inspected_m: metres.not_inspected_m,
-        },
+        metres: coverage.metres(),
+        missed_from_m: coverage.sections.missed_from_m(),
         unsure: coverage.unsure,
         passed: is_passed(&coverage, &heads, &update.situation),
         back_to_m: back_to_m(&coverage.sections, &update.situation),

@@ -17,7 +17,7 @@ const TICK_MS = 200;
 export async function serve(options = {}) {
   let world = new World(options);
   const clients = new Set();
-  let seq = 0, kept = [], sectionsTo = 0, mute = false, closed = false, token = options.token ?? null, refuses = null, spent = false;
+  let seq = 0, kept = [], sectionsTo = 0, mute = false, closed = false, token = options.token ?? null, refuses = null, spent = false, ended = false;
 
   const send = (message) => {
     seq += 1;
@@ -41,6 +41,7 @@ export async function serve(options = {}) {
   };
   let tick = 0;
   const beat = () => {
+    if (ended) return;
     const list = world.step(TICK_MS / 1000);
     for (const change of world.changes.splice(0)) send(change);
     if (list.length > 0) send(samplesFrame(list, BEGUN_S));
@@ -96,6 +97,13 @@ export async function serve(options = {}) {
     if (ask.spent !== undefined) spent = ask.spent;
     if (ask.restart) { world = new World({ ...options, instance: ask.restart }); kept = []; sectionsTo = 0; clients.forEach((client) => client.terminate()); }
     if (ask.world) Object.assign(world, ask.world);
+    if (ask.end) {
+      world.over.ended = true;
+      send(world.back());
+      send(world.state());
+      send({ type: "end", digest: "0", exit: 0, ...ask.end });
+      ended = true;
+    }
     return { alerts: world.alerts, notes: world.notes, at_m: world.at_m, playback: world.playback, clients: clients.size, seq };
   };
 

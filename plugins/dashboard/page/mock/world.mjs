@@ -8,7 +8,11 @@ const SENSORS = [
   { id: "echo_up", plugin: "ping1d", kind: "echosounder" }, { id: "echo_left", plugin: "ping1d", kind: "echosounder" },
   { id: "echo_right", plugin: "ping1d", kind: "echosounder" }, { id: "depth", plugin: "bar100", kind: "depth" },
 ];
+/** UTC of the log's zero: 2026-08-30 06:00:00. */
+const UTC_OF_ZERO_S = Date.UTC(2026, 7, 30, 6) / 1000;
 const station = (m) => `${Math.floor(m / 1000)}+${(m % 1000).toFixed(2).padStart(6, "0")}`;
+/** Speeds as the program writes them. */
+const speedText = (v) => v.toFixed(Math.abs(v) < 0.1 ? 3 : 2);
 const round = (x, n = 4) => Math.round(x * 10 ** n) / 10 ** n;
 
 export class World {
@@ -30,6 +34,9 @@ export class World {
     this.remedy = null;
     this.recording = { on: true, fails: false, words: null, path: "dive.mcap" };
     this.changes = [];
+    /** Fields of the state that a test sets, and the legs of the way back. */
+    this.over = {};
+    this.legs = null;
     this.seedAlerts();
   }
 
@@ -38,7 +45,7 @@ export class World {
       vehicle: "mock", target_m: dive.TARGET_M, section_m: dive.SECTION_M, confidence_sd: 2, length_m: this.length_m,
       perimeter_m: dive.PERIMETER_M, profile: dive.PROFILE, clock_arc_m: dive.CLOCK_ARC_M,
       heads: SENSORS.slice(0, 4).map(({ id }, source) => ({ id, source, hidden_deg: source < 2 ? [[100, 125]] : [[235, 260]] })),
-      sensors: SENSORS, may: { operate: this.mode !== "replay", playback: this.mode !== "live" }, begun_s: dive.BEGUN_S, utc_of_zero_s: null,
+      sensors: SENSORS, may: { operate: this.mode !== "replay", playback: this.mode !== "live" }, begun_s: dive.BEGUN_S, utc_of_zero_s: UTC_OF_ZERO_S,
       causes: dive.CAUSES, whys: dive.WHYS, span_s: this.mode === "replay" ? [dive.BEGUN_S, dive.BEGUN_S + this.length_m / 0.2] : null,
       tokens_needed: false };
   }
@@ -178,10 +185,20 @@ export class World {
         from: [0.3 * Math.sin(this.t_s / 5), 3], to: [[0.1, 5.99], [2.99, 2.9], [-2.99, 3.1]][n] })),
       rates: SENSORS.map(({ id }, n) => ({ id, hz: this.dead.has(id) ? 0 : n < 4 ? 18 : [10, 50, 20, 20, 20, 5][n - 4] })),
       recording: this.recording,
-      playback: this.playback ? { ...this.playback, at_s: round(this.t_s), from_s: dive.BEGUN_S, to_s: dive.BEGUN_S + this.length_m / 0.2 } : null };
+      playback: this.playback ? { ...this.playback, at_s: round(this.t_s), from_s: dive.BEGUN_S, to_s: dive.BEGUN_S + this.length_m / 0.2 } : null,
+      ...this.texts(v, missed), ...this.over };
+  }
+
+  /** Texts and figures that earlier versions of the program lack. */
+  texts(v, missed) {
+    const most = this.position === "none" ? null : this.v_max_mps, spare = most === null ? 0 : Number(speedText(most)) - Number(speedText(Math.abs(v)));
+    const margin = Math.abs(spare) < 0.001 ? "at the limit" : `${speedText(Math.abs(spare))} ${spare > 0 ? "to spare" : "too fast"}`;
+    return { speeds: { speed: this.position === "none" ? null : speedText(Math.abs(v)), limit: most === null ? null : speedText(most), margin: most === null ? null : margin },
+      outstanding: missed > 0 ? `${missed.toFixed(2)} m missed, from 0+012.00` : null, depth_m: round(12.3 + 0.001 * this.at_m, 2) };
   }
 
   back() {
+    if (this.legs) return { type: "back", legs: this.legs, way_m: 12.5, time_s: this.legs.some((leg) => leg.at_most_mps === null) ? null : 140 };
     const legs = this.alerts.filter((alert) => alert.kind === "missed" && alert.state === "active").reverse()
       .map(({ from_m, to_m }) => ({ from_m: from_m - 2, to_m, at_most_mps: 0.08, why: "too fast" }));
     const way_m = legs.length === 0 ? 0 : this.at_m - Math.min(...legs.map((leg) => leg.from_m));

@@ -12,10 +12,12 @@ import { History } from "./side/History";
 import { Back, Metres } from "./side/Metres";
 import { NoteDialog, Notes } from "./side/Notes";
 import { Sensors } from "./side/Sensors";
+import { Result } from "./speed/Result";
 import { Announcer, Condition, Place, Speed } from "./speed/Speed";
 import { hasEnded, isOld, lost_s, shown } from "./store/age";
 import { prefs, setPrefs } from "./store/prefs";
 import { store } from "./store/store";
+import { useTopics } from "./store/topic";
 import "./style/palettes.css";
 import "./style/page.css";
 import "./style/panels.css";
@@ -25,7 +27,8 @@ import { startVoice } from "./voice/record";
 import { Wall } from "./wall/Wall";
 
 function Top() {
-  return <header class="top"><Condition /><Speed /><Place /></header>;
+  useTopics(store.topics.state);
+  return <header class="top"><Condition />{hasEnded(store) ? <Result /> : <Speed />}<Place /></header>;
 }
 
 function Whole() {
@@ -37,7 +40,7 @@ function Whole() {
       <main>
         <Wall />
         <Alerts />
-        <div class="lower"><Section /><Sensors /><div class="stack"><Metres /><Back /></div><div class="stack"><History /><Notes /></div></div>
+        <div class="lower"><Section /><Sensors /><div class="stack"><Metres /><Notes /></div><div class="stack"><Back /><History /></div></div>
       </main>
       <Replay />
       <Status />

@@ -102,6 +102,167 @@ describe("display", () => {
   }, { init: withoutWebGl }));
 });
 
+describe("one truth", () => {
+  const legs = [{ from_m: 16.25, to_m: 10.75, at_most_mps: 0.0925, why: "too_fast" }, { from_m: 8.6, to_m: 8.3, at_most_mps: 0.119, why: "not_passed" }];
+  const fits = (page, within) => page.evaluate((within) => [...document.querySelectorAll(within)]
+    .filter((each) => each.scrollWidth > each.clientWidth + 1).map((each) => each.textContent), within);
+
+  it("shows missed sections beside a green lamp", () => on({}, async ({ mock, page }) => {
+    await condition(page, "good");
+    mock.control({ world: { over: { outstanding: "5.50 m missed, from 0+010.75" } } });
+    await page.locator(".condition.green .outstanding", { hasText: "5.50 m missed, from 0+010.75" }).waitFor();
+    mock.control({ world: { over: { outstanding: null } } });
+    await page.locator(".condition .outstanding").waitFor({ state: "detached" });
+  }, { init: withoutWebGl }));
+
+  it("shows them in the widget, too", () => on({ at_m: 300 }, async ({ mock, page }) => {
+    mock.control({ world: { over: { outstanding: "5.50 m missed, from 0+010.75" } } });
+    await page.locator(".outstanding").waitFor();
+    const room = await page.evaluate(() => {
+      const bottom = (name) => document.querySelector(name).getBoundingClientRect().bottom;
+      return [bottom(".condition") - bottom(".outstanding"), innerHeight - bottom(".place")];
+    });
+    assert.ok(room.every((each) => each >= 0), `${room}`);
+  }, { path: "/widget/speed", width: 420, height: 300 }));
+
+  it("shows the same ready speed texts in the panel and in the advice, and nothing is cut at 1280 px", () => on({}, async ({ mock, page }) => {
+    const speeds = { speed: "0.106", limit: "0.094", margin: "0.012 too fast" };
+    mock.control({ world: { speed_mps: -0.106, v_max_mps: 0.0943, condition: "too_fast", lamp: "red", over: { speeds } } });
+    await page.locator(".most .value", { hasText: /^0\.094$/ }).waitFor();
+    assert.equal(await page.locator(".speed .now").innerText(), "0.106m/s back");
+    assert.equal(await page.locator(".margin").innerText(), "0.012 too fast");
+    assert.match(await page.locator(".condition .advice").innerText(), /at most 0\.094 m\/s$/);
+    assert.deepEqual(await fits(page, ".figures, .place, .condition, .lamp"), []);
+  }, { init: withoutWebGl }));
+
+  it("shows no limit while nothing limits the speed", () => on({}, async ({ mock, page }) => {
+    mock.control({ world: { condition: "going_back", speed_mps: -0.2, over: { speeds: { speed: "0.200", limit: null, margin: null } } } });
+    await page.locator(".forecast", { hasText: /^nothing limits the speed on the way$/ }).waitFor();
+    assert.equal(await page.locator(".speed :is(.most, .margin)").count(), 0);
+    assert.doesNotMatch(await page.locator(".speed").innerText(), /max|–|limit /);
+    // Conditions without a limit in which a turn is still forecast.
+    mock.control({ world: { condition: "cannot_say", lamp: "amber", over: { speeds: { speed: "0.090", limit: null, margin: null } } } });
+    await condition(page, "cannot_say");
+    assert.equal(await page.locator(".speed :is(.most, .margin, .why b)").count(), 0);
+    assert.doesNotMatch(await page.locator(".condition .advice").innerText(), /m\/s/);
+  }, { init: withoutWebGl }));
+
+  it("works without the fields that earlier versions lack", () => on({}, async ({ mock, page }) => {
+    mock.control({ world: { over: { speeds: undefined, outstanding: undefined, depth_m: undefined } } });
+    await condition(page, "good");
+    await page.waitForFunction(() => /^0\.0\d to spare$/.test(document.querySelector(".margin")?.innerText ?? ""));
+    assert.equal(await page.locator(".depth, .outstanding").count(), 0);
+    mock.control({ world: { condition: "going_back" } });
+    await page.locator(".speed .most").waitFor({ state: "detached" });
+    mock.control({ world: { over: { metres: { pass_m: 40, fail_m: 5.5, cannot_say_m: 0, open_m: 0, not_inspected_m: 0, way_m: 45.5 }, outstanding: undefined } } });
+    await page.locator(".condition .outstanding", { hasText: /^5\.50 m missed$/ }).waitFor();
+  }, { init: withoutWebGl }));
+
+  for (const [width, height] of [[1280, 800], [390, 844]]) {
+    it(`lists the way back rounded outward, in large type that is not cut, at ${width} px`, () => on({}, async ({ mock, page }) => {
+      mock.control({ world: { legs } });
+      const first = page.locator(".back .leg").first();
+      await first.filter({ hasText: "0+016.3–0+010.7 ≤ 0.092 m/s too fast" }).waitFor();
+      assert.equal(await first.getAttribute("title"), "0+016.25–0+010.75");
+      assert.equal(await page.locator(".back .count").innerText(), "2 stretches, 12.5 m, 2 min 20 s");
+      assert.match(await page.locator(".back .leg").nth(1).innerText(), /0\+008\.6–0\+008\.3\s+≤ 0\.11 m\/s not passed/);
+      assert.ok(await first.evaluate((leg) => Number.parseFloat(getComputedStyle(leg).fontSize)) >= 18);
+      assert.deepEqual(await fits(page, ".back .leg, .back .leg *, .back .panel-head, .result, .place"), []);
+      // Without a speed there is no time.
+      mock.control({ world: { legs: [{ ...legs[0], at_most_mps: null }] } });
+      await page.locator(".back .count", { hasText: /^12\.5 m$/ }).waitFor();
+    }, { init: withoutWebGl, width, height }));
+  }
+
+  it("shows dive time with UTC, depth and heading", () => on({ at_m: 60 }, async ({ mock, page }) => {
+    mock.control({ world: { over: { pose: { y_m: 0, z_m: 3, roll_deg: 1, pitch_deg: 2, yaw_deg: -1.26 } } } });
+    await page.locator(".heading", { hasText: "heading 1.3° right" }).waitFor();
+    assert.match(await page.locator(".depth").innerText(), /^depth 12\.\d m$/);
+    assert.match(await page.locator(".clock").innerText(), /^dive 5:0\d\s+06:06:4\d UTC$/);
+    assert.match(await page.locator(".clock time").getAttribute("title"), /^2026-08-30 06:06:4\d UTC$/);
+    assert.equal(await page.locator(".attitude").innerText(), "roll 1° pitch 2°");
+    const since = page.locator(".alert .since time").first();
+    assert.equal(await since.innerText(), "1:31");
+    assert.match(await since.getAttribute("title"), /^2026-08-30 06:03:11 UTC, 3 min \d\d s ago$/);
+    await page.keyboard.press("b");
+    const note = page.locator(".notes li time");
+    await note.waitFor();
+    assert.match(await note.innerText(), /^5:\d\d$/);
+    assert.match(await note.getAttribute("title"), / UTC$/);
+    assert.match(await page.locator(".notes li b").innerText(), /^0\+06\d\.\d$/);
+    await page.locator(".history-box").hover();
+    assert.match(await page.locator(".history-box").getAttribute("title"), /^\d:\d\d, 2026-08-30 .* UTC$/);
+  }, { init: withoutWebGl }));
+
+  it("warns of a close wall in words", () => on({}, async ({ mock, page }) => {
+    const echo = (range_m) => ({ id: "echo_right", range_m, age_s: 0.1, from: [-0.2, 3], to: [-0.2 - range_m, 3.05] });
+    mock.control({ world: { over: { echosounders: [echo(0.42)] } } });
+    await page.locator(".close-wall", { hasText: /^WALL 0\.42 m, right$/ }).waitFor();
+    mock.control({ world: { over: { echosounders: [echo(1.9)] } } });
+    await page.locator(".close-wall", { hasText: /^$/ }).waitFor({ state: "hidden" });
+  }, { init: withoutWebGl }));
+
+  it("hatches sections that are not inspected in grey, on the wall and in the bar", () => on({ at_m: 3 }, async ({ page }) => {
+    await condition(page, "good");
+    let grey = 0;
+    for (let tries = 0; tries < 20 && grey < 200; tries += 1) {
+      grey = await countNear(page, await page.screenshot({ clip: await page.locator(".wall-box").boundingBox() }), [0x8c, 0x98, 0xa3]);
+    }
+    assert.ok(grey >= 200, `${grey} grey pixels on the wall`);
+    assert.equal(await page.locator(".bar > .v-not-inspected").evaluate((bar) => getComputedStyle(bar).fill), 'url("#unpassed")');
+  }));
+
+  it("has a legend for each mark, no colour twice, and hover text that is not cut", () => on({ at_m: 60 }, async ({ page }) => {
+    await condition(page, "good");
+    assert.deepEqual(await page.locator(".legend .mark").allInnerTexts(),
+      ["missed", "gap", "can't say", "not inspected", "open", "unseen", "sample", "doubtful", "this turn", "largest hole", "vehicle"]);
+    const { yellow, notInspected } = await page.evaluate(() => ({ yellow: getComputedStyle(document.documentElement).getPropertyValue("--caution"),
+      notInspected: getComputedStyle(document.querySelector(".key.v-not-inspected")).backgroundImage }));
+    assert.match(notInspected, /repeating-linear-gradient/);
+    assert.ok(!notInspected.includes(yellow));
+    const wall = await page.locator(".wall-box").boundingBox();
+    for (let x = 60; x < wall.width; x += 20) {
+      await page.mouse.move(wall.x + x, wall.y + 60);
+      const cut = await fits(page, ".under");
+      assert.deepEqual(cut, []);
+      const inside = await page.evaluate(() => document.querySelector(".under").getBoundingClientRect().bottom <= document.querySelector(".legend.marks").getBoundingClientRect().bottom);
+      assert.ok(inside, await page.locator(".under").innerText());
+    }
+  }));
+});
+
+describe("a finished dive", () => {
+  const summary = { pass_m: 48.25, fail_m: 5.5, cannot_say_m: 0.25, not_inspected_m: 2.25, open_m: 0 };
+  const end = { summary, way: { length_m: 56.25 } };
+  const legs = [{ from_m: 16.25, to_m: 10.75, at_most_mps: 0.0925, why: "too_fast" }];
+
+  it("shows its result first, and nothing as if it were live", () => on({ mode: "replay" }, async ({ mock, page }) => {
+    await condition(page, "good");
+    mock.control({ world: { legs, over: { outstanding: "5.50 m missed, from 0+010.75" } } });
+    mock.control({ world: { playback: { paused: true, speed: 1 } }, end });
+    await word(page, "DIVE ENDED");
+    await page.locator(".condition.ended .shape.ended").waitFor();
+    assert.deepEqual(await page.locator(".result dl > div").allInnerTexts(), ["passed\n48.3 m", "missed\n5.50 m", "can't say\n0.25 m", "not inspected\n2.25 m"]);
+    assert.equal(await page.locator(".result .outstanding").innerText(), "5.50 m missed, from 0+010.75");
+    assert.match(await page.locator(".result li").innerText(), /^0\+016\.3–0\+010\.7 too fast$/);
+    // The metres by verdict are those of the result, not of the last state.
+    assert.match(await page.locator(".metres dl").first().innerText(), /passed\s+48\.3 m/);
+    assert.equal(await page.locator(".speed, .paused, .shape.green, .shape.amber, .shape.red").count(), 0);
+    assert.match(await page.locator(".sensors .panel-head").innerText(), /at the end/);
+    const all = await page.locator("#page").innerText();
+    assert.doesNotMatch(all, /Hz|recording|to spare|no connection/);
+    mock.control({ closed: true });
+    await page.locator(".status .link", { hasText: /^the program has closed$/ }).waitFor();
+    await page.locator(':root[data-old="false"]').waitFor();
+    assert.doesNotMatch(await page.locator("#page").innerText(), /no connection|tried/);
+  }, { init: withoutWebGl }));
+
+  it("counts open metres only if there are any", () => on({}, async ({ mock, page }) => {
+    mock.control({ end: { ...end, summary: { ...summary, open_m: 0.5 } } });
+    await page.locator(".result .open", { hasText: "0.50 m" }).waitFor();
+  }, { init: withoutWebGl }));
+});
+
 describe("voice notes", () => {
   let hears;
   before(async () => { hears = await browser(MICROPHONE); });
@@ -250,6 +411,13 @@ describe("alerts", () => {
     await page.keyboard.press("Home");
     await page.waitForFunction((hidden) => Number.parseInt(document.querySelector(".alerts .more")?.textContent ?? "0", 10) === hidden, before.hidden);
   }));
+
+  it("show the whole place of each missed stretch in a long list", () => on({ at_m: 1 }, async ({ mock, page }) => {
+    for (let k = 0; k < 8; k += 1) mock.control({ raise: { priority: "alarm", class: "coverage", kind: "missed", text: `MISSED 0+0${k}0.00 to 0+0${k}6.25, at 3 o'clock: too fast` } });
+    await page.locator(".dense .alert").nth(7).waitFor();
+    const cut = await page.locator(".alert .text").evaluateAll((texts) => texts.filter((each) => each.scrollWidth > each.clientWidth).length);
+    assert.equal(cut, 0);
+  }, { init: withoutWebGl }));
 
   it("count alerts beyond the list; these move up as others are acknowledged", () => on({ at_m: 1 }, async ({ mock, page }) => {
     await page.locator(".alert-list .none").waitFor();
@@ -424,6 +592,20 @@ describe("accessibility", () => {
     }, { palette, reducedMotion: "reduce" }));
   }
 
+  it("axe finds no serious problem in a finished dive", () => on({ at_m: 148 }, async ({ mock, page }) => {
+    mock.control({ world: { legs: [{ from_m: 16.25, to_m: 10.75, at_most_mps: 0.0925, why: "too_fast" }] }, end: {} });
+    await word(page, "DIVE ENDED");
+    await page.evaluate(AXE);
+    for (const palette of ["day", "dusk", "night"]) {
+      const { violations } = await page.evaluate((palette) => {
+        document.documentElement.dataset.palette = palette;
+        return window.axe.run(document, { resultTypes: ["violations"] });
+      }, palette);
+      const grave = violations.filter(({ impact }) => impact === "serious" || impact === "critical");
+      assert.deepEqual(grave.map(({ id, nodes }) => `${palette} ${id}: ${nodes.map((node) => `${node.target} ${node.any[0]?.message ?? ""}`).join("; ")}`), []);
+    }
+  }, { reducedMotion: "reduce", init: withoutWebGl }));
+
   it("green, amber and red differ under deuteranopia, and also by shape and word", () => on({}, async ({ page }) => {
     await condition(page, "good");
     const colours = await page.evaluate(() => ["day", "dusk", "night"].flatMap((palette) => {
@@ -468,7 +650,8 @@ describe("exported dive", () => {
     text({ type: "notes", list: [{ number: 1, at_s: 300, by: "AB", text: "rubble", chainage_m: 20, station: "0+020" }] });
     text(world.history());
     text({ type: "timeline", t_s, states: states.map(({ sensors, ...state }, n) => (n === 0 ? { sensors, ...state } : state)) });
-    text({ type: "end", digest: "0", exit: 0 });
+    text({ ...world.state(), metres: { ...world.state().metres, pass_m: 1 }, outstanding: "5.50 m missed, from 0+010.75" });
+    text({ type: "end", digest: "0", exit: 0, summary: { pass_m: 57.5, fail_m: 5.5, cannot_say_m: 0, not_inspected_m: 1, open_m: 0 }, way: { length_m: 64 } });
     const single = readFileSync(new URL("../dist/single.html", import.meta.url), "utf8");
     assert.equal(single.split("<!--DIVE-->").length, 2);
     const page1 = single.replace("<!--DIVE-->", () => `<script type="application/octet-stream;base64" id="dive">${deflateRawSync(Buffer.concat(parts)).toString("base64")}</script>`);
@@ -477,7 +660,10 @@ describe("exported dive", () => {
     await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
     const { page, context, problems } = await open(chromium, `http://127.0.0.1:${server.address().port}/`);
     try {
-      await condition(page, "good");
+      // The file opens at the end of the dive.
+      await word(page, "DIVE ENDED");
+      assert.deepEqual(await page.locator(".result dd").allInnerTexts(), ["57.5 m", "5.50 m", "0.00 m", "1.00 m"]);
+      assert.equal(await page.locator(".result .outstanding").innerText(), "5.50 m missed, from 0+010.75");
       assert.match(await page.locator(".chainage").innerText(), /0\+063\.6/);
       assert.match(await page.locator(".age").innerText(), /from a file/);
       assert.match(await page.locator(".dive").innerText(), /1,200 samples left out/);
@@ -485,6 +671,10 @@ describe("exported dive", () => {
       await page.getByLabel("Time of the dive").focus();
       await page.keyboard.press("Home");
       await page.locator(".chainage", { hasText: "0+060.2" }).waitFor();
+      await word(page, "GOOD");
+      assert.equal(await page.locator(".result").count(), 0);
+      // The list of the end says nothing about earlier times.
+      assert.match(await page.locator(".back").innerText(), /only for the end of the dive/);
       // Constant parts are in the first entry only.
       assert.equal(await page.locator(".sensor[data-sensor]").count(), 10);
       assert.deepEqual(requests.filter((url) => url !== "/"), []);

@@ -42,5 +42,15 @@ await shot("replay", { dive: { ...far, mode: "replay" }, asks: [{ world: { playb
 await shot("tablet", { size: [1024, 768], dive: far });
 await shot("help", { dive: near, keys: ["?"] });
 await shot("token", { dive: { ...near, token: "abc" }, wait: 800 });
+const ended = [{ world: { over: { outstanding: "5.50 m missed, from 6+856.75" }, legs: [{ from_m: 6862.25, to_m: 6856.75, at_most_mps: 0.0925, why: "too_fast" }] } },
+  { end: { summary: { pass_m: 6851.25, fail_m: 5.5, cannot_say_m: 7, not_inspected_m: 2.25, open_m: 0 }, way: { length_m: 6866 } } }];
+for (const size of ["desk", "wide", "phone"]) await shot(`ended-${size}`, { size, dive: far, asks: ended });
+await shot("ended-closed", { dive: far, asks: [...ended, { closed: true }], wait: 4000 });
+const back = { legs: [{ from_m: 16.25, to_m: 10.75, at_most_mps: 0.0925, why: "too_fast" }, { from_m: 8.6, to_m: 8.3, at_most_mps: 0.119, why: "not_passed" }] };
+const going = { world: { ...back, condition: "going_back", speed_mps: -0.2, over: { outstanding: "5.50 m missed, from 0+010.75",
+  speeds: { speed: "0.200", limit: null, margin: null }, echosounders: [{ id: "echo_right", range_m: 0.42, age_s: 0.1, from: [-2, 3], to: [-2.42, 3.05] }] } } };
+const slow = { speeds: { speed: "0.106", limit: "0.094", margin: "0.012 too fast" } };
+await shot("digits", { dive: near, asks: [{ world: { speed_mps: -0.106, v_max_mps: 0.094, condition: "too_fast", lamp: "red", remedy: "set the heads to FASTER: 0.13 m/s", over: slow } }] });
+for (const size of ["desk", "wide", "phone"]) await shot(`back-${size}`, { size, dive: near, asks: [going], full: size === "phone" });
 for (const widget of ["speed", "wall", "alerts"]) await shot(`widget-${widget}`, { size: [420, 300], dive: far, path: `/widget/${widget}` });
 await chromium.close();

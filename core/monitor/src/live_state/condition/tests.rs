@@ -1,6 +1,7 @@
 use super::*;
 use crate::fixtures;
-use crate::live_state::{LiveMetres, SensorState};
+use crate::live_state::SensorState;
+use headrace_coverage::Metres;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::Target;
 use headrace_sampling::advice::Advice;
@@ -28,7 +29,7 @@ pub(crate) fn state() -> LiveState {
         pass_sd_m: 0.02,
         speed_mps: Some(0.07),
         advice: Some(advice(Reason::HelixPitch, 0.07, 0.46)),
-        metres: LiveMetres { pass_m: 12.0, open_m: 1.5, ..LiveMetres::default() },
+        metres: Metres { pass_m: 12.0, open_m: 1.5, ..Metres::default() },
         turning: 0b11,
         heard,
         ..LiveState::new(Target::new(0.5), 0b11, 3)

@@ -7,6 +7,7 @@ import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { span } from "../text/format";
 import { PRIORITIES } from "../text/table";
+import { Time } from "../ui/Time";
 import { actions } from "../wall/control";
 import { SoundButtons } from "./SoundButtons";
 
@@ -81,9 +82,9 @@ function Mark({ alert }: { alert: Alert }) {
 }
 
 function Since({ alert }: { alert: Alert }) {
-  useTopics(store.topics.state);
+  useTopics(store.topics.state, store.topics.hello);
   const now = store.state?.now_s;
-  return <span class="since">{now === undefined ? "" : `${span(now - alert.since_s)} ago`}</span>;
+  return <span class="since"><Time at_s={alert.since_s} more={now === undefined ? "" : `${span(now - alert.since_s)} ago`} /></span>;
 }
 
 /** Announces new alerts to a screen reader, alarms without delay. */

@@ -3,7 +3,7 @@ import { prefs } from "../store/prefs";
 import { store } from "../store/store";
 import { HEADER_BYTES, SAMPLE_BYTES, frameOf, type Frame } from "./binary";
 import { Feed } from "./feed";
-import { embedded, entryAt, readDive, stateAt, type Dive } from "./file";
+import { embedded, entryAt, isLast, readDive, stateAt, type Dive } from "./file";
 import type { Command } from "./types";
 
 /** Time span before the displayed time whose samples the cross-section of a file shows: two turns of a slow head. */
@@ -21,7 +21,6 @@ export function start(): void {
     void readDive(file, store).then(
       (read) => {
         dive = read;
-        store.end = null;
         seekFile(read.t_s.at(-1) ?? 0);
       },
       (error: unknown) => {
@@ -89,6 +88,7 @@ export function seekFile(at_s: number): void {
     return t_ms <= upTo_ms && t_ms > upTo_ms - TURNS_MS;
   }), begun_s);
   store.topics.samples.changed();
+  store.end = isLast(dive, entry) ? dive.end : null;
   store.take({ ...state, playback: { paused: true, speed: null, at_s: dive.t_s[entry] ?? 0, from_s, to_s: dive.t_s.at(-1) ?? 0 } });
 }
 

@@ -2,9 +2,9 @@
 // binary, bytes).
 import type { Store } from "../store/store";
 import { frameOf, KIND_SAMPLES, type Frame } from "./binary";
-import type { Message, State } from "./types";
+import type { End, Message, State } from "./types";
 
-export interface Dive { samples: Frame[]; t_s: number[]; states: Partial<State>[]; voices: Map<number, Blob> }
+export interface Dive { samples: Frame[]; t_s: number[]; states: Partial<State>[]; voices: Map<number, Blob>; end: End; last: Partial<State> }
 
 export function embedded(): string | null {
   return document.getElementById("dive")?.textContent?.trim() ?? null;
@@ -39,7 +39,7 @@ export function* frames(bytes: ArrayBuffer): Generator<string | Frame> {
 
 /** Reads the embedded dive into the store. */
 export async function readDive(base64: string, store: Store): Promise<Dive> {
-  const dive: Dive = { samples: [], t_s: [], states: [], voices: new Map() };
+  const dive: Dive = { samples: [], t_s: [], states: [], voices: new Map(), end: {}, last: {} };
   store.link.phase = "file";
   for (const frame of frames(await inflate(base64))) {
     if (typeof frame !== "string") {
@@ -59,16 +59,23 @@ export async function readDive(base64: string, store: Store): Promise<Dive> {
       store.take(message);
     }
   }
+  dive.end = store.end ?? {};
+  dive.last = store.state ?? {};
   store.ready = true;
   return dive;
 }
 
-/** State at an entry of the timeline. The first entry is complete. A later entry has only the fields that differ from the first. */
+/** Whether an entry of the timeline is the last one, at which the dive has ended. */
+export function isLast({ states }: Dive, entry: number): boolean {
+  return entry >= states.length - 1;
+}
+
+/** State at an entry of the timeline. A later entry has only the fields that differ from the first. The last one shows the end of the dive. */
 export function stateAt(dive: Dive, entry: number): State | null {
   const whole: Partial<State> = {};
   const first = dive.states[0];
   if (!first) return null;
-  Object.assign(whole, first, dive.states[entry]);
+  Object.assign(whole, first, dive.states[entry], isLast(dive, entry) ? dive.last : {});
   return { ...EMPTY, ...whole, type: "state" } as State;
 }
 

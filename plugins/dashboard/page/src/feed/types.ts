@@ -3,6 +3,8 @@ import type { CLASSES, CONDITIONS, POSITION_WHY, PRIORITIES, REASONS, SENSOR_STA
 
 export type Mode = "live" | "demo" | "replay" | "file";
 export type Lamp = "green" | "amber" | "red";
+/** Speed texts with the one rounding rule of all screens. `limit` and `margin` are null if no limit applies at present. */
+export interface Speeds { speed: string | null; limit: string | null; margin: string | null }
 export type Condition = keyof typeof CONDITIONS;
 export type Priority = keyof typeof PRIORITIES;
 export type AlertClass = (typeof CLASSES)[number];
@@ -37,9 +39,15 @@ export interface State {
   };
   speed_mps: number | null; v_max_mps: number | null; reason: keyof typeof REASONS | null; remedy?: string | null;
   margins: { speed_mps: number | null; turn_m: number | null; position_m: number | null; lost_share: number | null };
+  /** Files of earlier versions lack this field and the next two. */
+  speeds?: Speeds;
+  /** Missed sections that are still to be passed, as text. */
+  outstanding?: string | null;
+  /** Depth below the water level. */
+  depth_m?: number | null;
   turn: Turn | null;
   sensors: Sensor[];
-  metres: { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number };
+  metres: Metres;
   /** Verdicts of the same dive for the second target, which the hello states. */
   compared?: { target_m: number; pass_m: number; fail_m: number; cannot_say_m: number; open_m: number };
   cannot_say: { why: string; from_m: number; to_m: number } | null;
@@ -47,12 +55,17 @@ export interface State {
   ended?: boolean;
   alert_list?: Alert[]; alerts_hidden?: number;
   left?: { cable_m: number | null; time_s: number | null; battery_pct: number | null } | null;
+  /** When the dive began; the hello of a page that was open before has 0. */
+  begun_s?: number | null;
   pose?: { y_m: number; z_m: number; roll_deg: number; pitch_deg: number; yaw_deg: number } | null;
   echosounders?: Echosounder[];
   rates?: { id: string; hz: number }[];
   recording?: { on: boolean; fails: boolean; words: string | null; path: string | null } | null;
   playback?: Playback | null;
 }
+
+/** Lengths by verdict, and of the whole coverage extent. */
+export interface Metres { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number }
 
 export interface Echosounder {
   id: string; range_m: number | null; age_s: number | null; from: [number, number]; to: [number, number] | null;
@@ -73,8 +86,12 @@ export interface Note {
   voice?: { id: number; seconds: number | null } | null;
 }
 export interface Leg { from_m: number; to_m: number; at_most_mps: number | null; why: string }
-export interface Back { legs: Leg[]; way_m: number; time_s: number }
+/** `time_s` is null if a leg has no speed. */
+export interface Back { legs: Leg[]; way_m: number; time_s: number | null }
 export interface History { t_s: number[]; v_mps: (number | null)[]; v_max_mps: (number | null)[]; t_m: (number | null)[] }
+
+/** Result of the dive. The last state may lack verdicts that became final at the end. */
+export interface End { summary?: Omit<Metres, "way_m">; way?: { length_m: number } | null; digest?: string; exit?: number }
 
 /** An event, as in a line of `--json-lines`. */
 export interface Told { type: string; t_s: number; text: string }
@@ -92,7 +109,7 @@ export type Message =
   | { type: "done"; do: string }
   | { type: "voice"; id: number; media_type: string; audio: string }
   | { type: "timeline"; t_s: number[]; states: Partial<State>[] }
-  | { type: "end"; summary?: unknown; digest?: string; exit?: number };
+  | ({ type: "end" } & End);
 
 /** Messages that the page sends. */
 export type Command =

@@ -2,7 +2,9 @@
 import { seekFile, send, stepFile } from "../feed/client";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
-import { clock } from "../text/format";
+import { hasEnded } from "../store/age";
+import { diveTime } from "../text/times";
+import { Time } from "../ui/Time";
 
 const SPEEDS: (number | null)[] = [0.25, 0.5, 1, 2, 4, 8, 16, 64, null];
 
@@ -57,9 +59,10 @@ export function Replay() {
       <button type="button" disabled={off} onClick={play.step} title="Step (.)">{file ? "+1 s" : "Step"}</button>
       <button type="button" disabled={off} onClick={play.section} title="Step by a section (,)">{file ? "+10 s" : "Section"}</button>
       <input type="range" min={from_s} max={Math.max(to_s, from_s + 0.1)} step="any" value={at_s} disabled={off} aria-label="Time of the dive"
-        aria-valuetext={`${clock(at_s - from_s)} of ${clock(to_s - from_s)}`} onChange={(event) => play.to(Number(event.currentTarget.value))}
+        aria-valuetext={`${diveTime(store.hello, at_s)} of ${diveTime(store.hello, to_s)}`} onChange={(event) => play.to(Number(event.currentTarget.value))}
         onInput={(event) => file && play.to(Number(event.currentTarget.value))} />
-      <span class="at">{clock(at_s - from_s)} / {clock(to_s - from_s)}</span>
+      <span class="at"><Time at_s={at_s} /> / <Time at_s={to_s} /></span>
+      {file && !hasEnded(store) ? <span class="count">wall and alerts: state at the end</span> : null}
       {file ? null : (
         <label class="speed-choice"><span class="sr">Speed of the replay</span>
           <select disabled={off} value={String(speed)} onChange={(event) => send({ do: "play", command: "speed", speed: event.currentTarget.value === "null" ? null : Number(event.currentTarget.value) })}>
@@ -67,7 +70,7 @@ export function Replay() {
           </select>
         </label>
       )}
-      {paused && !file ? <b class="paused">PAUSED</b> : null}
+      {paused && !file && !hasEnded(store) ? <b class="paused">PAUSED</b> : null}
     </section>
   );
 }

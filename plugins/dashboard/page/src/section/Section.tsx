@@ -3,8 +3,10 @@ import { prefsTopic } from "../store/prefs";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure } from "../text/format";
+import { hasEnded, isOld } from "../store/age";
 import { fit, useSize, type Size } from "../ui/canvas";
 import { drawSection } from "./draw";
+import { wallWarning } from "./walls";
 
 export function Section() {
   const canvas = useRef<HTMLCanvasElement>(null), size = useRef<Size>({ width: 0, height: 0, scale: 1 });
@@ -27,6 +29,7 @@ export function Section() {
   return (
     <section class="panel section" aria-label="Cross-section">
       <div class="panel-head"><h2>Section</h2><Attitude /></div>
+      <Close />
       <div class="section-box" ref={box}>
         <canvas ref={canvas} role="img" aria-label="Cross-section looking inwards: profile, returns of this turn and the last, heads, echosounders and the vehicle" />
       </div>
@@ -34,9 +37,16 @@ export function Section() {
   );
 }
 
+/** Warning about a close wall. It describes the present, so it is empty while the data is old. */
+function Close() {
+  useTopics(store.topics.state, store.topics.clock);
+  const words = hasEnded(store) || isOld(store) ? "" : wallWarning(store.state?.echosounders ?? []);
+  return <p class="close-wall" role="status">{words}</p>;
+}
+
 function Attitude() {
   useTopics(store.topics.state);
   const pose = store.state?.pose;
   if (!pose) return <span class="attitude">attitude unknown</span>;
-  return <span class="attitude">roll {figure(pose.roll_deg, 0)}° pitch {figure(pose.pitch_deg, 0)}° yaw {figure(pose.yaw_deg, 0)}°</span>;
+  return <span class="attitude">roll {figure(pose.roll_deg, 0)}° pitch {figure(pose.pitch_deg, 0)}°</span>;
 }

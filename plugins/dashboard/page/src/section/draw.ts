@@ -1,7 +1,9 @@
 // Draws the cross-section, seen looking inwards: the tunnel's left is on the left.
+import type { Echosounder } from "../feed/types";
 import type { Store } from "../store/store";
 import type { Return } from "../store/turns";
 import { figure } from "../text/format";
+import { isClose, isFresh, sideOf } from "./walls";
 import { colour } from "../ui/colours";
 
 const FONT = "system-ui, 'DejaVu Sans', sans-serif";
@@ -36,8 +38,11 @@ export function drawSection(context: CanvasRenderingContext2D, store: Store, wid
     const latest = turns.present.at(-1);
     if (latest && sensor?.state !== "silent" && sensor?.state !== "never") direction(frame, pose, latest, head, hello.profile);
   });
-  (state?.echosounders ?? []).forEach((echo) => sounder(frame, echo));
+  const echosounders = state?.echosounders ?? [];
+  echosounders.forEach((echo) => beam(frame, echo));
   vehicle(frame, pose);
+  // The labels of short beams lie on the vehicle.
+  echosounders.forEach((echo) => distance(frame, echo));
 }
 
 function profile({ context, x, y }: Frame, points: [number, number][]): void {
@@ -133,11 +138,13 @@ function direction(frame: Frame, pose: Pose, latest: Return, head: number, point
   text(frame, String(head + 1), lx, ly + 0.5, "bold 12px", colour("ink"));
 }
 
-function sounder(frame: Frame, echo: { id: string; range_m: number | null; age_s: number | null; from: [number, number]; to: [number, number] | null }): void {
-  const { context, x, y } = frame;
+function inkOf(echo: Echosounder): string {
+  return colour(!isFresh(echo) ? "faint" : isClose(echo) ? "amber-ink" : "echo");
+}
+
+function beam({ context, x, y }: Frame, echo: Echosounder): void {
   if (!echo.to) return;
-  const stale = echo.age_s === null || echo.age_s > 2;
-  context.strokeStyle = colour(stale ? "faint" : "echo");
+  context.strokeStyle = inkOf(echo);
   context.setLineDash([2, 5]);
   context.lineWidth = 2;
   context.beginPath();
@@ -146,8 +153,15 @@ function sounder(frame: Frame, echo: { id: string; range_m: number | null; age_s
   context.stroke();
   context.setLineDash([]);
   context.lineWidth = 1;
-  const at = 0.5, lx = x(echo.from[0]) + (x(echo.to[0]) - x(echo.from[0])) * at, ly = y(echo.from[1]) + (y(echo.to[1]) - y(echo.from[1])) * at;
-  text(frame, stale ? "silent" : figure(echo.range_m, 2), lx, ly - 8, "12px", colour(stale ? "faint" : "echo"));
+}
+
+/** Writes the distance to the wall beside the middle of the beam. */
+function distance(frame: Frame, echo: Echosounder): void {
+  const { from, to, range_m } = echo, side = sideOf(echo), close = isClose(echo);
+  if (!to) return;
+  const lx = frame.x((from[0] + to[0]) / 2), ly = frame.y((from[1] + to[1]) / 2), upright = side === "up" || side === "down";
+  const words = isFresh(echo) ? `${figure(range_m, close ? 2 : 1)} m` : "silent";
+  text(frame, words, lx + (upright ? 24 : 0), ly - (upright ? 0 : 10), close ? "bold 14px" : "13px", inkOf(echo), colour("water"));
 }
 
 function vehicle(frame: Frame, pose: Pose): void {
@@ -174,10 +188,17 @@ function vehicle(frame: Frame, pose: Pose): void {
   context.lineWidth = 1;
 }
 
-function text({ context }: Frame, what: string, x: number, y: number, font: string, ink: string): void {
+function text({ context }: Frame, what: string, x: number, y: number, font: string, ink: string, halo?: string): void {
   context.font = `${font} ${FONT}`;
   context.fillStyle = ink;
   context.textAlign = "center";
   context.textBaseline = "middle";
+  if (halo) {
+    context.strokeStyle = halo;
+    context.lineWidth = 4;
+    context.lineJoin = "round";
+    context.strokeText(what, x, y);
+    context.lineWidth = 1;
+  }
   context.fillText(what, x, y);
 }

@@ -1,7 +1,8 @@
 // Lengths by verdict, the remaining length, and directions for going back to missed stretches.
+import { hasEnded, metresOf } from "../store/age";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
-import { figure, metres, span, station } from "../text/format";
+import { figure, metres, span, speedDown, station, stretch } from "../text/format";
 import { VERDICTS } from "../text/table";
 import { plain } from "../text/words";
 import { actions } from "../wall/control";
@@ -10,7 +11,7 @@ const ORDER = ["pass", "fail", "cannot_say", "not_inspected", "open"] as const;
 
 export function Metres() {
   useTopics(store.topics.state);
-  const all = store.state?.metres;
+  const all = metresOf(store);
   const whole = Math.max(all?.way_m ?? 0, 1e-9);
   let at = 0;
   return (
@@ -19,11 +20,12 @@ export function Metres() {
       <svg class="bar" viewBox="0 0 1000 20" preserveAspectRatio="none" aria-hidden="true">
         <defs>
           <pattern id="unsure" width="10" height="10" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="10" height="10" class="v-cannot-say" /><rect width="4" height="10" class="v-stripe" /></pattern>
+          <pattern id="unpassed" width="10" height="10" patternUnits="userSpaceOnUse" patternTransform="rotate(-45)"><rect width="10" height="10" class="v-open" /><rect width="3" height="10" class="v-grey-stripe" /></pattern>
         </defs>
         {ORDER.map((key) => {
           const share = ((all?.[`${key}_m`] ?? 0) / whole) * 1000, x = at;
           at += share;
-          return <rect key={key} x={x} y="0" width={Math.max(share > 0 ? 4 : 0, share)} height="20" class={`v-${key.replaceAll("_", "-")}`} fill={key === "cannot_say" ? "url(#unsure)" : undefined} />;
+          return <rect key={key} x={x} y="0" width={Math.max(share > 0 ? 4 : 0, share)} height="20" class={`v-${key.replaceAll("_", "-")}`} />;
         })}
       </svg>
       <dl>
@@ -64,17 +66,20 @@ function Left() {
 }
 
 export function Back() {
-  useTopics(store.topics.back);
-  const { legs, way_m, time_s } = store.back;
+  useTopics(store.topics.back, store.topics.state);
+  // A file has the legs of the end only.
+  const known = store.link.phase !== "file" || hasEnded(store);
+  const { legs, way_m, time_s } = known ? store.back : { legs: [], way_m: 0, time_s: 0 };
+  const totals = legs.length === 0 ? [] : [legs.length > 1 ? `${legs.length} stretches` : null, metres(way_m), time_s === null ? null : span(time_s)];
   return (
     <section class="panel back" aria-label="The way back">
-      <div class="panel-head"><h2>Way back</h2><span class="count">{legs.length === 0 ? "" : `${metres(way_m)}, ${span(time_s)}`}</span></div>
-      {legs.length === 0 ? <p class="none">nothing to go back for</p> : (
+      <div class="panel-head"><h2>Way back</h2><span class="count">{totals.filter((part) => part !== null).join(", ")}</span></div>
+      {legs.length === 0 ? <p class="none">{known ? "nothing to go back for" : "a file has this list only for the end of the dive"}</p> : (
         <ol tabIndex={0} aria-label="Stretches to pass again, in order">
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
-              <button type="button" class="leg" onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
-                <b>{station(leg.from_m)}–{station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` ≤ ${figure(leg.at_most_mps, 2)} m/s`}<span class="leg-why"> {plain(leg.why)}</span>
+              <button type="button" class="leg" title={`${station(leg.from_m, 2)}–${station(leg.to_m, 2)}`} onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
+                <b>{stretch(leg.from_m, leg.to_m)}</b>{leg.at_most_mps === null ? "" : <> <span class="at-most">≤ {speedDown(leg.at_most_mps)} m/s</span></>} <span class="leg-why">{plain(leg.why)}</span>
               </button>
             </li>
           ))}

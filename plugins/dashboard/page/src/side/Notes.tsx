@@ -4,8 +4,9 @@ import { note } from "../feed/client";
 import { store } from "../store/store";
 import type { Note } from "../feed/types";
 import { useTopics } from "../store/topic";
-import { clock, station } from "../text/format";
+import { station } from "../text/format";
 import { NOTES } from "../text/table";
+import { Time } from "../ui/Time";
 import { playTopic, playing, togglePlay } from "../voice/play";
 import { VoiceButton, VoiceWords } from "../voice/Voice";
 import { actions } from "../wall/control";
@@ -26,7 +27,6 @@ export function words({ text, voice }: Note): string {
 
 export function Notes() {
   useTopics(store.topics.notes, store.topics.hello, playTopic);
-  const begun = store.hello?.begun_s ?? 0;
   return (
     <section class="panel notes" aria-label="Notes">
       <div class="panel-head"><h2>Notes</h2><span class="buttons"><VoiceButton /><button type="button" disabled={!(store.hello?.may.operate ?? false)} onClick={openNote} title="Note at this place (N)">Note…</button></span></div>
@@ -35,7 +35,7 @@ export function Notes() {
         {[...store.notes].reverse().map((each) => (
           <li key={each.number}>
             <button type="button" class="leg" disabled={each.chainage_m === null} onClick={() => each.chainage_m !== null && actions.goTo(each.chainage_m, 30)}>
-              <b>{each.chainage_m === null ? clock(each.at_s - begun) : station(each.chainage_m)}</b> {words(each)} <span class="leg-why">{each.by}</span>
+              {each.chainage_m === null ? null : <b>{station(each.chainage_m)}</b>} {words(each)} <span class="leg-why">{each.by} <Time at_s={each.at_s} /></span>
             </button>
             {each.voice && each.voice.seconds !== null ? <Play number={each.number} id={each.voice.id} seconds={each.voice.seconds} /> : null}
           </li>
@@ -78,7 +78,7 @@ export function NoteDialog() {
   return (
     <dialog ref={dialog} class="note" aria-label="Note">
       <form onSubmit={submit}>
-        <label>Note at {at === null || at === undefined ? "this time" : station(at, 1)}
+        <label>Note at {at === null || at === undefined ? "this time" : station(at)}
           <input ref={field} type="text" maxLength={MOST_BYTES} autocomplete="off" />
         </label>
         <span class="buttons"><button type="submit">Save (Enter)</button><VoiceButton /><button type="button" onClick={close}>Cancel (Esc)</button></span>

@@ -1,24 +1,31 @@
 // The condition, the speed, and its limit with the reason. A pilot can read them from two metres away.
-import type { Condition } from "../feed/types";
-import { shown, age_s, isOld } from "../store/age";
+import type { Speeds } from "../feed/types";
+import { shown, age_s, hasEnded, isOld, outstandingOf, sinceState_s } from "../store/age";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
-import { figure, span, station } from "../text/format";
+import { figure, heading, span, station } from "../text/format";
 import { REASONS } from "../text/table";
-import { positionWhy } from "../text/words";
+import { utcOf } from "../text/times";
+import { positionWhy, speedsOf, UNBOUNDED } from "../text/words";
 import { Shape } from "../ui/Shape";
+import { Time } from "../ui/Time";
 import { marks, scaleEnd, TOO_FAST } from "./gauge";
 
 export function Condition() {
   useTopics(store.topics.state, store.topics.link, store.topics.clock);
   const { word, advice, lamp, old } = shown(store);
+  // The lamp describes the present. Missed sections are shown beside it until they have been passed.
+  const outstanding = lamp === "ended" ? null : outstandingOf(store);
   return (
     <div class={`condition ${lamp}${old ? " old" : ""}${word.length > 14 ? " longest" : word.length > 9 ? " long" : ""}`} data-condition={store.state?.condition ?? ""}>
-      <Shape lamp={lamp} size={64} />
-      <div>
-        <div class="word">{word}</div>
-        <div class="advice">{advice}</div>
+      <div class="lamp">
+        <Shape lamp={lamp} size={64} />
+        <div>
+          <div class="word">{word}</div>
+          <div class="advice">{advice}</div>
+        </div>
       </div>
+      {outstanding === null ? null : <p class="outstanding">{outstanding}</p>}
     </div>
   );
 }
@@ -31,40 +38,37 @@ export function Announcer() {
   return <div class="sr" role="status" aria-live="polite">{said}</div>;
 }
 
-/** Text if nothing limits the speed. */
-const UNBOUNDED: Partial<Record<Condition, string>> = {
-  passed: "the wall here has passed",
-  going_back: "up to max, the drive back counts as a pass",
-  outside: "no verdicts here",
-};
-
 export function Speed() {
   useTopics(store.topics.state);
   const { state } = store;
-  const unbounded = state ? UNBOUNDED[state.condition] : undefined, bounded = unbounded === undefined;
-  const speed = state?.speed_mps ?? null, most = bounded ? (state?.v_max_mps ?? null) : null;
-  const margin = state?.margins.speed_mps ?? null, lost = state?.margins.lost_share ?? null;
+  const unbounded = state ? UNBOUNDED[state.condition] : undefined;
+  const texts = state ? speedsOf(state) : { speed: null, limit: null, margin: null };
+  const speed = state?.speed_mps ?? null, most = texts.limit === null ? null : (state?.v_max_mps ?? null);
+  // A reason without a limit is shown only if no speed meets the target.
+  const limited = unbounded === undefined && (texts.limit !== null || state?.v_max_mps === null), lost = state?.margins.lost_share ?? null;
   return (
     <div class="speed">
       <div class="figures">
-        <div class="now"><span class="value">{figure(speed === null ? null : Math.abs(speed), 2)}</span><span class="unit">m/s{speed !== null && speed < -0.02 ? " back" : ""}</span></div>
-        <div class="most"><span class="name">max</span><span class="value">{figure(most, 2)}</span><span class="unit">m/s</span></div>
-        <div class="margin">{margin === null || !bounded ? "" : margin >= 0 ? `${figure(margin, 2)} to spare` : `${figure(-margin, 2)} too fast`}</div>
+        <div class="now"><span class="value">{texts.speed ?? "–"}</span><span class="unit">m/s{speed !== null && speed < -0.02 ? " back" : ""}</span></div>
+        <div class="allowed">
+          {texts.limit === null ? null : <div class="most"><span class="name">max</span><span class="value">{texts.limit}</span><span class="unit">m/s</span></div>}
+          {texts.margin === null ? null : <div class="margin">{texts.margin}</div>}
+        </div>
       </div>
-      <Gauge speed={speed} most={most} />
+      <Gauge speed={speed} most={most} texts={texts} />
       <div class="why">
-        {state?.reason && bounded ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
-        {state?.remedy && bounded ? <span class="remedy"><b>faster option</b> {state.remedy}</span> : null}
+        {state?.reason && limited ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
+        {state?.remedy && limited ? <span class="remedy"><b>faster option</b> {state.remedy}</span> : null}
       </div>
-      {bounded ? <Forecast /> : <div class="forecast">{unbounded}</div>}
+      {unbounded === undefined ? <Forecast /> : <div class="forecast">{unbounded}</div>}
     </div>
   );
 }
 
-function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
+function Gauge({ speed, most, texts }: { speed: number | null; most: number | null; texts: Speeds }) {
   const end = scaleEnd(speed, most), x = (v: number): number => Math.min(1000, (Math.abs(v) / end) * 1000);
   const at = speed === null ? null : x(speed);
-  const told = speed === null ? "no speed" : `${figure(Math.abs(speed), 2)} metres per second, limit ${figure(most, 2)}`;
+  const told = texts.speed === null ? "no speed" : `${texts.speed} metres per second, ${texts.limit === null ? "no limit" : `limit ${texts.limit}`}`;
   return (
     <div class="gauge-box">
     <svg class="gauge" viewBox="-14 0 1028 66" role="img" aria-label={`Speed: ${told}`} preserveAspectRatio="none">
@@ -104,14 +108,34 @@ function Forecast() {
 export function Place() {
   useTopics(store.topics.state, store.topics.clock, store.topics.link);
   const { state } = store, position = state?.position;
-  const age = age_s(store), dead = !position || position.state === "none";
+  const dead = !position || position.state === "none";
   return (
     <div class="place">
       <div class={`chainage${dead ? " dead" : ""}`}>{dead ? "no position" : station(position.chainage_m ?? 0, 1)}</div>
       <div class="sure">
         {dead ? positionWhy(position?.why) : <>± {figure(position.chainage_sd_m === null ? null : 2 * position.chainage_sd_m, 2)} m (95 %){position.state === "doubtful" ? <b class="doubt"> doubtful: {positionWhy(position.why)}</b> : null}</>}
       </div>
-      <div class={`age${isOld(store) ? " old" : ""}`}>{store.link.phase === "file" ? "from a file" : `data ${age === null ? "–" : span(age)} old`}</div>
+      <Ages />
+      <DiveClock />
+      <div class="pose">
+        {state?.depth_m === undefined || state.depth_m === null ? null : <span class="depth">depth <b>{figure(state.depth_m, 1)} m</b></span>}
+        {state?.pose ? <span class="heading">heading <b>{heading(state.pose.yaw_deg)}</b></span> : null}
+      </div>
     </div>
   );
+}
+
+/** Age of the data. It has no meaning after the end of the dive. */
+function Ages() {
+  const age = age_s(store), file = store.link.phase === "file";
+  if (file || hasEnded(store)) return <div class="age">{file ? "from a file" : "at the end of the dive"}</div>;
+  return <div class={`age${isOld(store) ? " old" : ""}`}>data {age === null ? "–" : span(age)} old</div>;
+}
+
+/** Time of the dive, and UTC if it is known. In a live dive it goes on while no data arrive. */
+function DiveClock() {
+  const { state, hello } = store;
+  if (!state || state.at_s === null) return null;
+  const now_s = state.now_s + (hello?.mode === "live" ? sinceState_s(store) : 0), utc = utcOf(hello, now_s);
+  return <div class="clock"><span>dive <b><Time at_s={now_s} /></b></span> {utc === "" ? null : <span class="utc">{utc.slice(11)}</span>}</div>;
 }

@@ -1,6 +1,7 @@
 // Age of the displayed data, and text about the age.
-import { span } from "../text/format";
-import { CONDITIONS } from "../text/table";
+import { metres, span } from "../text/format";
+import { CONDITIONS, VERDICTS } from "../text/table";
+import type { Metres } from "../feed/types";
 import { conditionWords, oldWords, type Shown } from "../text/words";
 import type { Store } from "./store";
 
@@ -15,6 +16,21 @@ export function stands(store: Store): boolean {
 /** Whether the dive has ended, so that no more data arrive. */
 export function hasEnded(store: Store): boolean {
   return store.end !== null || store.state?.ended === true;
+}
+
+/** Lengths by verdict. Those of the result replace those of the last state, whose verdicts are not all final. */
+export function metresOf({ end, state }: Store): Metres | null {
+  const sums = end?.summary;
+  if (!sums) return state?.metres ?? null;
+  const { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = sums;
+  return { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, way_m: end?.way?.length_m ?? state?.metres.way_m ?? 0 };
+}
+
+/** Text about missed sections that are still to be passed; null if there are none. Files of earlier versions have only their length. */
+export function outstandingOf(store: Store): string | null {
+  const { state } = store, fail_m = metresOf(store)?.fail_m ?? 0;
+  if (state?.outstanding !== undefined) return state.outstanding;
+  return fail_m > 0 ? `${metres(fail_m)} ${VERDICTS.fail}` : null;
 }
 
 /** Seconds since the state arrived. */
@@ -53,8 +69,7 @@ export function shown(store: Store): Shown {
   }
   const gone = sinceState_s(store);
   if (hasEnded(store)) {
-    const advice = link.phase === "lost" ? "the program has closed" : "all verdicts are final";
-    return { word: "DIVE ENDED", advice, lamp: "amber", old: false };
+    return { word: "DIVE ENDED", advice: "all verdicts are final", lamp: "ended", old: false };
   }
   if (lost !== null && (lost > OLD_AFTER_S || gone > OLD_AFTER_S)) {
     return { word: "NO CONNECTION", advice: `for ${span(Math.max(lost, gone))}: all data here is old`, lamp: "red", old: true };

@@ -1,7 +1,7 @@
 // All data of the page: the feed's content, with a topic for each subject. The page computes nothing except the order
 // of items.
 import { KIND_SECTIONS, type Frame } from "../feed/binary";
-import type { Alert, Back, Hello, History, Message, Note, State, Told } from "../feed/types";
+import type { Alert, Back, End, Hello, History, Message, Note, State, Told } from "../feed/types";
 import { Sections } from "./sections";
 import { Topic } from "./topic";
 import { Turns } from "./turns";
@@ -35,7 +35,7 @@ export class Store {
   session = 0;
   /** Whether all data has arrived once, so that a later connection needs only the changes. */
   private known = false;
-  end: { digest?: string; exit?: number } | null = null;
+  end: End | null = null;
   alerts = new Map<number, Alert>();
   alertsHidden = 0;
   notes: Note[] = [];
@@ -91,7 +91,7 @@ export class Store {
       case "done":
         return this.answered(`done: ${(message as { do: string }).do}`, false);
       case "end":
-        this.end = message as { digest?: string; exit?: number };
+        this.end = message as End;
         return this.topics.state.changed();
       default:
         if (typeof (message as Told).text === "string") this.tell(message as Told);
@@ -146,6 +146,8 @@ export class Store {
     const before = this.state;
     this.state = state;
     this.state_ms = performance.now();
+    // A page that was open before the dive's first data learns only now when the dive began.
+    if (this.hello && state.begun_s) this.hello.begun_s = state.begun_s;
     if (state.alerts_hidden !== undefined && state.alerts_hidden !== this.alertsHidden) {
       this.alertsHidden = state.alerts_hidden;
       this.topics.alerts.changed();

@@ -1,13 +1,31 @@
 // Formats numbers, lengths and times for people.
 
-/** Chainage in engineers' notation: 1+240 for 1240 m, with this many decimals. */
-export function station(chainage_m: number, decimals = 0): string {
+/** Chainage in engineers' notation: 1+240.0 for 1240 m, with this many decimals. */
+export function station(chainage_m: number, decimals = 1): string {
   const scale = 10 ** decimals;
   const units = Math.round(Math.abs(chainage_m) * scale);
   const sign = chainage_m < 0 && units > 0 ? "-" : "";
   const kilometres = Math.floor(units / (1000 * scale));
   const metres = ((units - kilometres * 1000 * scale) / scale).toFixed(decimals);
-  return `${sign}${kilometres}+${metres.padStart(decimals > 0 ? 4 + decimals : 3, "0")}`;
+  return `${sign}${kilometres}+${metres.padStart(4 + decimals, "0")}`;
+}
+
+/** A stretch with one decimal, rounded outward, in the given order: 0+016.3–0+010.7 for 16.25 to 10.75 m. */
+export function stretch(from_m: number, to_m: number): string {
+  const end = (at_m: number, other_m: number): string => station((at_m > other_m ? Math.ceil(at_m * 10 - 1e-6) : Math.floor(at_m * 10 + 1e-6)) / 10);
+  return `${end(from_m, to_m)}–${end(to_m, from_m)}`;
+}
+
+/** A speed that may not be exceeded, rounded down to hundredths, and below 0.1 m/s to thousandths. */
+export function speedDown(speed_mps: number): string {
+  const decimals = speed_mps < 0.1 ? 3 : 2, scale = 10 ** decimals;
+  return figure(Math.floor(speed_mps * scale + 1e-6) / scale, decimals);
+}
+
+/** Direction of the nose from the tunnel axis: 1.2° left. Positive yaw is to the left. */
+export function heading(yaw_deg: number): string {
+  const size = figure(Math.abs(yaw_deg), 1);
+  return size === "0.0" ? "0.0°" : `${size}° ${yaw_deg > 0 ? "left" : "right"}`;
 }
 
 /** A number with this many decimals and a proper minus; a dash without a value. */

@@ -9,7 +9,7 @@ export const CONDITIONS = {
   outside: { name: "OUTSIDE", detail: "no head is within the tunnel", action: "", speed: "" },
   no_sonar: { name: "NO SONAR", detail: "no returns", action: "stop", speed: "" },
   passed: { name: "passed here", detail: "any speed will do", action: "", speed: "" },
-  going_back: { name: "going back", detail: "to a missed section: any speed will do", action: "", speed: "" },
+  going_back: { name: "going back", detail: "at any speed", action: "", speed: "" },
   no_speed: { name: "slower won't help", detail: "no speed meets the target here", action: "", speed: "" },
   too_fast: { name: "TOO FAST", detail: "", action: "", speed: "at most" },
   turn_fails: { name: "THIS TURN MISSES", detail: "", action: "", speed: "go" },

@@ -12,7 +12,7 @@ import { actions, current, vehicle, viewTopic, wayOf, whole } from "./control";
 import { columns, WORDS } from "./columns";
 import { usePointer } from "./pointer";
 import { WallGl, type Part, type WallColours } from "./gl";
-import { Legend } from "./Legend";
+import { Legend, Scale } from "./Legend";
 import { drawOverlay, type Layout, type Row } from "./overlay";
 import { SampleWindow } from "./samples";
 import { left_m, right_m, roundOf, wholeView, type Round, type View } from "./view";
@@ -34,7 +34,7 @@ function layoutOf({ width, height }: Size): Layout {
 function wallColours(): WallColours {
   return {
     blank: colour("wall-blank"), open: colour("wall-open"), missed: colour("wall-missed"), flag: colour("wall-flag"),
-    hatch: colour("wall-hatch"), dot: colour("wall-dot"), fresh: colour("wall-fresh"), gain: Number(getComputedStyle(document.documentElement).getPropertyValue("--wall-gain")) || 1,
+    hatch: colour("wall-hatch"), grey: colour("wall-grey"), dot: colour("wall-dot"), fresh: colour("wall-fresh"), gain: Number(getComputedStyle(document.documentElement).getPropertyValue("--wall-gain")) || 1,
   };
 }
 
@@ -160,7 +160,9 @@ class Painter {
       const first = head.present[0];
       if (first && at < 16) this.turns[at] = first.t_s - hello.begun_s - 0.0005;
     });
-    return { samples: this.window, radius_m: target_m / 2, perimeter_m: hello.perimeter_m, turn_t_s: this.turns };
+    // Live samples may arrive shortly before their state.
+    const now_s = store.link.phase === "file" ? (store.state?.now_s ?? 0) - hello.begun_s : 1e9;
+    return { samples: this.window, now_s, radius_m: target_m / 2, perimeter_m: hello.perimeter_m, turn_t_s: this.turns };
   }
 
   /** Text about the place under the pointer. */
@@ -221,7 +223,7 @@ export function Wall() {
     <section class="panel wall" aria-label="Unrolled wall">
       <div class="wall-head">
         <h2>Wall</h2>
-        <Legend />
+        <Scale />
         <span class="under" aria-hidden="true">{under}</span>
         <span class="buttons">
           <button type="button" onClick={() => actions.zoom(0.5)} title="Zoom in (+)" aria-label="Zoom in">+</button>
@@ -230,6 +232,7 @@ export function Wall() {
           <button type="button" onClick={actions.whole} title="Whole tunnel (0)">Whole</button>
         </span>
       </div>
+      <Legend />
       <div class="wall-box" ref={box}>
         {why ? <p class="missing" role="alert">The wall can't be drawn: {why}. Everything else works.</p> : null}
         <canvas ref={wall} aria-hidden="true" />

@@ -5,14 +5,14 @@ import { FLOATS, type SampleWindow } from "./samples";
 import { DISC_FRAGMENT, DISC_VERTEX, DOT_FRAGMENT, DOT_VERTEX, FULL_VERTEX, MARKS_FRAGMENT, POINT_DISC_FRAGMENT, POINT_DISC_VERTEX, WALL_FRAGMENT } from "./shaders";
 import type { Round, View } from "./view";
 
-export interface WallColours { blank: string; open: string; missed: string; flag: string; hatch: string; dot: string; fresh: string; gain: number }
+export interface WallColours { blank: string; open: string; missed: string; flag: string; hatch: string; grey: string; dot: string; fresh: string; gain: number }
 
 /** A part of the canvas, in device pixels from the canvas's lower left corner. */
 export interface Part { x: number; y: number; width: number; height: number }
 
 export interface Drawing {
   part: Part; columns: Uint32Array; view: View; round: Round; scale: number;
-  discs: { samples: SampleWindow; radius_m: number; perimeter_m: number; turn_t_s: Float32Array } | null;
+  discs: { samples: SampleWindow; radius_m: number; perimeter_m: number; turn_t_s: Float32Array; now_s: number } | null;
 }
 
 /** Discs of a smaller radius, CSS pixels, are drawn as points. */
@@ -155,6 +155,7 @@ export class WallGl {
     gl.uniform1i(this.dots.at("u_all"), Math.min(radius, down) > 4 * drawing.scale ? 1 : 0);
     gl.uniform1f(this.dots.at("u_point"), Math.min(Math.max(radius / 6, 1), 3.5 * drawing.scale));
     gl.uniform1fv(this.dots.at("u_turn_t_s"), discs.turn_t_s);
+    gl.uniform1f(this.dots.at("u_now_s"), discs.now_s);
     gl.uniform3fv(this.dots.at("u_dot"), rgb(colours.dot));
     gl.uniform3fv(this.dots.at("u_new"), rgb(colours.fresh));
     gl.bindVertexArray(this.points);
@@ -182,7 +183,7 @@ export class WallGl {
     gl.uniform1f(program.at("u_zoom"), view.zoomDown);
     gl.uniform1f(program.at("u_scale"), scale);
     gl.uniform1f(program.at("u_gain"), colours.gain);
-    for (const name of ["blank", "open", "missed", "flag", "hatch"] as const) {
+    for (const name of ["blank", "open", "missed", "flag", "hatch", "grey"] as const) {
       gl.uniform3fv(program.at(`u_${name}`), rgb(colours[name]));
     }
   }

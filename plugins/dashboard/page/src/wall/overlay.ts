@@ -82,7 +82,7 @@ export function step_m(least_m: number): number {
 }
 
 function stations(context: CanvasRenderingContext2D, view: View, layout: Layout): void {
-  const step = step_m((view.span_m / layout.width) * 84), decimals = step < 1 ? Math.ceil(-Math.log10(step)) : 0;
+  const step = step_m((view.span_m / layout.width) * 84), decimals = step < 1 ? Math.ceil(-Math.log10(step)) : 1;
   context.font = `13px ${FONT}`;
   context.textAlign = "center";
   context.fillStyle = context.strokeStyle = colour("ink");

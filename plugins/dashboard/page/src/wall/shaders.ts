@@ -17,7 +17,7 @@ uniform float u_middle;  // fraction of the round in the middle of the height
 uniform float u_zoom;    // heights of one round
 uniform float u_gain;    // brightness of colours
 uniform float u_scale;   // device pixels of a CSS pixel
-uniform vec3 u_blank, u_open, u_missed, u_flag, u_hatch;
+uniform vec3 u_blank, u_open, u_missed, u_flag, u_hatch, u_grey;
 const vec3 stops[10] = vec3[10](${stops});
 vec3 cividis(float share) {
   float at = clamp(share, 0.0, 1.0) * 9.0;
@@ -59,7 +59,7 @@ void main() {
   colour = vec4(seen ? its : (judged ? u_blank : u_open), 1.0);
 }`;
 
-/** Draws over columns and discs: a hatch for "can't say", and the outline of flagged sections. */
+/** Draws over columns and discs: hatches for "can't say" and "not inspected", and the outline of flagged sections. */
 export const MARKS_FRAGMENT = `${COMMON}
 out vec4 colour;
 uint stateAt(float x) { return texelFetch(u_columns, ivec2(int(clamp(x, 0.0, u_size.x - 1.0)), 0), 0).x; }
@@ -74,10 +74,7 @@ void main() {
     if (side || edge) { colour = vec4(u_flag, 1.0); return; }
   }
   if (verdict == 3u && stripe(place, 9.0, 2.5)) { colour = vec4(u_hatch, 1.0); return; }
-  if (verdict == 4u && mod(place.x, 6.0 * u_scale) < u_scale * 1.5 && mod(place.y, 6.0 * u_scale) < u_scale * 1.5) {
-    colour = vec4(u_hatch * 0.7, 1.0);
-    return;
-  }
+  if (verdict == 4u && stripe(place * vec2(1.0, -1.0), 9.0, 2.5)) { colour = vec4(u_grey, 1.0); return; }
   discard;
 }`;
 
@@ -132,11 +129,12 @@ layout(location = 0) in vec4 a_sample;
 uniform float u_point;      // pixels
 uniform bool u_all;         // dots of all turns, or of the present one
 uniform float u_turn_t_s[16]; // where each head's present turn begins
+uniform float u_now_s;        // time shown; a file has later samples
 out float v_kind;
 void main() {
   vec2 at = placed(a_sample.x, a_sample.y);
   int head = int(mod(a_sample.w, 16.0));
-  bool present = a_sample.z >= u_turn_t_s[head];
+  bool present = a_sample.z >= u_turn_t_s[head] && a_sample.z <= u_now_s;
   float outcome = floor(a_sample.w / 16.0);
   v_kind = outcome > 0.0 ? 2.0 : present ? 1.0 : 0.0;
   gl_PointSize = present ? u_point + 2.5 * u_scale : u_point;
@@ -151,6 +149,6 @@ void main() {
   vec2 corner = gl_PointCoord * 2.0 - 1.0;
   float off = dot(corner, corner);
   if (off > 1.0) discard;
-  if (v_kind > 1.5) { if (off < 0.3) discard; colour = vec4(u_flag, 1.0); return; }
+  if (v_kind > 1.5) { if (off < 0.2) discard; colour = vec4(off < 0.6 ? u_hatch : u_dot, 1.0); return; }
   colour = vec4(v_kind > 0.5 ? u_new : u_dot, 1.0);
 }`;

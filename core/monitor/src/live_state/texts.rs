@@ -1,0 +1,119 @@
+//! Texts of the live state that all screens show.
+
+use serde::Serialize;
+
+use super::condition::Condition;
+use super::speed_band::SpeedBand;
+use super::state::LiveState;
+use crate::pilot_text::{limit_steps, speed_steps, station};
+use crate::words::verdict_words;
+use headrace_coverage::Verdict;
+
+/// Texts of the speed and its limit, each without its unit.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct SpeedTexts {
+    /// Absolute speed along the tunnel; `None` without a position, or if the data are old.
+    pub speed: Option<String>,
+    /// Largest advised speed; `None` if no limit applies here and now.
+    pub limit: Option<String>,
+    /// Difference between both, in words; `None` without one of them.
+    pub margin: Option<String>,
+}
+
+impl LiveState {
+    /// Whether the pilot has to keep a speed limit at present.
+    fn has_limit(&self) -> bool {
+        match self.condition() {
+            Condition::NoData
+            | Condition::Old(_)
+            | Condition::NoPosition(_)
+            | Condition::Outside(_)
+            | Condition::NoSonar
+            | Condition::Passed
+            | Condition::GoingBack(_)
+            | Condition::NoSpeed => false,
+            Condition::TooFast
+            | Condition::TurnFails
+            | Condition::CannotSay(_)
+            | Condition::Over
+            | Condition::TurnUnsure
+            | Condition::Good => !self.asks_to_stand(),
+        }
+    }
+
+    /// Texts of the speed and its limit.
+    ///
+    /// Both have the same number of decimals. The limit is rounded down. The speed is rounded up if it is over the
+    /// limit, and is otherwise shown as at most the limit, so that the figures agree with the condition.
+    pub fn speed_texts(&self) -> SpeedTexts {
+        let is_now = !matches!(self.condition(), Condition::NoData | Condition::Old(_));
+        let speed_mps = self.speed_mps.filter(|_| is_now).map(f64::abs);
+        let limit_mps = self.v_max_mps().filter(|_| self.has_limit());
+        let (decimals, steps) = speed_steps(limit_mps.or(speed_mps).unwrap_or(0.0));
+        let limit = limit_mps.map(|mps| limit_steps(mps, steps));
+        let is_over = self.speed_band() != SpeedBand::Within;
+        let speed = speed_mps.map(|mps| match limit {
+            Some(limit) if is_over => (mps * steps - 1e-6).ceil().max(limit + 1.0),
+            Some(limit) => (mps * steps).round().min(limit),
+            None => (mps * steps).round(),
+        });
+        let text = |in_steps: f64| format!("{:.decimals$}", in_steps / steps);
+        let margin = limit.zip(speed).map(|(limit, speed)| match limit - speed {
+            left if left > 0.5 => format!("{} to spare", text(left)),
+            left if left < -0.5 => format!("{} too fast", text(-left)),
+            _ => "at the limit".to_owned(),
+        });
+        SpeedTexts { speed: speed.map(text), limit: limit.map(text), margin }
+    }
+
+    /// Text about missed stretches: their length, and where the first one begins; `None` if there are none.
+    pub fn outstanding_text(&self) -> Option<String> {
+        let missed = verdict_words(Verdict::Fail);
+        let missed_m = Some(self.metres.fail_m).filter(|missed_m| *missed_m > 0.0)?;
+        let from =
+            self.missed_from_m.map_or_else(String::new, |from_m| format!(", from {}", station(from_m)));
+        Some(format!("{missed_m:.2} m {missed}{from}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::condition::test_state;
+    use super::*;
+    use headrace_sampling::advice::Advice;
+
+    /// Texts for a speed and a limit, m/s, as one line.
+    fn shown(speed_mps: f64, v_max_mps: f64) -> String {
+        let state = test_state();
+        let advice = state.advice.map(|advice| Advice { v_max_mps, ..advice });
+        let texts = LiveState { speed_mps: Some(speed_mps), advice, ..state }.speed_texts();
+        [texts.speed, texts.limit, texts.margin].map(Option::unwrap).join(" | ")
+    }
+
+    #[test]
+    fn figures_of_speed_limit_and_margin_agree_with_each_other_and_with_the_condition() {
+        let texts = [(0.0904, 0.0939), (0.0939, 0.0939), (0.0945, 0.0939), (0.0965, 0.0939), (0.1, 0.0939)]
+            .map(|(speed_mps, v_max_mps)| shown(speed_mps, v_max_mps));
+        insta::assert_snapshot!(texts.join("\n"), @r"
+        0.090 | 0.093 | 0.003 to spare
+        0.093 | 0.093 | at the limit
+        0.093 | 0.093 | at the limit
+        0.097 | 0.093 | 0.004 too fast
+        0.100 | 0.093 | 0.007 too fast
+        ");
+        insta::assert_snapshot!([shown(0.104, 0.119), shown(-0.25, 0.1), shown(0.1049, 0.1)].join("\n"), @r"
+        0.10 | 0.11 | 0.01 to spare
+        0.25 | 0.10 | 0.15 too fast
+        0.11 | 0.10 | 0.01 too fast
+        ");
+    }
+
+    #[test]
+    fn no_limit_is_shown_where_none_applies() {
+        let state = test_state();
+        let back = LiveState { back_to_m: Some(8.2), speed_mps: Some(-0.3), ..state }.speed_texts();
+        assert_eq!((back.speed.as_deref(), back.limit, back.margin), (Some("0.30"), None, None));
+        let passed = LiveState { passed: true, ..state }.speed_texts();
+        assert_eq!(passed.limit, None);
+    }
+}
