@@ -100,6 +100,14 @@ fn seen(viewer: &Viewer) -> Value {
         "sections": verdicts, "legs": back.unwrap_or_else(|| json!([]))})
 }
 
+/// A new viewer of a paused replay, with all data of the present moment.
+fn joining(serving: &Serving) -> Viewer {
+    let mut viewer = Viewer::connect(serving, "", &[]).unwrap();
+    viewer.until_type("ready");
+    viewer.until("a state", |viewer| !viewer.state["now_s"].is_null());
+    viewer
+}
+
 #[test]
 fn replay_begun_in_the_middle_shows_the_same_as_one_from_the_beginning() {
     let folder = Folder::with_dive();
@@ -113,25 +121,23 @@ fn replay_begun_in_the_middle_shows_the_same_as_one_from_the_beginning() {
         let at_s = f64::from(part) / 20.0 * (to_s - from_s);
         let from = format!("{at_s}s");
         let arguments =
-            [&["replay", "dive.mcap", ANY, "--speed", "1x", "--from", &from][..], &targets].concat();
+            [&["replay", "dive.mcap", ANY, "--speed", "0.01x", "--from", &from][..], &targets].concat();
         let middle = Serving::start(&folder, &arguments);
-        let mut late = Viewer::connect(&middle, "", &[]).unwrap();
-        late.until_type("ready");
-        late.send(&json!({"do": "play", "command": "pause"}));
-        late.until("the pause", |viewer| viewer.state["playback"]["paused"] == true);
-        // A viewer that is never read would be dropped, so each comparison has a new one.
-        let mut whole = Viewer::connect(&serving, "", &[]).unwrap();
-        whole.until_type("ready");
-        whole.send(&json!({"do": "play", "command": "seek", "to_s": late.state["now_s"]}));
+        let mut viewer = Viewer::connect(&middle, "", &[]).unwrap();
+        // Nothing is sent to the replay, because a pause or a jump would send all data again.
+        viewer.until("the jump", |viewer| viewer.state["now_s"].as_f64() > Some(from_s + at_s - 0.1));
+        let late = joining(&middle);
         let now_s = late.state["now_s"].clone();
-        whole.until("the jump", |viewer| viewer.state["now_s"] == now_s);
-        assert_eq!(seen(&late), seen(&whole), "{at_s} s");
+        let mut other = joining(&serving);
+        other.send(&json!({"do": "play", "command": "seek", "to_s": now_s}));
+        other.until("the jump", |viewer| viewer.state["now_s"] == now_s);
+        assert_eq!(seen(&late), seen(&joining(&serving)), "{at_s} s");
         missed += usize::from(!late.state["outstanding"].is_null());
-        late.send(&json!({"do": "play", "command": "end"}));
+        viewer.send(&json!({"do": "play", "command": "end"}));
         middle.end();
     }
     assert!(missed > 2, "{missed} times with missed sections");
-    let mut last = Viewer::connect(&serving, "", &[]).unwrap();
+    let mut last = joining(&serving);
     end(serving, &mut last);
 }
 
