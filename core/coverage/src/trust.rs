@@ -121,7 +121,8 @@ impl HalfTurn {
 
 /// Least ratio of squared changes to squared deviations from the mean at which a range counts as noise.
 ///
-/// Independent noise has 2 +- 0.2 in the returns of half a turn. Range to a wall has 0.1 or less.
+/// Independent noise has 2 +- 0.2 in the returns of half a turn. Range to a wall has much less, unless the vehicle is in the
+/// centre of a round tunnel.
 const NOISE_RATIO: f64 = 1.0;
 /// Resolution of a profiling sonar's range, m. Changes below it show nothing.
 const RESOLUTION_M: f64 = 0.002;
