@@ -81,9 +81,11 @@ impl AlertList {
     ///
     /// `state` is the live state of the last advice update, with `now` set to `at`.
     pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
-        let begun = *self.begun.get_or_insert(at);
         self.take_sensors(at, state, to);
-        self.take_left(at, state, begun, to);
+        // The dive's time runs from the first advice update, not from the start of the program.
+        if let Some(begun) = self.begun {
+            self.take_left(at, state, begun, to);
+        }
         self.take_recording(at, to);
         self.take_stall(at, to);
     }

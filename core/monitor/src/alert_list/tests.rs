@@ -287,6 +287,21 @@ fn stall_of_the_computer_is_listed_for_a_while() {
     assert_eq!((active(15, None), active(16, None)), (Some(Figures::Stalled(2)), None));
 }
 
+/// The dive's time begins with its data, however long the program waits for them.
+#[test]
+fn sensors_never_heard_are_one_alert_and_do_not_begin_the_dive() {
+    let mut bench = Bench::new(0.0, 0.0);
+    let heard = [None; headrace_sensor::reading::MAX_SOURCES];
+    for minutes in 0..90 {
+        let now = MonoNs(minutes * 60_000_000_000);
+        let mut state = crate::live_state::test_state();
+        (state.now, state.at, state.heard) = (now, None, heard);
+        bench.with(|list, to| list.time(now, &state, to));
+    }
+    let kinds: Vec<_> = bench.list.iter().map(|alert| alert.kind).collect();
+    assert_eq!((kinds, bench.list.begun), (vec![ListKind::NoData], None));
+}
+
 #[test]
 fn higher_priority_needs_a_new_acknowledgement() {
     let mut bench = Bench::new(0.0, 5.0);
