@@ -122,8 +122,13 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     live::make_room(&args.record, args, claims)?;
     let rotate = args.rotate;
     let paths = args.record.as_slice();
-    let recording =
-        (!paths.is_empty()).then_some(Recording { paths, clock: Clock::Theirs, rotate, scene: None });
+    let recording = (!paths.is_empty()).then_some(Recording {
+        paths,
+        clock: Clock::Theirs,
+        rotate,
+        scene: None,
+        earlier: &[],
+    });
     if let (None, Some(_)) = (&recording, args.rotate) {
         return Err(Failure::Usage(
             "run: --rotate needs a recording; with --source, add --record".to_owned(),

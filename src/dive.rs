@@ -1,10 +1,11 @@
 //! A dive from the assembled loop to the report: shared by `demo`, `run` and `replay`.
 
-use std::path::PathBuf;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use headrace_fusion::Navigation;
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleInput, ConsolePort};
 use headrace_monitor::entities::HeadSpecification;
@@ -15,9 +16,13 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
 use headrace_replay::drive::{DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::{
-    DerivedChannels, Every, LinePort, LogHeader, Recorder, Rotation, SourceInfo, VoicePort, dive_name,
+    DerivedChannels, Every, Interrupted, LinePort, LogHeader, Recorder, Rotation, SourceInfo, VoicePort,
+    dive_name,
 };
+use headrace_replay::playback::PlaybackError;
+use headrace_replay::rebuild::Rebuild;
 use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
+use headrace_replay::saved_state::StateKeeper;
 use headrace_replay::threads::drive_on;
 use headrace_replay::view::{Site, View};
 use headrace_sensor::device::Sense;
@@ -30,6 +35,7 @@ use crate::outputs::SIMULATED;
 use crate::phase::Phase;
 use crate::progress::Progress;
 use crate::recordings::Recordings;
+use crate::resume::{BOOT, Earlier, Resuming, boot_id};
 use crate::watch::Watch;
 
 /// Capacity of the queue of notices to the terminal.
@@ -50,6 +56,9 @@ pub(crate) struct Dive {
     notices: NoticeReceiver,
     recordings: Recordings,
     operator: Option<Operator>,
+    states: Option<StateKeeper>,
+    /// The parts recorded before the dive was interrupted.
+    earlier: Earlier,
 }
 
 /// Operator's input of a live dive.
@@ -70,12 +79,20 @@ pub(crate) struct Recording<'a> {
     pub(crate) rotate: Option<Every>,
     /// Name of the scene, for a simulation.
     pub(crate) scene: Option<&'a str>,
+    /// The interrupted recordings that the paths continue; empty for a new dive.
+    pub(crate) earlier: &'a [Interrupted],
 }
 
 impl<'a> Recording<'a> {
     /// Recording of a simulated dive.
     pub(crate) fn simulated(path: &'a PathBuf, scene: &'a str) -> Self {
-        Self { paths: std::slice::from_ref(path), clock: Clock::Theirs, rotate: None, scene: Some(scene) }
+        Self {
+            paths: std::slice::from_ref(path),
+            clock: Clock::Theirs,
+            rotate: None,
+            scene: Some(scene),
+            earlier: &[],
+        }
     }
 }
 
@@ -133,7 +150,7 @@ impl<'a> Assembly<'a> {
             Some(recording) => record(&mut app, vehicle, self.text, recording)?,
         };
         let armed = arm(app, vehicle, self.navigation.unwrap_or_else(|| vehicle.navigation()))?;
-        Ok(Dive { armed, notices, recordings, operator: None })
+        Ok(Dive { armed, notices, recordings, operator: None, states: None, earlier: Earlier::default() })
     }
 }
 
@@ -142,7 +159,7 @@ fn record(
     app: &mut App,
     vehicle: &VehicleConfig,
     vehicle_text: &str,
-    Recording { paths, clock, rotate, scene }: Recording<'_>,
+    Recording { paths, clock, rotate, scene, earlier }: Recording<'_>,
 ) -> Result<Recordings, Failure> {
     let mut header = log_header(vehicle, vehicle_text, true);
     let is_live = clock == Clock::Ours;
@@ -153,9 +170,12 @@ fn record(
     let rotation = Rotation { every: rotate, dive: new_dive() };
     let queue_bytes = if is_live { QUEUE_OF_PORTS_BYTES } else { QUEUE_BYTES };
     let (mut ports, mut recorders) = (Vec::new(), Vec::new());
-    for path in paths {
+    for (number, path) in paths.iter().enumerate() {
         let view: Option<Box<dyn DerivedChannels>> = Some(Box::new(View::new(view_site(vehicle))));
-        let (port, handle) = Recorder::create(path, &header, &rotation, queue_bytes, view)?;
+        let (port, handle) = match earlier.get(number) {
+            Some(earlier) => Recorder::go_on(earlier, &header, rotate, queue_bytes, view)?,
+            None => Recorder::create(path, &header, &rotation, queue_bytes, view)?,
+        };
         ports.push(port);
         recorders.push((path.clone(), handle));
     }
@@ -222,6 +242,19 @@ fn anchor(header: &mut LogHeader) {
     let [of_clock, of_utc] = CLOCK_ANCHOR.map(str::to_owned);
     header.metadata.insert(of_clock, monotonic.0.to_string());
     header.metadata.insert(of_utc, utc.0.to_string());
+    let [boot, ahead] = BOOT.map(str::to_owned);
+    header.metadata.extend(boot_id().map(|id| (boot, id)));
+    header.metadata.insert(ahead, headrace_ports::ahead().0.to_string());
+}
+
+/// A loop without outlets. It gives the same results as one that is recorded.
+pub(crate) fn silent(vehicle: &VehicleConfig) -> Result<Loop, Failure> {
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref())?;
+    }
+    app.keep_results();
+    arm(app, vehicle, vehicle.navigation())
 }
 
 /// A unique name for a recording.
@@ -363,17 +396,83 @@ impl Dive {
         Ok(report)
     }
 
-    /// Runs the loop on the ports until `ended` returns true, and returns the report. `beside` is called
-    /// after every tick.
+    /// Saves states beside the recording, so that the dive can be continued quickly after an interruption.
+    pub(crate) fn keep_states(&mut self, recording: &Path) {
+        match StateKeeper::start(recording) {
+            Ok(states) => self.states = Some(states),
+            Err(error) => tracing::warn!("saving states of the dive: {error}"),
+        }
+    }
+
+    /// Rebuilds the state of the interrupted dive `resuming`, while packets of the ports are only recorded. Returns
+    /// false if `ended` returned true meanwhile.
+    ///
+    /// If the state can't be rebuilt, the dive goes on without the earlier part, and the report says so.
+    pub(crate) fn rebuild(
+        &mut self,
+        resuming: &Resuming,
+        rebuild: Rebuild,
+        (supervisor, ended): (&Supervisor, &dyn Fn() -> bool),
+        watch: &mut Watch,
+        beside: &mut dyn FnMut(&Supervisor, &mut Watch),
+    ) -> bool {
+        let _phase = Phase::start("rebuilding the dive so far");
+        let rebuild = RefCell::new(rebuild);
+        if let Some(operator) = &mut self.operator {
+            operator.restarted(resuming.gap);
+            operator.input.take_in(headrace_ports::now());
+        }
+        let near = || ended() || rebuild.borrow().is_near();
+        supervisor.run(&mut self.armed, &near, &mut |dive| {
+            rebuild.borrow_mut().take(&dive.view().placed().inbox);
+            tell_recordings(&mut self.recordings, watch, dive, None);
+            watch.rebuilding(resuming.read_pct(rebuild.borrow().at()));
+            if let Some(operator) = &mut self.operator {
+                operator.input.take_in(dive.now());
+            }
+            beside(supervisor, watch);
+        });
+        let rebuild = rebuild.into_inner();
+        if ended() {
+            rebuild.cancel();
+            return false;
+        }
+        let losses = resuming.recordings.iter().map(|interrupted| interrupted.loss().to_string());
+        let words = match self.go_on(rebuild, losses.collect()) {
+            Ok(replayed) => format!("{}; {replayed} packets replayed", resuming.words()),
+            Err(error) => {
+                let words = format!("the dive before the interruption can't be read again: {error}");
+                self.earlier.losses.push(words.clone());
+                words
+            }
+        };
+        watch.rebuilt(&self.armed, &words);
+        true
+    }
+
+    /// Restores the rebuilt state. Returns the number of packets that were replayed for it.
+    fn go_on(&mut self, rebuild: Rebuild, interruption: Vec<String>) -> Result<u64, PlaybackError> {
+        self.earlier.losses = interruption;
+        let rebuilt = rebuild.finish().inspect_err(|_| self.armed.go_on(None).unwrap_or(()))?;
+        self.armed.go_on(Some(&rebuilt.snapshot))?;
+        self.earlier.losses.splice(0..0, rebuilt.losses);
+        self.earlier.files = rebuilt.files;
+        if let Some(states) = &mut self.states {
+            states.counted(rebuilt.consumed);
+        }
+        Ok(rebuilt.consumed.packets - rebuilt.saved_packets)
+    }
+
+    /// Runs the loop on the ports until `ended` returns true. `beside` is called after every tick.
     pub(crate) fn run_live(
-        mut self,
-        supervisor: Supervisor,
+        &mut self,
+        supervisor: &Supervisor,
         ended: &dyn Fn() -> bool,
         watch: &mut Watch,
         beside: &mut dyn FnMut(&Supervisor, &mut Watch),
-    ) -> Report {
+    ) {
         let notices = self.notices.clone();
-        let phase = Phase::start("dive");
+        let _phase = Phase::start("dive");
         supervisor.run(&mut self.armed, ended, &mut |dive| {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
@@ -383,10 +482,17 @@ impl Dive {
                 operator.input.take_in_live(dive, headrace_ports::now());
             }
             watch.tick(dive);
-            beside(&supervisor, watch);
+            beside(supervisor, watch);
+            if let Some(states) = &mut self.states {
+                states.after_tick(dive, headrace_ports::now() - self.recordings.unsafe_for());
+            }
         });
+    }
+
+    /// Ends a dive on ports, and returns the report.
+    pub(crate) fn end_live(mut self, supervisor: Supervisor, watch: &mut Watch) -> Report {
+        let notices = self.notices.clone();
         let histories = supervisor.stop(&mut self.armed, &mut |_| ());
-        drop(phase);
         while let Some(notice) = notices.next() {
             watch.notice(&notice, &self.armed);
         }
@@ -429,11 +535,24 @@ impl Dive {
         let recordings = core::mem::take(&mut self.recordings);
         drop(self.armed);
         report.log = recordings.end(&report);
+        if let Some(log) = &mut report.log {
+            self.earlier.complete(log);
+        }
+        if let Some(states) = self.states {
+            states.end();
+        }
         report
     }
 }
 
 impl Operator {
+    /// Tells the loop that the program did not run for some time.
+    fn restarted(&mut self, after: DurNs) {
+        if let Err(error) = self.port.send(&Command::stalled_for(after)) {
+            tracing::error!(%error, "writing the interruption to the log failed");
+        }
+    }
+
     /// Tells the loop whether a recording is failing, so that other recordings and later parts of the same
     /// one state it.
     fn recording(&mut self, fails: bool) {

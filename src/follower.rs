@@ -34,6 +34,8 @@ pub(crate) trait Follower {
     /// Called when a replay has paused, jumped or ended, `time` after the log's beginning. The loop may hold
     /// the state of another time.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
+    /// Called when the state of an interrupted dive has been rebuilt from its log.
+    fn rebuilt(&mut self, _dive: &Loop) {}
     /// Called when the dive has ended and all sections are judged.
     fn end(&mut self, dive: &Loop);
 }

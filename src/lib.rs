@@ -41,6 +41,7 @@ mod recording_state;
 mod recordings;
 mod recover;
 mod report_output;
+mod resume;
 mod screen;
 mod simulate;
 mod smooth;

@@ -23,6 +23,7 @@ use crate::outputs::{self, Claims};
 use crate::page::{self, Of, Served, VoicesOf};
 use crate::recordings::InRecordings;
 use crate::report_output::{finish, state_utc};
+use crate::resume::Resuming;
 use crate::screen::Screen;
 use crate::summary::broken;
 use crate::tui;
@@ -39,19 +40,27 @@ fn wrong_texts(vehicle: &VehicleConfig) -> Vec<String> {
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claims) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
     output::never_wait();
-    let logs = if args.record.is_empty() { vec![new_log()] } else { args.record.clone() };
-    if !args.no_record {
-        make_room(&logs, args, claims)?;
+    let mut logs = if args.record.is_empty() { vec![new_log()] } else { args.record.clone() };
+    let resuming = Resuming::of(args, &logs, text)?;
+    match &resuming {
+        Some(resuming) => logs = resuming.paths(),
+        None if args.no_record => {}
+        None => make_room(&logs, args, claims)?,
     }
     let recording = (!args.no_record).then_some(Recording {
         paths: &logs,
         clock: Clock::Ours,
         rotate: args.rotate,
         scene: None,
+        earlier: resuming.as_ref().map_or(&[], |resuming| &resuming.recordings),
     });
-    let is_served = page::is_wanted(&args.page, true);
+    let (is_served, recording_is_on) = (page::is_wanted(&args.page, true), recording.is_some());
     let mut dive =
         Assembly::of(vehicle, text).recorded(recording).kept(is_served).assemble()?.operated(Clock::Ours);
+    if let (Some(log), true) = (logs.first(), recording_is_on) {
+        dive.keep_states(log);
+    }
+    let rebuild = resuming.as_ref().map(|resuming| resuming.begin(vehicle, &mut dive)).transpose()?;
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let followers = Followers::of(&args.following)?;
@@ -64,7 +73,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
         watch = watch.followed_by(served.follower(&dive.armed));
     }
     let wrong: Vec<String> = wrong_texts(vehicle);
-    let mut begun_text = begun_text(args, &logs, vehicle);
+    let mut begun_text = begun_text(args, &logs, (vehicle, resuming.as_ref()));
     if show == Show::Lines {
         for line in
             core::iter::once(&begun_text).chain(&wrong).flat_map(|text| broken(text, Screen::columns()))
@@ -90,11 +99,21 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
             || until.is_some_and(|until| now >= until)
             || states.borrow().missing(now).is_some()
     };
-    let mut report = dive.run_live(supervisor, &ended, &mut watch, &mut |supervisor, watch| {
+    let mut beside = |supervisor: &Supervisor, watch: &mut Watch| {
         while let Some(status) = supervisor.next_status() {
             states.borrow_mut().show(&status, watch);
         }
-    });
+    };
+    if let Some((resuming, rebuild)) = resuming.as_ref().zip(rebuild)
+        && !dive.rebuild(resuming, rebuild, (&supervisor, &ended), &mut watch, &mut beside)
+    {
+        return Err(Failure::Required(
+            "the dive was ended before its earlier part was read again: there is no report; replay the recording for one"
+                .to_owned(),
+        ));
+    }
+    dive.run_live(&supervisor, &ended, &mut watch, &mut beside);
+    let mut report = dive.end_live(supervisor, &mut watch);
     state_utc(&mut report, Some(utc_of_zero_s()));
     if let Some(served) = served {
         served.end(&report);
@@ -139,7 +158,14 @@ fn live_page(
 }
 
 /// Text about ports and recordings that is shown at the beginning of a dive.
-fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
+fn begun_text(
+    args: &Run,
+    logs: &[PathBuf],
+    (vehicle, resuming): (&VehicleConfig, Option<&Resuming>),
+) -> String {
+    if let Some(resuming) = resuming {
+        return format!("{}: {}; Ctrl-C ends the dive", vehicle.name, resuming.words());
+    }
     let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
     let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
     let firsts = firsts.join(" and ");

@@ -444,6 +444,10 @@ impl Follower for PageFollower {
         self.collector.recorded(state.words());
     }
 
+    fn rebuilt(&mut self, dive: &Loop) {
+        self.collector.rebuilt(dive);
+    }
+
     fn stopped(&mut self, dive: &Loop, _time: DurNs, _ended: bool) {
         self.now = dive.now();
         self.collector.stopped(dive);

@@ -13,6 +13,8 @@ pub(crate) struct RecordingState {
     pub(crate) fails: Option<bool>,
     /// Whole seconds of the dive that a power cut would lose, for the recording that is furthest behind.
     pub(crate) unsafe_s: u64,
+    /// How much of an interrupted dive's log has been read again, percent; `None` if the dive's state is complete.
+    pub(crate) rebuilt_pct: Option<u8>,
 }
 
 impl RecordingState {
@@ -24,6 +26,9 @@ impl RecordingState {
             _ if unsafe_for >= ALARM_FROM => Some((format!("LAST {} s NOT ON DISK", self.unsafe_s), true)),
             _ if unsafe_for >= SHOWN_FROM => {
                 Some((format!("last {} s not on disk yet", self.unsafe_s), false))
+            }
+            _ if let Some(pct) = self.rebuilt_pct => {
+                Some((format!("reading the dive so far again: {pct} %; new data is recorded"), false))
             }
             Some(false) => Some(("recording had failed".to_owned(), false)),
             None => None,

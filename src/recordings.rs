@@ -59,7 +59,13 @@ impl Recordings {
     /// State of all recordings together, for the screens.
     pub(crate) fn state(&self) -> RecordingState {
         let fails = self.all.iter().filter_map(|one| one.fails).reduce(|one, other| one | other);
-        RecordingState { fails, unsafe_s: self.unsafe_for.0.max(0).unsigned_abs() / 1_000_000_000 }
+        let unsafe_s = self.unsafe_for.0.max(0).unsigned_abs() / 1_000_000_000;
+        RecordingState { fails, unsafe_s, rebuilt_pct: None }
+    }
+
+    /// Dive time that a power cut would lose now, of the recording that is furthest behind.
+    pub(crate) fn unsafe_for(&self) -> DurNs {
+        self.unsafe_for
     }
 
     /// Whether a recording fails, or would lose the last seconds of the dive in a power cut.

@@ -198,8 +198,40 @@ impl Watch {
 
     /// Sets the state of the recordings that is to be shown from now on.
     pub(crate) fn recorded(&mut self, state: &RecordingState) {
-        self.recorded = *state;
-        self.followers.iter_mut().for_each(|follower| follower.recorded(state));
+        self.show_recorded(RecordingState { rebuilt_pct: self.recorded.rebuilt_pct, ..*state });
+    }
+
+    fn show_recorded(&mut self, state: RecordingState) {
+        self.recorded = state;
+        self.followers.iter_mut().for_each(|follower| follower.recorded(&state));
+    }
+
+    /// Shows how much of an interrupted dive's log has been read again, percent.
+    pub(crate) fn rebuilding(&mut self, pct: u8) {
+        if self.recorded.rebuilt_pct == Some(pct) {
+            return;
+        }
+        self.show_recorded(RecordingState { rebuilt_pct: Some(pct), ..self.recorded });
+        let words = self.recorded.words().map(|(words, _)| words).unwrap_or_default();
+        match self.show {
+            Show::JsonLines => {
+                self.print(json!({"type": "rebuilding", "read_pct": pct, "text": words}).to_string())
+            }
+            Show::Lines if pct.is_multiple_of(10) => self.say(&format!("RESUMING  {words}")),
+            Show::Lines | Show::Nothing | Show::Followers => {}
+        }
+    }
+
+    /// Shows that an interrupted dive goes on, after its state has been rebuilt.
+    pub(crate) fn rebuilt(&mut self, dive: &Loop, words: &str) {
+        self.show_recorded(RecordingState { rebuilt_pct: None, ..self.recorded });
+        self.teller = LiveMessages::default();
+        self.followers.iter_mut().for_each(|follower| follower.rebuilt(dive));
+        match self.show {
+            Show::JsonLines => self.json(dive.now(), json!({"type": "resumed", "text": words})),
+            Show::Lines => self.say(&format!("RESUMED   {words}")),
+            Show::Nothing | Show::Followers => {}
+        }
     }
 
     /// Shows that a replay has paused, jumped or ended, `time` after the log's beginning.

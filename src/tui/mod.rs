@@ -161,6 +161,11 @@ impl Follower for Tui {
         });
     }
 
+    fn rebuilt(&mut self, dive: &Loop) {
+        self.eye.forget();
+        self.show(dive, None);
+    }
+
     fn stopped(&mut self, dive: &Loop, _: DurNs, ended: bool) {
         self.eye.forget();
         self.show(dive, Some(if ended { Stop::Ended } else { Stop::Paused }));

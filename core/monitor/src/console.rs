@@ -18,7 +18,7 @@ pub(crate) mod command;
 pub(crate) mod packets;
 mod text;
 
-pub use command::{Command, CommandError, MAX_COMMAND_BYTES, MAX_NOTE_BYTES, NoteText, Who};
+pub use command::{Command, CommandError, MAX_COMMAND_BYTES, MAX_NOTE_BYTES, MAX_STALL_S, NoteText, Who};
 pub(super) use packets::Console;
 pub use packets::ConsoleCounts;
 pub use text::ShortText;
@@ -28,8 +28,6 @@ pub use headrace_vehicle::CONSOLE_ID;
 const MOST_WAITING: usize = 256;
 /// Least time between two calls of a live loop that counts as a stall of the computer.
 const STALL: DurNs = DurNs(500_000_000);
-/// Longest duration that [`Command::Stalled`] states, seconds.
-const MAX_STALL_S: u32 = 60;
 /// Interval of [`Command::Time`] while no sensor delivers readings. The commands let the loop notice stale data.
 const TIME_EVERY: DurNs = DurNs(500_000_000);
 
@@ -118,8 +116,7 @@ impl ConsoleInput {
         self.take_in(now);
         let idle = self.called.replace(now).map_or(DurNs(0), |called| now.since(called));
         if idle.0 >= STALL.0 && self.port.has_room(MAX_COMMAND_BYTES) {
-            let seconds = u32::try_from(idle.0 / 1_000_000_000 + 1).unwrap_or(MAX_STALL_S).min(MAX_STALL_S);
-            self.put(now, &Command::Stalled { seconds });
+            self.put(now, &Command::stalled_for(idle));
         }
         if self.time_told == MonoNs(0) {
             self.time_told = now;

@@ -176,6 +176,14 @@ impl Placer {
         debug_assert!(into.commands.0.is_sorted_by_key(|command| command.before), "commands are in order");
     }
 
+    /// Takes the waiting packets, of at most `allowance_bytes`, without processing them. Allocates: never.
+    pub(super) fn receive(&mut self, allowance_bytes: usize, into: &mut Placed) {
+        into.inbox.fill(&mut self.readers, allowance_bytes);
+        into.events.clear();
+        into.items.clear();
+        into.commands.0.clear();
+    }
+
     /// Results before the next tick, with room for a tick of any size. Allocates: all memory of the lists.
     pub(super) fn placed_with_room(&self) -> Placed {
         let mut placed = Placed {
@@ -264,11 +272,13 @@ impl Placer {
         self.part.save(to);
     }
 
-    /// Packets waiting in the rings are dropped.
     pub(super) fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
-        self.part.restore(from)?;
+        self.part.restore(from)
+    }
+
+    /// Drops the packets waiting in the rings.
+    pub(super) fn drop_waiting(&mut self) {
         self.readers.iter_mut().for_each(PortReader::clear);
-        Ok(())
     }
 }
 

@@ -55,6 +55,8 @@ pub struct Loop {
     ports: Vec<Option<Port>>,
     time: TickTime,
     ticks: u64,
+    /// Whether ticks only pass packets to the outlets, see [`Loop::hold`].
+    held: bool,
     finished: bool,
 }
 
@@ -75,6 +77,7 @@ impl Loop {
             ports: ports.into_iter().map(Some).collect(),
             time: TickTime::default(),
             ticks: 0,
+            held: false,
             finished: false,
         };
         // Outlets may allocate in the first tick. Without packets this tick has no other effect.
@@ -92,6 +95,13 @@ impl Loop {
         let Self { ahead, placed, advised, allowance_bytes, .. } = self;
         #[expect(clippy::expect_used, reason = "a caller's mistake, as documented")]
         let (placer, adviser) = ahead.as_mut().expect("no part of the loop is split off");
+        if self.held {
+            placer.receive(*allowance_bytes, sole(placed, placer));
+            self.time = TickTime { index: self.ticks, now };
+            self.publish();
+            self.ticks += 1;
+            return self.placed.inbox.len();
+        }
         placer.tick(*allowance_bytes, sole(placed, placer));
         adviser.tick(placed, advised);
         self.conclude(now);
@@ -332,6 +342,14 @@ impl Loop {
     ///
     /// Errors: the snapshot doesn't fit this loop. The loop must not be used afterwards.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
+        self.restore_parts(snapshot)?;
+        if let Some((placer, _)) = &mut self.ahead {
+            placer.drop_waiting();
+        }
+        Ok(())
+    }
+
+    fn restore_parts(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let mut from = Restorer::new(snapshot);
         let Some((placer, adviser)) = &mut self.ahead else {
             return Err(from.unfit("parts of the loop are on other threads; join them first".to_owned()));
@@ -345,6 +363,37 @@ impl Loop {
         placer.report(sole(&mut self.placed, placer));
         adviser.report(&mut self.advised);
         if from.is_empty() { Ok(()) } else { Err(from.unfit("it has extra bytes at its end".to_owned())) }
+    }
+
+    /// Makes the next ticks only pass packets to the outlets, which record them, until [`Loop::go_on`]. The next tick
+    /// gets the number `tick`.
+    ///
+    /// Call it before the first tick of a dive that continues an interrupted one.
+    pub fn hold(&mut self, tick: u64) {
+        debug_assert_eq!(self.ticks, 0, "a loop that has processed packets isn't held");
+        (self.held, self.ticks) = (true, tick);
+    }
+
+    /// Ends [`Loop::hold`]. From now on the loop processes packets in the state `snapshot`, which another loop has
+    /// reached with all packets that were passed on. `None` means the state of a new loop.
+    ///
+    /// Packets waiting in the rings stay there. The number and time of the last tick are kept.
+    ///
+    /// Errors: as for [`Loop::restore`].
+    pub fn go_on(&mut self, snapshot: Option<&[u8]>) -> Result<(), SnapshotError> {
+        if let Some(snapshot) = snapshot {
+            let (ticks, time) = (self.ticks, self.time);
+            self.restore_parts(snapshot)?;
+            (self.ticks, self.time) = (ticks, time);
+        }
+        self.held = false;
+        // Outlets that count results learn the counts of the restored state.
+        self.placed = Arc::new(self.placed.followed_by_nothing());
+        self.advised = self.advised.followed_by_nothing();
+        self.surveyor.next_tick();
+        self.alerter.next_tick();
+        self.publish();
+        Ok(())
     }
 
     /// Frees the memory of the samples. After the end of a dive the report needs only the sections.

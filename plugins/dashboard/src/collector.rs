@@ -30,6 +30,8 @@ use crate::wire::{NONE, Outcome, SampleRecord, SectionRecord};
 pub(crate) const WAITING: usize = 64;
 /// Maximum number of samples kept while the queue is full: ten seconds of four heads.
 const MOST_SAMPLES: usize = 20_000;
+/// Maximum length of wall whose samples are read from the loop's store for one message, m.
+const MENDED_AT_ONCE_M: f64 = 10.0;
 /// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
 /// Maximum number of sections in one message.
@@ -198,6 +200,14 @@ impl Collector {
         self.skips = true;
         self.send(dive);
         self.skips = false;
+    }
+
+    /// Handles a dive's state that was rebuilt from its log. The wall of the dive so far is sent in pieces.
+    pub fn rebuilt(&mut self, dive: &Loop) {
+        self.begun = dive.view().span().map(|(first, _)| first);
+        self.lacking_m = dive.view().coverage().frontier.way().map(|way| [way.from_m, way.to_m]);
+        (self.back_due, self.notes_due) = (true, true);
+        self.change_all(dive);
     }
 
     /// Collects a change of a sensor's connection.
@@ -406,7 +416,9 @@ impl Collector {
     /// nor head numbers.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn mended(&mut self, dive: &Loop) -> Vec<SampleRecord> {
-        let Some([from_m, to_m]) = self.lacking_m.take() else { return Vec::new() };
+        let Some([from_m, whole_to_m]) = self.lacking_m.take() else { return Vec::new() };
+        let to_m = whole_to_m.min(from_m + MENDED_AT_ONCE_M);
+        self.lacking_m = (to_m < whole_to_m).then_some([to_m, whole_to_m]);
         let (profile, t_ms) = (&dive.mission().profile, self.t_ms(dive.now()));
         let mut mended = Vec::new();
         dive.view().coverage().store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {

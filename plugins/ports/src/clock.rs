@@ -1,16 +1,32 @@
 //! The host's clock, which gives all input its timestamps.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use headrace_geometry::time::{DurNs, MonoNs, UtcNs};
 use rustix::time::{ClockId, clock_gettime};
 
-/// Returns the current time on the host's monotonic clock, which counts from boot and is never set.
+/// Time to add to the host's clock, ns. It isn't zero only in a dive that continues one from before a reboot.
+static AHEAD_NS: AtomicU64 = AtomicU64::new(0);
+
+/// Returns the current time on the dive's clock: the host's monotonic clock, which counts from boot and is never set,
+/// plus [`set_ahead`].
 pub fn now() -> MonoNs {
     let time = clock_gettime(ClockId::Monotonic);
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
     let rest = u64::try_from(time.tv_nsec).unwrap_or(0);
-    MonoNs(seconds.saturating_mul(1_000_000_000).saturating_add(rest))
+    let since_boot = seconds.saturating_mul(1_000_000_000).saturating_add(rest);
+    MonoNs(since_boot.saturating_add(AHEAD_NS.load(Ordering::Relaxed)))
+}
+
+/// Returns how far the dive's clock is ahead of the host's monotonic clock.
+pub fn ahead() -> DurNs {
+    DurNs(i64::try_from(AHEAD_NS.load(Ordering::Relaxed)).unwrap_or(i64::MAX))
+}
+
+/// Sets the dive's clock ahead of the host's monotonic clock. Call it before the first timestamp.
+pub fn set_ahead(by: DurNs) {
+    AHEAD_NS.store(u64::try_from(by.0).unwrap_or(0), Ordering::Relaxed);
 }
 
 /// Converts a wall-clock timestamp of the kernel to the monotonic clock.

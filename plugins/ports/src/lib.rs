@@ -19,7 +19,7 @@ mod supervisor;
 pub mod uhid;
 mod wake;
 
-pub use clock::{clock_anchor, now, of_wall};
+pub use clock::{ahead, clock_anchor, now, of_wall, set_ahead};
 pub use device_end::{EmulatedPort, wait_for_any};
 pub use discover::can::is_interface_up;
 pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};

@@ -59,6 +59,14 @@ impl AtomicFile {
         Ok(Self { file: BufWriter::new(file), beside: None })
     }
 
+    /// Syncs what has been written so far.
+    ///
+    /// Errors: system errors.
+    pub fn sync(&mut self) -> Result<()> {
+        self.file.flush()?;
+        self.file.get_ref().sync_data()
+    }
+
     /// Moves the file to its destination. Once this function returns, the file survives a power cut.
     ///
     /// Errors: a system error, after which the previous file is unchanged.

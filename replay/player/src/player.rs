@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::clocks::{self, Clock};
 use crate::drive::{Coming, PacketSource};
 use crate::log::{DiveLog, DivePlace, LogError, LogInfo, Loss, MessageKind, PartFile};
+use crate::saved_state::Consumed;
 
 /// Plays the messages of a log that were received from sources.
 pub struct Player {
@@ -163,6 +164,14 @@ impl Player {
         all
     }
 
+    /// Returns losses and omissions so far, as text, except that the last file is cut off.
+    pub(crate) fn losses_before_cut(&self) -> Vec<String> {
+        let cut = self.reader.losses().iter().rfind(|loss| loss.is_open_end()).map(Loss::to_string);
+        let mut losses = self.losses_here();
+        losses.retain(|loss| Some(loss) != cut.as_ref());
+        losses
+    }
+
     /// Returns anomalies found so far, and how they were handled, as text. They lose no data.
     pub fn notes(&self) -> Vec<String> {
         let note = |(topic, ids): (String, Vec<u16>)| {
@@ -196,6 +205,29 @@ impl Player {
             return Ok(Some(Coming { at: message.log_time, source: id, len: self.bytes.len() }));
         }
         Ok(None)
+    }
+}
+
+impl Player {
+    /// Skips the next packet, and counts it.
+    pub(crate) fn pass(&mut self, consumed: &mut Consumed) {
+        if let Some(next) = self.next.take() {
+            consumed.add(next.source, next.at, &self.bytes);
+            self.order += 1;
+            self.played += 1;
+        }
+    }
+
+    /// Sends the next packet to the ring of its source, and counts it.
+    ///
+    /// Errors: the packet doesn't fit, and remains the next packet.
+    pub(crate) fn send_counted(&mut self, port: &mut Port, consumed: &mut Consumed) -> Result<(), RingError> {
+        let next = self.next;
+        self.send(port)?;
+        if let Some(next) = next {
+            consumed.add(next.source, next.at, &self.bytes);
+        }
+        Ok(())
     }
 }
 

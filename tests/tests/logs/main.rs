@@ -11,6 +11,7 @@ mod golden;
 mod odd_logs;
 mod playback;
 mod recover;
+mod resume;
 mod rotation;
 mod snapshots;
 mod threads;

@@ -52,7 +52,7 @@ pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
     all
 }
 
-fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
+pub(crate) fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref()).unwrap();
@@ -65,7 +65,7 @@ fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
 }
 
 /// Feeds packets to a loop, with a tick after every 23 packets.
-fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
+pub(crate) fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     for some in packets.chunks(23) {
         for packet in some {
             ports[packet.source].send(packet.at, &packet.bytes).unwrap();

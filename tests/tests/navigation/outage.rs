@@ -9,7 +9,8 @@ use serde_json::Value;
 
 const LEG: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.197\n";
 
-/// Replays a four-head dive of 12 m without the data of `source` between two times, seconds on the source's clock.
+/// Replays a four-head dive of 12 m without the data of `source` between two times, seconds on the source's clock. An
+/// empty name means all sources.
 fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
     // The simulated heads have no bodies that could hide the wall. So the paper's speed meets the target.
@@ -26,7 +27,7 @@ fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
         .into_iter()
         .filter(|message| {
             let at_s = message.log_time as f64 / 1e9;
-            message.channel.topic != topic || !(from_s..to_s).contains(&at_s)
+            !message.channel.topic.starts_with(&topic) || !(from_s..to_s).contains(&at_s)
         })
         .collect();
     write_log(&folder.path("cut.mcap"), WriteOptions::new(), Some(&vehicle), &kept);
@@ -56,6 +57,24 @@ fn short_tether_silence_is_bridged() {
     for (way, until_s) in [("direct", 26.5), ("filter", 31.0)] {
         let report = without(way, "tether", 25.0, until_s);
         assert_eq!(failed(&report).len(), 0, "{way}");
+    }
+}
+
+/// The dive is interrupted for half a minute, in which the vehicle drives on. What no head saw does not pass, and the
+/// stretches before and after it are judged as usual.
+#[test]
+fn interrupted_dive_passes_nothing_that_was_not_seen() {
+    for way in ["direct", "filter"] {
+        let report = without(way, "", 20.0, 50.0);
+        let sections = report["sections"].as_array().unwrap();
+        let start_m = |section: &Value| section["start_m"].as_f64().unwrap();
+        // At 0.197 m/s the vehicle drives from 5.9 to 11.9 m. The heads see 0.5 m ahead and behind.
+        let unseen = sections.iter().filter(|section| (6.6..11.0).contains(&start_m(section)));
+        let passed: Vec<_> = unseen.filter(|section| section["verdict"] == "pass").map(start_m).collect();
+        assert_eq!(passed, Vec::<f64>::new(), "{way}");
+        let before = sections.iter().filter(|section| section["verdict"] == "pass" && start_m(section) < 5.0);
+        let before: Vec<f64> = before.map(start_m).collect();
+        assert!(before.len() > 1, "{way}: {before:?}");
     }
 }
 

@@ -19,6 +19,8 @@ mod kernel_drivers;
 #[cfg(unix)]
 mod rehearsal;
 #[cfg(target_os = "linux")]
+mod restarts;
+#[cfg(target_os = "linux")]
 mod run_ports;
 #[cfg(target_os = "linux")]
 mod soak;

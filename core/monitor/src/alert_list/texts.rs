@@ -102,8 +102,14 @@ impl ListedAlert {
                 min if min < 0.0 => format!("{:.0} min over the dive's time", -min),
                 min => format!("{min:.0} min of the dive left"),
             },
-            (_, Figures::Stalled(seconds)) => {
+            (_, Figures::Stalled(seconds @ ..60)) => {
                 format!("computer stalled for {seconds} s: data came late, or were lost")
+            }
+            (_, Figures::Stalled(seconds)) => {
+                format!(
+                    "computer stalled or off for {} min: data of this time are missing",
+                    seconds.div_ceil(60)
+                )
             }
             (_, Figures::Left(left_pct)) => format!("battery at {left_pct:.0} %"),
             (kind, Figures::None) => plain_text(kind, &name, &place),

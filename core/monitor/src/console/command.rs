@@ -4,10 +4,13 @@ use core::fmt::Write as _;
 
 use super::text::ShortText;
 use crate::voice::MAX_VOICE_S;
+use headrace_geometry::time::DurNs;
 use serde::{Deserialize, Serialize};
 
 /// Longest command packet, bytes.
 pub const MAX_COMMAND_BYTES: usize = 512;
+/// Longest duration that [`Command::Stalled`] states: a day, seconds.
+pub const MAX_STALL_S: u32 = 86_400;
 /// Longest text of a note, bytes.
 pub const MAX_NOTE_BYTES: usize = 240;
 
@@ -58,9 +61,9 @@ pub enum Command {
         /// Whether a log recording fails at present.
         fails: bool,
     },
-    /// Sent by the program: it got no computing time for a while.
+    /// Sent by the program: it got no computing time for a while, or did not run.
     Stalled {
-        /// Duration, rounded up to whole seconds, 1 to 60; a longer stall counts as 60 s.
+        /// Duration, rounded up to whole seconds, 1 to [`MAX_STALL_S`]; longer ones count as that.
         seconds: u32,
     },
     /// Sent by other equipment: remaining battery charge of the vehicle.
@@ -108,6 +111,12 @@ impl Command {
             self,
             Self::Acknowledge { .. } | Self::Silence { .. } | Self::Note { .. } | Self::Voice { .. }
         )
+    }
+
+    /// The statement that the program did not run for some time.
+    pub fn stalled_for(time: DurNs) -> Self {
+        let seconds = u32::try_from(time.0 / 1_000_000_000 + 1).unwrap_or(MAX_STALL_S).min(MAX_STALL_S);
+        Self::Stalled { seconds }
     }
 
     /// The command without its author and text.
@@ -208,9 +217,11 @@ impl Values {
             let others = (alert, text.is_some(), fails, battery_pct) != (None, false, None, None);
             return match (what.as_str(), id, by, seconds) {
                 ("voice", Some(id), Some(by), None) if !others => Ok(Command::Voice { id, by }),
-                ("voiced", Some(id), None, Some(seconds)) if !others => Ok(Command::Voiced { id, seconds }),
+                ("voiced", Some(id), None, Some(seconds)) if !others && seconds <= MAX_VOICE_S => {
+                    Ok(Command::Voiced { id, seconds })
+                }
                 ("voice", ..) => Err("voice with \"id\" and \"by\""),
-                _ => Err("voiced with \"id\" and \"seconds\""),
+                _ => Err("voiced with \"id\" and \"seconds\" from 1 to 60"),
             };
         }
         if what.as_str() == "stalled" {
@@ -313,8 +324,8 @@ impl Scan<'_> {
             Some(3) => values.text.replace(self.string("a text of at most 240 bytes")?).is_none(),
             Some(4) => values.fails.replace(self.bool()?).is_none(),
             Some(5) => values.battery_pct.replace(self.percent()?).is_none(),
-            Some(6) => values.id.replace(self.of_voice(u32::MAX, "an id from 1 to 4294967295")?).is_none(),
-            Some(_) => values.seconds.replace(self.of_voice(MAX_VOICE_S, "1 to 60 seconds")?).is_none(),
+            Some(6) => values.id.replace(self.whole(u32::MAX, "an id from 1 to 4294967295")?).is_none(),
+            Some(_) => values.seconds.replace(self.whole(MAX_STALL_S, "1 to 86400 seconds")?).is_none(),
             None => {
                 let expected = "do, alert, by, text, fails, battery_pct, id or seconds";
                 return Err(CommandError { at: from, expected });
@@ -349,7 +360,7 @@ impl Scan<'_> {
     }
 
     /// A whole number from 1 to `most` in a JSON text.
-    fn of_voice(&mut self, most: u32, expected: &'static str) -> Result<u32, CommandError> {
+    fn whole(&mut self, most: u32, expected: &'static str) -> Result<u32, CommandError> {
         let at = self.at;
         let number: Option<u32> = self.number().parse().ok();
         number.filter(|number| (1..=most).contains(number)).ok_or(CommandError { at, expected })

@@ -106,6 +106,16 @@ pub(super) struct Tally {
 }
 
 impl Tally {
+    /// Creates the totals from the form in which a part's metadata contain them. `last` is the time of the last message.
+    pub(super) fn of(progress: &Progress, header: &LogHeader, last: MonoNs) -> Self {
+        let sources = (0..).take(header.sources.len());
+        let lanes = sources.flat_map(|number| [Lane::Raw(number), Lane::Sent(number)]);
+        let lanes =
+            lanes.chain([Lane::Tick, Lane::Voice]).chain((0..).take(header.results.len()).map(Lane::Result));
+        let next = lanes.filter_map(|lane| Some((lane, *progress.sequences.get(&topic(lane, header)?)?)));
+        Self { messages: progress.messages, tick: progress.tick, next: next.collect(), last: Some(last) }
+    }
+
     pub(super) fn add(&mut self, head: &Head) {
         self.messages += 1;
         self.tick = head.tick.or(self.tick);
@@ -116,19 +126,21 @@ impl Tally {
 
     /// Returns the totals in the form in which a part's metadata contain them.
     pub(super) fn progress(&self, header: &LogHeader) -> Progress {
-        let source = |prefix: &str, number: u16| {
-            header.sources.get(usize::from(number)).map(|source| format!("{prefix}{}", source.id))
-        };
-        let topic = |lane: Lane| match lane {
-            Lane::Raw(number) => source(RAW_PREFIX, number),
-            Lane::Sent(number) => source(SENT_PREFIX, number),
-            Lane::Tick => Some(TICK_TOPIC.to_owned()),
-            Lane::Voice => Some(VOICE_TOPIC.to_owned()),
-            Lane::Result(number) => {
-                header.results.get(usize::from(number)).map(|result| result.topic.clone())
-            }
-        };
-        let sequences = self.next.iter().filter_map(|(lane, next)| Some((topic(*lane)?, *next)));
+        let sequences = self.next.iter().filter_map(|(lane, next)| Some((topic(*lane, header)?, *next)));
         Progress { messages: self.messages, tick: self.tick, sequences: sequences.collect() }
+    }
+}
+
+/// Returns the topic of a channel; `None` if the header doesn't have the channel.
+fn topic(lane: Lane, header: &LogHeader) -> Option<String> {
+    let source = |prefix: &str, number: u16| {
+        header.sources.get(usize::from(number)).map(|source| format!("{prefix}{}", source.id))
+    };
+    match lane {
+        Lane::Raw(number) => source(RAW_PREFIX, number),
+        Lane::Sent(number) => source(SENT_PREFIX, number),
+        Lane::Tick => Some(TICK_TOPIC.to_owned()),
+        Lane::Voice => Some(VOICE_TOPIC.to_owned()),
+        Lane::Result(number) => header.results.get(usize::from(number)).map(|result| result.topic.clone()),
     }
 }

@@ -280,6 +280,17 @@ impl LossKind {
     }
 }
 
+impl Loss {
+    /// Whether the loss is the cut-off end of the dive's last file.
+    pub(crate) fn is_open_end(&self) -> bool {
+        let kind = match &self.kind {
+            LossKind::InPart { kind, .. } => kind,
+            kind => kind,
+        };
+        *kind == LossKind::Truncated && self.to.is_none()
+    }
+}
+
 impl fmt::Display for Loss {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut notes = Vec::new();

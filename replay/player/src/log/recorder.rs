@@ -22,8 +22,9 @@ use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, LinePort, Queue, State, until_stopped};
 use super::recording::Recording;
-use super::rotate::{Rotation, in_the_way};
+use super::rotate::{Every, Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
+use super::unfinished::Interrupted;
 use super::voice::VoicePort;
 use super::worker::{DerivedChannels, RecorderWorker};
 use super::writer::{Lane, LogHeader, Summary};
@@ -106,6 +107,21 @@ impl Recorder {
         Self::spawn(Self::unthreaded(Box::new(Disk), path, header, rotation, queue_bytes, derived)?)
     }
 
+    /// Starts a recorder that continues an interrupted recording in a further part, which states the interruption.
+    ///
+    /// Errors: as for [`Recorder::create`]. The earlier parts are never modified.
+    pub fn go_on(
+        earlier: &Interrupted,
+        header: &LogHeader,
+        every: Option<Every>,
+        queue_bytes: usize,
+        derived: Option<Box<dyn DerivedChannels>>,
+    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
+        let rotation = Rotation { every, dive: String::new() };
+        let recording = Recording::go_on(Box::new(Disk), &rotation, header, earlier)?;
+        Self::spawn(Self::of_recording(recording, header, queue_bytes, derived))
+    }
+
     /// Creates a recorder without a thread, on any storage. The caller runs its steps.
     ///
     /// The header is written and synced before this function returns.
@@ -119,7 +135,20 @@ impl Recorder {
         queue_bytes: usize,
         derived: Option<Box<dyn DerivedChannels>>,
     ) -> Result<(RecorderPort, RecorderWorker), LogError> {
-        let recording = Recording::begin(storage, path, rotation, header)?;
+        Ok(Self::of_recording(
+            Recording::begin(storage, path, rotation, header)?,
+            header,
+            queue_bytes,
+            derived,
+        ))
+    }
+
+    fn of_recording(
+        recording: Recording,
+        header: &LogHeader,
+        queue_bytes: usize,
+        derived: Option<Box<dyn DerivedChannels>>,
+    ) -> (RecorderPort, RecorderWorker) {
         let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
         let state = Arc::new(State {
             stopping: AtomicBool::new(false),
@@ -145,7 +174,7 @@ impl Recorder {
             gap: None,
         };
         let queue = Queue { ring: Cons::new(ring), message: Vec::new() };
-        Ok((port, RecorderWorker::new(queue, recording, header, derived, state)))
+        (port, RecorderWorker::new(queue, recording, header, derived, state))
     }
 
     /// Runs a recorder's steps on a thread of its own.

@@ -18,6 +18,7 @@ use super::fault::{RecordingEvent, RecordingFault, add};
 use super::part::{PartHead, part_path};
 use super::rotate::{Every, Rotation};
 use super::storage::{Buffered, Storage, Taken};
+use super::unfinished::Interrupted;
 use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
 /// Unsynced bytes after which a sync is due.
@@ -98,7 +99,14 @@ impl Recording {
         rotation: &Rotation,
         header: &LogHeader,
     ) -> Result<Self, LogError> {
-        let mut recording = Self {
+        let mut recording = Self::empty(storage, path, rotation, header);
+        recording.open = Some(recording.begin_part()?);
+        recording.number = 1;
+        Ok(recording)
+    }
+
+    fn empty(storage: Box<dyn Storage>, path: &Path, rotation: &Rotation, header: &LogHeader) -> Self {
+        Self {
             storage,
             path: path.to_owned(),
             rotation: rotation.clone(),
@@ -115,9 +123,29 @@ impl Recording {
             sum: Summary::default(),
             events: Vec::new(),
             now: Duration::ZERO,
+        }
+    }
+
+    /// Continues an interrupted recording with a further part, which states the interruption.
+    ///
+    /// Errors: the part can't be created or written.
+    pub(super) fn go_on(
+        storage: Box<dyn Storage>,
+        rotation: &Rotation,
+        header: &LogHeader,
+        earlier: &Interrupted,
+    ) -> Result<Self, LogError> {
+        let Interrupted { recording: unfinished, to, words } = earlier;
+        let mut recording = Self {
+            number: unfinished.number,
+            named: unfinished.named,
+            settled: unfinished.tally(header),
+            ..Self::empty(storage, &unfinished.recording, rotation, header)
         };
+        recording.rotation.dive.clone_from(&unfinished.dive);
         recording.open = Some(recording.begin_part()?);
-        recording.number = 1;
+        recording.number += 1;
+        recording.state(Some(unfinished.last), Some(*to), words);
         Ok(recording)
     }
 

@@ -110,7 +110,7 @@ const HEAD_RECORDS: usize = 4;
 const MAX_HEAD_BYTES: u64 = 1 << 20;
 
 /// Returns the part metadata of a log; `None` if it has none.
-fn part_head(path: &Path) -> Option<PartHead> {
+pub(super) fn part_head(path: &Path) -> Option<PartHead> {
     let mut file = LogFile::new(File::open(path).ok()?, path.display().to_string()).ok()?;
     let mut at = mcap::MAGIC.len() as u64;
     for _ in 0..HEAD_RECORDS {

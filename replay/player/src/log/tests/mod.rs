@@ -9,6 +9,7 @@ mod recorder;
 mod recover;
 mod round_trip;
 mod storage;
+mod unfinished;
 mod voice;
 
 use std::io::Cursor;

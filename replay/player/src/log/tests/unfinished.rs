@@ -1,0 +1,122 @@
+//! Recordings that were cut off at any byte are continued in further parts, and are read as one log.
+
+use std::fs::OpenOptions;
+use std::path::{Path, PathBuf};
+
+use super::super::{
+    DiveLog, Interrupted, Recorder, RecorderHandle, RecorderPort, Rotation, Unfinished, files_of,
+};
+use super::parts::{Folder, all};
+use super::*;
+
+/// Queue of the recorder, bytes.
+const QUEUE_BYTES: usize = 1 << 22;
+
+/// Records ticks with one packet and one result each, and ends the recording in order.
+fn record((mut port, handle): (RecorderPort, RecorderHandle), ticks: core::ops::Range<u64>) {
+    for tick in ticks {
+        let at = MonoNs((tick + 10) * 100_000_000);
+        port.raw(0, at, at, &noise(tick, 300)).unwrap();
+        port.tick(tick, at, &[0]).unwrap();
+        port.result(0, at, &tick.to_le_bytes()).unwrap();
+    }
+    handle.finish().unwrap();
+}
+
+fn cut(path: &Path, bytes: u64) {
+    OpenOptions::new().write(true).open(path).unwrap().set_len(bytes).unwrap();
+}
+
+/// The readable messages of a recording, and its losses.
+fn messages(recording: &Path) -> (Vec<Seen>, Vec<String>) {
+    let mut log = DiveLog::open(&files_of(&[recording.to_owned()]).unwrap()).unwrap();
+    let seen = all(&mut log);
+    (seen, log.losses().iter().map(ToString::to_string).collect())
+}
+
+/// Continues the recording by 30 ticks, and returns the statement of the interruption.
+fn go_on(recording: &Path) -> String {
+    let unfinished = Unfinished::read(recording).unwrap().unwrap();
+    let (tick, to) = (unfinished.next_tick(), MonoNs(unfinished.last.0 + 5_000_000_000));
+    let interrupted = Interrupted { recording: unfinished, to, words: format!("stopped before tick {tick}") };
+    let loss = interrupted.loss().to_string();
+    record(Recorder::go_on(&interrupted, &header(true), None, QUEUE_BYTES, None).unwrap(), tick..tick + 30);
+    loss
+}
+
+#[test]
+fn recording_cut_at_any_byte_is_continued_without_gaps_or_repetitions() {
+    let folder = Folder::new("unfinished");
+    let recording = folder.0.join("dive.mcap");
+    let rotation = Rotation { every: None, dive: "one".to_owned() };
+    record(Recorder::create(&recording, &header(true), &rotation, QUEUE_BYTES, None).unwrap(), 0..200);
+    assert!(Unfinished::read(&recording).unwrap().is_none(), "it ended in order");
+    let whole = std::fs::read(&recording).unwrap();
+    let complete = messages(&recording).0;
+    let step = whole.len() / 40 + 1;
+    let (mut continued, mut ended) = (0, 0);
+    for bytes in (whole.len() / 8..whole.len() - 8).step_by(step).chain([whole.len() - 1]) {
+        std::fs::write(&recording, &whole).unwrap();
+        cut(&recording, bytes as u64);
+        let (before, _) = messages(&recording);
+        assert_eq!(before, complete[..before.len()], "cut at {bytes}");
+        if Unfinished::read(&recording).unwrap().is_none() {
+            let is_complete = before.len() == complete.len();
+            assert!(
+                before.is_empty() || is_complete,
+                "cut at {bytes}: nothing to continue, or ended in order"
+            );
+            ended += usize::from(is_complete);
+            continue;
+        }
+        // The second part is cut off, too, and continued in a third one.
+        let mut stated = vec![go_on(&recording)];
+        let second = folder.part(2);
+        cut(&second, std::fs::metadata(&second).unwrap().len() * 3 / 4);
+        let (kept, _) = messages(&recording);
+        assert_eq!(kept[..before.len()], before, "cut at {bytes}");
+        stated.push(go_on(&recording));
+        let (after, losses) = messages(&recording);
+        assert_eq!(losses, stated, "cut at {bytes}: only the interruptions are lost");
+        assert_eq!(after[..kept.len()], kept, "cut at {bytes}");
+        continued += 1;
+        let of = |kind: &str| {
+            after.iter().filter(|seen| seen.0.contains(kind)).map(|seen| seen.3).collect::<Vec<_>>()
+        };
+        for kind in ["Raw", "Tick", "Result"] {
+            let numbers = of(kind);
+            assert_eq!(numbers, (0..numbers.len() as u32).collect::<Vec<_>>(), "cut at {bytes}: {kind}");
+        }
+        assert_eq!(after.len(), kept.len() + 3 * 30, "cut at {bytes}");
+        for part in [2, 3] {
+            std::fs::remove_file(folder.part(part)).unwrap();
+        }
+    }
+    assert!(continued > 20 && ended > 0, "{continued} continued, {ended} had ended in order");
+}
+
+#[test]
+fn last_recording_of_a_folder_is_found_if_it_did_not_end_in_order() {
+    let folder = Folder::new("last");
+    let last = || Unfinished::last_in(&folder.0, &|info| info.metadata.contains_key("simulated")).unwrap();
+    let create = |name: &str, dive: &str| -> PathBuf {
+        let path = folder.0.join(name);
+        let rotation = Rotation { every: None, dive: dive.to_owned() };
+        record(Recorder::create(&path, &header(true), &rotation, QUEUE_BYTES, None).unwrap(), 0..20);
+        path
+    };
+    assert_eq!(last(), None);
+    let first = create("b.mcap", "one");
+    assert_eq!(last(), None, "it ended in order");
+    cut(&first, std::fs::metadata(&first).unwrap().len() * 3 / 4);
+    std::fs::write(folder.0.join("z.mcap"), b"no log").unwrap();
+    assert_eq!(last(), Some(first.clone()));
+    go_on(&first);
+    assert_eq!(last(), None, "its continuation ended in order");
+    let part = folder.part(2).with_file_name("b.part002.mcap");
+    cut(&part, std::fs::metadata(&part).unwrap().len() * 3 / 4);
+    assert_eq!(last(), Some(first.clone()), "the path of the recording, not of its part");
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    create("a.mcap", "two");
+    assert_eq!(last(), None, "a later dive ended in order");
+}

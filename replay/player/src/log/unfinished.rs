@@ -1,0 +1,165 @@
+//! Recordings that did not end in order, because the program or the computer was stopped.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use headrace_geometry::time::MonoNs;
+
+use super::backlog::Tally;
+use super::dive_log::DiveLog;
+use super::error::LogError;
+use super::format::Tick;
+use super::loss::{Loss, LossKind};
+use super::part::{PartHead, Progress, named_part, part_path};
+use super::reader::{LogInfo, LogReader, MessageKind};
+use super::rotate::{files_of, part_head};
+use super::writer::LogHeader;
+
+/// A recording that did not end in order, and that a later dive can continue in a further part.
+#[derive(Debug, Clone)]
+pub struct Unfinished {
+    /// Path that names the recording, as given to `--record`.
+    pub recording: PathBuf,
+    /// Header of the last part.
+    pub info: LogInfo,
+    /// Log time of the last message.
+    pub last: MonoNs,
+    /// First and last time of the log.
+    pub span: Option<(MonoNs, MonoNs)>,
+    /// Files of the parts, in order.
+    pub files: Vec<PathBuf>,
+    pub(super) dive: String,
+    /// Number of the last part, and number in its file name.
+    pub(super) number: u32,
+    pub(super) named: u32,
+    /// Totals of all readable messages.
+    pub(super) progress: Progress,
+}
+
+/// An interrupted recording that is continued, and the statement about the interruption in its log.
+#[derive(Debug, Clone)]
+pub struct Interrupted {
+    /// The recording before the interruption.
+    pub recording: Unfinished,
+    /// Log time at which the recording continues.
+    pub to: MonoNs,
+    /// Text about the interruption.
+    pub words: String,
+}
+
+impl Interrupted {
+    /// Returns the loss that the part after the interruption states.
+    pub fn loss(&self) -> Loss {
+        let Self { recording, to, words } = self;
+        let kind = Box::new(LossKind::Stated(words.clone()));
+        let kind = LossKind::InPart { part: recording.number + 1, kind };
+        Loss { kind, offset: 0, bytes: 0, from: Some(recording.last), to: Some(*to) }
+    }
+}
+
+impl Unfinished {
+    /// Reads the recording named `recording`. `None` if it ended in order, or if its logs aren't parts of a recording.
+    ///
+    /// Errors: a log can't be read.
+    pub fn read(recording: &Path) -> Result<Option<Self>, LogError> {
+        let files = files_of(&[recording.to_owned()])?;
+        let Some((last_file, head)) = unended(&files)?.map(|(file, head)| (file.to_owned(), head)) else {
+            return Ok(None);
+        };
+        let span = DiveLog::open(&files)?.times();
+        let mut reader = LogReader::open(&last_file)?;
+        let topics: BTreeMap<u16, String> =
+            reader.channels().map(|channel| (channel.id, channel.topic.to_owned())).collect();
+        let (mut last, mut progress) = (span.map(|(_, last)| last), head.before.clone());
+        let mut counts: BTreeMap<u16, u32> = BTreeMap::new();
+        while let Some(message) = reader.next()? {
+            last = Some(message.log_time);
+            progress.messages += 1;
+            if message.kind == MessageKind::Tick {
+                progress.tick = Tick::decode(message.data).ok().map(|tick| tick.index).or(progress.tick);
+            }
+            counts.insert(message.channel, message.sequence.wrapping_add(1));
+        }
+        let next =
+            counts.into_iter().filter_map(|(channel, next)| Some((topics.get(&channel)?.clone(), next)));
+        progress.sequences.extend(next);
+        let named = files.iter().filter_map(|file| named_part(file)).map(|(_, number)| number).max();
+        let (info, dive, number) = (reader.header().clone(), head.dive, head.number);
+        let unfinished = |last| Self {
+            recording: recording.to_owned(),
+            info,
+            last,
+            span,
+            files,
+            dive,
+            number,
+            named: named.unwrap_or(1),
+            progress,
+        };
+        Ok(last.map(unfinished))
+    }
+
+    /// Returns the path that names the last recording in a folder, if that recording did not end in order.
+    ///
+    /// The last recording is the one whose file was modified last. Files that aren't parts of a recording are ignored, as
+    /// are those for which `is_other` returns true.
+    ///
+    /// Errors: the folder can't be read.
+    pub fn last_in(folder: &Path, is_other: &dyn Fn(&LogInfo) -> bool) -> Result<Option<PathBuf>, LogError> {
+        let failed = |source| LogError::Open { path: folder.to_owned(), source };
+        let is_here = folder == Path::new(".");
+        let mut logs: Vec<(SystemTime, PathBuf)> = Vec::new();
+        for entry in std::fs::read_dir(folder).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let path = if is_here { entry.file_name().into() } else { folder.join(entry.file_name()) };
+            let is_log = path.extension().is_some_and(|extension| extension == "mcap");
+            if let Ok(modified) = entry.metadata().and_then(|metadata| metadata.modified())
+                && is_log
+            {
+                logs.push((modified, path));
+            }
+        }
+        logs.sort();
+        for (_, path) in logs.into_iter().rev().filter(|(_, path)| part_head(path).is_some()) {
+            let Ok(reader) = LogReader::open(&path) else { continue };
+            if is_other(reader.header()) {
+                continue;
+            }
+            let recording = named_part(&path).map_or(path, |(recording, _)| recording);
+            let files = files_of(std::slice::from_ref(&recording))?;
+            return Ok(unended(&files)?.map(|_| recording));
+        }
+        Ok(None)
+    }
+
+    /// Returns the path of the last part.
+    pub fn last_part(&self) -> &Path {
+        self.files.last().unwrap_or(&self.recording)
+    }
+
+    /// Returns the number of the next tick.
+    pub fn next_tick(&self) -> u64 {
+        self.progress.tick.map_or(0, |tick| tick + 1)
+    }
+
+    /// Returns the path of the part in which the recording continues.
+    pub fn next_path(&self) -> PathBuf {
+        part_path(&self.recording, self.named + 1)
+    }
+
+    pub(super) fn tally(&self, header: &LogHeader) -> Tally {
+        Tally::of(&self.progress, header, self.last)
+    }
+}
+
+/// Returns the last part of a recording and its metadata, if the recording has data and did not end in order.
+fn unended(files: &[PathBuf]) -> Result<Option<(&Path, PartHead)>, LogError> {
+    let heads = files.iter().filter_map(|file| Some((file, part_head(file)?)));
+    let Some((last, head)) = heads.max_by_key(|(_, head)| head.number) else { return Ok(None) };
+    let reader = LogReader::open(last)?;
+    let end = reader.header().part.as_ref().and_then(|part| part.end.as_ref());
+    let has_ended = end.is_some_and(|end| !end.follows);
+    let is_empty = head.number == 1 && reader.times().is_none();
+    Ok(if has_ended || is_empty { None } else { Some((last.as_path(), head)) })
+}

@@ -1,0 +1,166 @@
+//! A dive that is killed and resumed at random moments: one recording in many parts, with one report.
+//!
+//! `HEADRACE_RESTARTS` sets the number of restarts.
+
+use std::collections::BTreeSet;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use headrace_tests::Folder;
+use serde_json::Value;
+
+use crate::rehearsal::{Running, headrace, interrupt, report, scene};
+
+/// Number of restarts, unless the environment sets another one.
+const RESTARTS: u64 = 6;
+/// Longest time from the start of the program until the dive goes on, on a busy machine.
+const RESUMED_WITHIN: Duration = Duration::from_secs(30);
+
+#[expect(clippy::disallowed_methods, reason = "how long a restart takes is wall time")]
+fn wall_clock() -> Instant {
+    Instant::now()
+}
+
+/// Element `n` of a fixed sequence of pseudorandom numbers.
+fn random(n: u64) -> u64 {
+    let word = (n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    word ^ (word >> 27)
+}
+
+/// Starts the dive. Returns the process once it shows that the dive has begun or goes on.
+fn start(folder: &Folder, vehicle: &str, how: &str) -> (Child, Duration) {
+    let begun = wall_clock();
+    let mut run = headrace()
+        .args([
+            "run",
+            vehicle,
+            how,
+            "--no-page",
+            "--json-lines",
+            "--record",
+            "dive.mcap",
+            "--report",
+            "live.json",
+            "--force",
+        ])
+        .current_dir(folder.path(""))
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(run.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let wanted = if how == "--resume" { "\"resumed\"" } else { "\"state\"" };
+    assert!(lines.any(|line| line.contains(wanted)), "{how}: the dive didn't begin");
+    let took = begun.elapsed();
+    std::thread::spawn(move || lines.count());
+    (run, took)
+}
+
+/// Chainages of the starts of sections with a verdict.
+fn with_verdict(report: &Value, verdict: &str) -> BTreeSet<String> {
+    let sections = report["sections"].as_array().unwrap().iter();
+    let these = sections.filter(|section| section["verdict"] == verdict);
+    these.map(|section| format!("{:9.3}", section["start_m"].as_f64().unwrap())).collect()
+}
+
+#[test]
+#[ignore = "takes a minute or more at real speed; .ci/run runs it beside other tests"]
+fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
+    let restarts = std::env::var("HEADRACE_RESTARTS").map_or(RESTARTS, |text| text.parse().unwrap());
+    let folder = Folder::new();
+    folder.write("scene.toml", scene(20.0 + restarts as f64));
+    let emulate = headrace()
+        .args(["emulate", "--stand", "0", "--linger", "30", "--out"])
+        .arg(folder.path("rehearsal"))
+        .arg(folder.path("scene.toml"))
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut emulate = Running(emulate);
+    let mut said = BufReader::new(emulate.0.stdout.take().unwrap()).lines().map(Result::unwrap);
+    let vehicle = said.find_map(|line| line.strip_prefix("vehicle ").map(str::to_owned)).unwrap();
+    let (mut run, _) = start(&folder, &vehicle, "--new");
+    std::thread::sleep(Duration::from_secs(12));
+    let (mut slowest, mut dead) = (Duration::ZERO, Duration::ZERO);
+    for number in 0..restarts {
+        std::thread::sleep(Duration::from_millis(500 + random(number) % 5000));
+        let killed = wall_clock();
+        run.kill().unwrap();
+        run.wait().unwrap();
+        std::thread::sleep(Duration::from_millis(random(number + 1000) % 1500));
+        let (next, took) = start(&folder, &vehicle, "--resume");
+        run = next;
+        (slowest, dead) = (slowest.max(took), dead + killed.elapsed());
+        assert!(took < RESUMED_WITHIN, "restart {number} took {took:?}");
+    }
+    std::thread::sleep(Duration::from_secs(8));
+    interrupt(&run);
+    let status = run.wait().unwrap();
+    assert_eq!(status.code(), Some(3), "data of the gaps is lost");
+    let live = report(&folder.path("live.json"));
+    let losses = live["log"]["losses"].as_array().unwrap();
+    assert_eq!(losses.len() as u64, restarts, "each interruption is one loss: {losses:#?}");
+    assert!(
+        losses.iter().all(|loss| loss.as_str().unwrap().contains("the program was stopped")),
+        "{losses:#?}"
+    );
+    assert_eq!(live["log"]["parts"].as_array().unwrap().len() as u64, restarts + 1);
+
+    let answer = folder.headrace(&["replay", "dive.mcap", "--report", "replayed.json"]);
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    let replayed = report(&folder.path("replayed.json"));
+    for key in ["digest", "sections", "summary", "coverage_extent", "runs", "not_inspected"] {
+        assert_eq!(live[key], replayed[key], "{key}");
+    }
+    for key in ["sha256", "messages", "losses", "parts"] {
+        assert_eq!(live["log"][key], replayed["log"][key], "log.{key}");
+    }
+    let verified = folder.headrace(&["verify", "dive.mcap"]);
+    assert_eq!(verified.code, Some(3), "{}{}", verified.stdout, verified.stderr);
+    let passed = with_verdict(&live, "pass").len();
+    eprintln!(
+        "{restarts} restarts: {passed} sections passed, {} failed, {} of {:.0} s without data, slowest restart {:.1} s",
+        with_verdict(&live, "fail").len(),
+        dead.as_secs(),
+        live["dive"]["duration_s"].as_f64().unwrap_or(f64::NAN),
+        slowest.as_secs_f64()
+    );
+    assert!(passed > 0, "stretches between the gaps pass");
+    let begun = Path::new("dive.mcap.state");
+    assert!(!folder.path(begun.to_str().unwrap()).exists(), "a dive that ended leaves no state behind");
+}
+
+#[test]
+#[ignore = "needs the time of .ci/run's rehearsal step"]
+fn unfinished_dive_is_offered_and_declined() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", headrace_tests::VEHICLE);
+    let run = |further: &[&str]| {
+        let fixed = ["run", "vehicle.toml", "--no-page", "--for", "1", "--report", "report.json", "--force"];
+        folder.headrace(&[&fixed[..], further].concat())
+    };
+    let mut first = headrace()
+        .args(["run", "vehicle.toml", "--no-page", "--record", "first.mcap"])
+        .current_dir(folder.path(""))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(3));
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let offered = run(&["--record", "second.mcap"]);
+    assert_eq!(offered.code, Some(2), "{}", offered.stdout);
+    insta::assert_snapshot!(offered.stderr, @"headrace: run: the last dive, first.mcap, did not end in order; --resume continues it in a further part, --new begins another dive");
+    assert!(!folder.path("second.mcap").exists());
+    // Without data there is nothing to judge, so the exit code is 1.
+    assert_eq!(run(&["--record", "second.mcap", "--new"]).code, Some(1));
+    // The second dive ended in order, so nothing is offered any more, and --resume begins a new dive.
+    assert_eq!(run(&["--record", "third.mcap", "--resume"]).code, Some(1));
+    assert!(folder.path("third.mcap").exists());
+    let named = run(&["--record", "fourth.mcap", "--resume=second.mcap"]);
+    assert_eq!(named.code, Some(2));
+    insta::assert_snapshot!(named.stderr, @"headrace: run --resume: second.mcap ended in order, so it can't be continued; begin another dive with --new");
+}
