@@ -232,6 +232,9 @@ pub(crate) struct Demo {
     /// Don't open a browser.
     #[arg(long, help_heading = "Page")]
     pub(crate) no_open: bool,
+    /// End after the dive. Without it, in a terminal, the page replays the dive until q is pressed.
+    #[arg(long, help_heading = "Page")]
+    pub(crate) exit: bool,
     #[command(flatten)]
     pub(crate) page: PageArgs,
 }
