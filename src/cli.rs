@@ -35,6 +35,21 @@ pub(crate) const COMMANDS: &str =
 pub(crate) const KEYS: &str =
     "space pause or continue, left and right 10 s, up and down 1 min, + - speed, . one tick, q quit";
 
+/// Commands of `emulate`.
+pub(crate) const FAULT_COMMANDS: &str = "unplug ID, plug ID, stall ID, resume ID, delay ID TIME, restart ID, freeze, \
+     release, end or quit";
+/// Keys of `emulate`.
+pub(crate) const FAULT_KEYS: &str =
+    "up and down choose a device, u unplug, s stall, d delay, r restart, f freeze the cable count, q quit";
+
+fn emulate_help() -> String {
+    format!(
+        "Faults during the rehearsal:\n  keys in a terminal: {FAULT_KEYS}; the same key ends a fault\n  lines on \
+         standard input otherwise: {FAULT_COMMANDS}\n\nExample:\n  headrace emulate deploy/scenes/rehearsal.toml --out /tmp/rehearsal\n  \
+         headrace run /tmp/rehearsal/vehicle.toml"
+    )
+}
+
 fn interactive_help() -> String {
     format!("Keys in a terminal: {KEYS}; otherwise commands by lines on standard input: {COMMANDS}")
 }
@@ -181,9 +196,7 @@ pub(crate) enum Command {
     ///
     /// Writes a vehicle file for `headrace run`. The vehicle waits until all its sensors are connected, and
     /// --stand seconds more. The command ends at the end of the trajectory.
-    #[command(
-        after_help = "Example:\n  headrace emulate deploy/scenes/rehearsal.toml --out /tmp/rehearsal\n  headrace run /tmp/rehearsal/vehicle.toml"
-    )]
+    #[command(after_help = emulate_help())]
     Emulate(Emulate),
     /// List attached devices, permissions and missing ports, with the command that fixes each problem.
     ///
@@ -232,6 +245,9 @@ pub(crate) struct Demo {
     /// Don't open a browser.
     #[arg(long, help_heading = "Page")]
     pub(crate) no_open: bool,
+    /// End after the dive. Without it, in a terminal, the page replays the dive until q is pressed.
+    #[arg(long, help_heading = "Page")]
+    pub(crate) exit: bool,
     #[command(flatten)]
     pub(crate) page: PageArgs,
 }

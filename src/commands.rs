@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crossbeam::channel::unbounded;
 use headrace_config::Document;
@@ -24,7 +24,9 @@ use crate::feeds::Interruptible;
 use crate::files;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
+use crate::keyboard;
 use crate::live;
+use crate::logging::complain;
 use crate::other_targets;
 use crate::output::{put_line, say, show};
 use crate::outputs::{self, Claims, Kind};
@@ -38,6 +40,12 @@ use crate::terminal;
 use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
+
+/// Speed of the replay after a demo that ran as fast as possible, relative to real time. At such a speed there
+/// would be nothing to see.
+const REPLAY_SPEED: f64 = 20.0;
+/// Time after the last packet that is certainly the end of a log.
+const BEYOND_END: DurNs = DurNs(1_000_000_000);
 
 /// Runs `headrace demo`.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
@@ -54,6 +62,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
     let is_served = page::is_wanted(&args.page, true);
+    let is_replayed = is_served && !args.exit && keyboard::is_ours() && terminal::is_watched();
     let dive = Assembly::of(&scene.vehicle, &scene.vehicle_text)
         .recorded(Some(recording))
         .kept(is_served)
@@ -67,7 +76,8 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
             scene.vehicle.name, scene.vehicle.target.max_hole_m
         ));
     }
-    let served = is_served.then(|| demo_page(args, &scene, &log, &dive, watch.shows_lines())).flatten();
+    let of = Of { is_playback: is_replayed, ..of_demo(&scene, &log, &dive) };
+    let served = is_served.then(|| demo_page(args, of, watch.shows_lines())).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
@@ -77,20 +87,53 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let mut feed = Interruptible { feed: &mut feed, interrupted: &interrupted };
     let report = dive.run(&mut feed, pace, &mut watch, &mut |_| ())?;
-    if let Some(served) = served {
-        served.end(&report);
+    let is_interrupted = interrupted.load(Ordering::Relaxed);
+    if let Some(served) = &served {
+        served.show_result(&report);
     }
     files::write_json(&report_file, &report)?;
-    let ended = if interrupted.load(Ordering::Relaxed) { "interrupted: the dive so far\n" } else { "" };
+    let ended = if is_interrupted { "interrupted: the dive so far\n" } else { "" };
     show(&format!("\n{ended}{}", summary(&report, Screen::columns())));
     say(&format!("report {}", report_file.display()));
     say(&format!("log    {}  (headrace replay)", log.display()));
+    if let Some(served) = served.filter(|_| is_replayed && !is_interrupted)
+        && let Err(error) = replay_demo(args, &scene, &served, &interrupted)
+    {
+        // The dive itself was complete, so the exit code stays.
+        complain(&format!("headrace: the page can't replay {}: {error}", log.display()));
+    }
     Ok(exit_code(&report))
 }
 
-/// Serves the page of a demo, and opens a browser that shows it.
-fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool) -> Option<Served> {
-    let of = Of {
+/// Replays the recorded demo on its page, beginning at the end of the dive, until a key or a signal ends it.
+fn replay_demo(
+    args: &Demo,
+    scene: &Scene,
+    served: &Served,
+    interrupted: &Arc<AtomicBool>,
+) -> Result<(), Failure> {
+    let mut player = Player::open(&files_of(&[args.out.join("dive.mcap")])?)?;
+    let span = player.span();
+    let dive = Assembly::of(&scene.vehicle, &scene.vehicle_text).kept(true).assemble()?;
+    player.connect(dive.armed.sources());
+    let mut watch = Watch::quiet().followed_by(served.replay_follower(&dive.armed, span));
+    let (sender, commands) = unbounded();
+    let close = served.direct(&sender, true, Arc::clone(interrupted));
+    say("The page now replays the dive, with pause, seek and speed. Press q to end.");
+    let playing = Playing {
+        from: span.map(|(from, to)| to.since(from) + BEYOND_END),
+        interactive: true,
+        pace: Pace { speed: args.speed.0.or(Some(REPLAY_SPEED)), ..Pace::default() },
+        commands: (sender, commands),
+        others: Some(Directors { takes_keys: false, close }),
+    };
+    // The page has shown the dive's result already. A replay that was left early has no result of its own.
+    playing.play(dive, &mut player, &mut watch).map(drop)
+}
+
+/// Data for the page of a demo.
+fn of_demo<'a>(scene: &'a Scene, log: &Path, dive: &Dive) -> Of<'a> {
+    Of {
         vehicle: &scene.vehicle,
         mode: Mode::Demo,
         dive: scene.name.clone(),
@@ -101,7 +144,11 @@ fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool
         is_playback: false,
         console: dive.console(),
         voices: VoicesOf::Dive(dive.voice_ports()),
-    };
+    }
+}
+
+/// Serves the page of a demo, and opens a browser that shows it.
+fn demo_page(args: &Demo, of: Of<'_>, in_lines: bool) -> Option<Served> {
     let served = page::serve(&args.page, of, in_lines.then_some(&mut put_line))?;
     if !args.no_open {
         served.open();

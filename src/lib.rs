@@ -22,6 +22,7 @@ mod foxglove_live;
 pub mod import;
 mod interrupt;
 mod inventory;
+mod keyboard;
 mod live;
 mod logging;
 mod manual;

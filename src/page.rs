@@ -8,7 +8,7 @@ use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crossbeam::channel::Sender;
@@ -45,6 +45,8 @@ use crate::report_output::exit_code;
 
 /// Interval at which a paused replay checks for an interruption.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Number of stops of a playback that begins with a jump to the end of the log: the jump and the end.
+const STOPS_TO_END: u8 = 2;
 /// Name of a BlueOS machine.
 const BLUEOS: &str = "blueos.local";
 
@@ -83,7 +85,22 @@ pub(crate) struct Served {
     span: Option<(MonoNs, MonoNs)>,
     is_playback: bool,
     waits: bool,
-    commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>>,
+    directed: Arc<Directed>,
+}
+
+/// Playback that the page controls.
+#[derive(Default)]
+struct Directed {
+    /// Sender of commands; `None` if no playback is running.
+    commands: Mutex<Option<Sender<PlaybackCommand>>>,
+    /// Whether playback is at the end of the log.
+    is_at_end: AtomicBool,
+}
+
+impl Directed {
+    fn commands(&self) -> MutexGuard<'_, Option<Sender<PlaybackCommand>>> {
+        self.commands.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// Whether to serve a page: true if it was requested, or if a person watches on a terminal.
@@ -121,17 +138,17 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
         Token::random().map_err(|error| format!("getting a random number for the page: {error}"))?;
     let instance = instance.text().chars().take(12).collect();
     let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
-    let commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>> = Arc::default();
-    let act = act(of.console.clone());
+    let directed: Arc<Directed> = Arc::default();
+    let act = act(of.console.clone(), &directed);
     let voices = voices(&of);
-    let page = Page::start(settings, site(of), instance, act, direct(&commands), voices)
+    let page = Page::start(settings, site(of), instance, act, direct(&directed), voices)
         .map_err(|error| error.to_string())?;
     for port in page.taken() {
         complain(&format!("headrace: port {port} is taken; the page is on {}", page.address().port()));
     }
     let told = told(&page, tokens.as_ref());
     lines.unwrap_or(&mut complain)(told.trim_end());
-    Ok(Served { page, span, is_playback, waits, commands })
+    Ok(Served { page, span, is_playback, waits, directed })
 }
 
 /// Tokens for access; `None` if other machines can't reach the page.
@@ -260,10 +277,14 @@ pub(crate) fn utc_of_zero_s(metadata: &BTreeMap<String, String>) -> Option<f64> 
     Some(utc?.checked_sub(monotonic?)? as f64 / 1e9)
 }
 
-/// Creates the function that hands an operator's commands to the loop.
-fn act(console: Option<ConsolePort>) -> Act {
+/// Creates the function that hands an operator's commands to the loop. During playback it refuses them.
+fn act(console: Option<ConsolePort>, directed: &Arc<Directed>) -> Act {
+    let directed = Arc::clone(directed);
     Arc::new(move |command| {
         let Some(console) = &console else { return Err("this dive takes no commands".to_owned()) };
+        if directed.commands().is_some() {
+            return Err("this dive has ended: its log contains the acknowledgements and notes".to_owned());
+        }
         let who = |by: &str| Who::new(by).ok_or_else(|| "by has control characters".to_owned());
         let command = match &command {
             Command::Acknowledge { alert, by } => Input::Acknowledge { alert: *alert, by: who(by)? },
@@ -307,9 +328,9 @@ fn voices(of: &Of<'_>) -> Voices {
 }
 
 /// Creates the function that hands the page's commands to playback. The function fails if no playback is
-/// running.
-fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
-    let commands = Arc::clone(commands);
+/// running. At the end of the log, playback goes on from the beginning.
+fn direct(directed: &Arc<Directed>) -> Direct {
+    let directed = Arc::clone(directed);
     Arc::new(move |play| {
         let command = match play {
             Play::Pause => PlaybackCommand::Pause,
@@ -320,7 +341,11 @@ fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
             Play::Speed(speed) => PlaybackCommand::Speed(speed),
             Play::Seek(to_s) => PlaybackCommand::Seek(MonoNs(0) + DurNs::from_secs_f64(to_s)),
         };
-        let commands = commands.lock().unwrap_or_else(PoisonError::into_inner);
+        let commands = directed.commands();
+        if command == PlaybackCommand::Go && directed.is_at_end.load(Ordering::Relaxed) {
+            // If this command fails, so does the next one.
+            commands.as_ref().and_then(|commands| commands.send(PlaybackCommand::Seek(MonoNs(0))).ok());
+        }
         let sent = commands.as_ref().map(|commands| commands.send(command));
         if matches!(sent, Some(Ok(()))) {
             Ok(())
@@ -334,7 +359,24 @@ impl Served {
     /// Creates the follower that feeds the page.
     pub(crate) fn follower(&self, dive: &Loop) -> Box<dyn Follower> {
         let span = self.span.filter(|_| self.is_playback);
-        Box::new(PageFollower { collector: self.page.collector(dive, self.waits), span, now: MonoNs(0) })
+        Box::new(PageFollower { span, ..self.directing_follower(dive) })
+    }
+
+    /// Creates the follower that feeds the page with a replay of the dive that it has shown until now. The
+    /// replay must begin with a jump to the end of the log.
+    pub(crate) fn replay_follower(&self, dive: &Loop, span: Option<(MonoNs, MonoNs)>) -> Box<dyn Follower> {
+        let (now, ignored_stops) = (span.map_or(MonoNs(0), |(_, to)| to), STOPS_TO_END);
+        Box::new(PageFollower { span, now, ignored_stops, ..self.directing_follower(dive) })
+    }
+
+    fn directing_follower(&self, dive: &Loop) -> PageFollower {
+        let directed = Some(Arc::clone(&self.directed));
+        PageFollower { directed, ..PageFollower::new(self.page.collector(dive, self.waits)) }
+    }
+
+    /// Shows the dive's result, and goes on serving the page.
+    pub(crate) fn show_result(&self, report: &Report) {
+        self.page.show_result(end_message(report));
     }
 
     /// Lets the page control a replay.
@@ -347,12 +389,10 @@ impl Served {
         stays: bool,
         interrupted: Arc<AtomicBool>,
     ) -> Option<Box<dyn Fn()>> {
-        let commands = Arc::clone(&self.commands);
-        *commands.lock().unwrap_or_else(PoisonError::into_inner) = Some(to.clone());
+        let directed = Arc::clone(&self.directed);
+        *directed.commands() = Some(to.clone());
         if !stays {
-            return Some(Box::new(move || {
-                drop(commands.lock().unwrap_or_else(PoisonError::into_inner).take());
-            }));
+            return Some(Box::new(move || drop(directed.commands().take())));
         }
         let sender = to.clone();
         std::thread::spawn(move || {
@@ -396,7 +436,7 @@ pub(crate) fn end_message(report: &Report) -> Value {
 
 /// A follower that passes all events of the dive to the page's collector.
 pub(crate) fn following(collector: Collector) -> Box<dyn Follower> {
-    Box::new(PageFollower { collector, span: None, now: MonoNs(0) })
+    Box::new(PageFollower::new(collector))
 }
 
 struct PageFollower {
@@ -404,6 +444,16 @@ struct PageFollower {
     /// First and last time of a replay's log; `None` in a live dive.
     span: Option<(MonoNs, MonoNs)>,
     now: MonoNs,
+    /// Playback that the page controls; `None` for a page in a file.
+    directed: Option<Arc<Directed>>,
+    /// Number of stops up to which the page shows the finished dive instead of the replay.
+    ignored_stops: u8,
+}
+
+impl PageFollower {
+    fn new(collector: Collector) -> Self {
+        Self { collector, span: None, now: MonoNs(0), directed: None, ignored_stops: 0 }
+    }
 }
 
 impl Follower for PageFollower {
@@ -421,12 +471,15 @@ impl Follower for PageFollower {
     }
 
     fn skipped(&mut self, dive: &Loop) {
-        self.now = dive.now();
-        self.collector.skipped(dive);
+        if self.ignored_stops == 0 {
+            self.now = dive.now();
+            self.collector.skipped(dive);
+        }
     }
 
     fn mode(&mut self, paused: bool, speed: Option<f64>) {
         let Some((from, to)) = self.span else { return };
+        let paused = paused || self.ignored_stops > 0;
         let [at_s, from_s, to_s] = [self.now.max(from), from, to].map(MonoNs::as_secs_f64);
         self.collector.playback(PlaybackState { paused, speed, at_s, from_s, to_s });
     }
@@ -448,7 +501,14 @@ impl Follower for PageFollower {
         self.collector.rebuilt(dive);
     }
 
-    fn stopped(&mut self, dive: &Loop, _time: DurNs, _ended: bool) {
+    fn stopped(&mut self, dive: &Loop, _time: DurNs, ended: bool) {
+        if let Some(directed) = &self.directed {
+            directed.is_at_end.store(ended, Ordering::Relaxed);
+        }
+        if self.ignored_stops > 0 {
+            self.ignored_stops -= 1;
+            return;
+        }
         self.now = dive.now();
         self.collector.stopped(dive);
     }

@@ -19,11 +19,9 @@ use headrace_replay::snapshot_store::SnapshotStore;
 use crate::cli::{COMMANDS, speed, time};
 use crate::dive::Dive;
 use crate::failure::Failure;
-use crate::interrupt;
 use crate::logging::complain;
 use crate::output::aside;
 use crate::watch::Watch;
-use keys::Keyboard;
 pub(crate) use keys::{Hand, Key};
 
 /// Computing time between two snapshots of the loop. A jump thus takes well under a second, including the
@@ -74,7 +72,7 @@ impl Playing {
             screen.watch.mode(false, pace.speed);
             // A terminal gives keys; a pipe or a file gives lines.
             let keyboard = match interactive {
-                true if has_keys => Some(keyboard(sender, pace)?),
+                true if has_keys => Some(keys::listen(sender, pace.speed)?),
                 true => {
                     listen(sender, screen.begun);
                     None
@@ -94,12 +92,6 @@ impl Playing {
 /// Whether single keys are read. That requires a terminal as standard input.
 pub(crate) fn has_keys() -> bool {
     std::io::stdin().is_terminal()
-}
-
-/// Reads keys of the terminal until the returned value is dropped.
-fn keyboard(to: Sender<PlaybackCommand>, pace: Pace) -> Result<Keyboard, Failure> {
-    let failed = |source| Failure::System { what: "reading keys from the terminal", source };
-    Keyboard::listen(to, pace.speed, interrupt::flag()?).map_err(failed)
 }
 
 /// Shows playback on the terminal.

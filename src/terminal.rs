@@ -56,6 +56,11 @@ pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
+/// Whether stdout is a terminal on which more than results and errors are shown.
+pub(crate) fn is_watched() -> bool {
+    std::io::stdout().is_terminal() && !is_quiet()
+}
+
 /// Sets whether the summary has the figures for engineers, as with `-v`.
 pub(crate) fn be_verbose(verbose: bool) {
     VERBOSE.store(verbose, Ordering::Relaxed);

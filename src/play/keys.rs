@@ -1,16 +1,12 @@
 //! Single keys of a terminal as commands of playback.
 
-use std::io;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use crossbeam::channel::Sender;
 use headrace_geometry::time::DurNs;
 use headrace_replay::playback::PlaybackCommand;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios, tcgetattr, tcsetattr};
 
 use crate::cli::KEYS;
+use crate::failure::Failure;
+use crate::keyboard::{INTERRUPT, Keyboard};
 use crate::output::aside;
 
 /// Length of a jump in time: by the left or right arrow key, and by the up or down arrow key.
@@ -19,8 +15,6 @@ const FAR: DurNs = DurNs::from_millis(60_000);
 /// Slowest and fastest speed of playback, relative to real time. Beyond the fastest, playback is unlimited.
 const SLOWEST: f64 = 0.125;
 const FASTEST: f64 = 1024.0;
-/// Longest wait for a key, so that the end of playback is noticed.
-const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 
 /// A key that controls playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,75 +31,18 @@ pub(crate) enum Key {
     Help,
 }
 
-/// Standard input without line buffering and echo. The settings are restored when the value is dropped.
-pub(super) struct Keyboard {
-    before: Termios,
-    ended: Arc<AtomicBool>,
-}
-
-impl Keyboard {
-    /// Reads the terminal's keys on a separate thread, and sends their commands to `to`. `speed` is that of
-    /// playback.
-    ///
-    /// Errors: the terminal's settings can't be read or changed.
-    pub(super) fn listen(
-        to: Sender<PlaybackCommand>,
-        speed: Option<f64>,
-        terminated: Arc<AtomicBool>,
-    ) -> io::Result<Self> {
-        let before = tcgetattr(io::stdin())?;
-        let mut raw = before.clone();
-        // Ctrl-C is read as a key, too, so that the terminal is restored before the program ends.
-        raw.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG);
-        raw.special_codes[SpecialCodeIndex::VMIN] = 1;
-        raw.special_codes[SpecialCodeIndex::VTIME] = 0;
-        tcsetattr(io::stdin(), OptionalActions::Now, &raw)?;
-        aside(&format!("KEYS     {KEYS}"));
-        let ended = Arc::new(AtomicBool::new(false));
-        let keyboard = Self { before, ended: Arc::clone(&ended) };
-        let mut hand = Hand::new(speed, aside);
-        std::thread::spawn(move || {
-            let mut bytes = [0; 64];
-            while !ended.load(Ordering::Relaxed) {
-                let keys = match read(&mut bytes) {
-                    _ if terminated.load(Ordering::Relaxed) => vec![Key::Leave],
-                    Ok(count) => keys(bytes.get(..count).unwrap_or_default()),
-                    Err(_) => vec![Key::Leave],
-                };
-                for command in keys.into_iter().filter_map(|key| hand.command(key)) {
-                    if to.send(command).is_err() || command == PlaybackCommand::End {
-                        return;
-                    }
-                }
-            }
-        });
-        Ok(keyboard)
-    }
-}
-
-impl Drop for Keyboard {
-    fn drop(&mut self) {
-        self.ended.store(true, Ordering::Relaxed);
-        if let Err(error) = tcsetattr(io::stdin(), OptionalActions::Now, &self.before) {
-            tracing::warn!(%error, "the terminal's settings could not be restored");
-        }
-    }
-}
-
-/// Reads typed bytes. Returns no bytes after a time without input.
+/// Reads the terminal's keys until the returned value is dropped, and sends their commands to `to`. `speed` is that
+/// of playback.
 ///
-/// Errors: standard input is closed.
-fn read(bytes: &mut [u8]) -> io::Result<usize> {
-    let stdin = io::stdin();
-    let mut typed = [PollFd::new(&stdin, PollFlags::IN)];
-    match poll(&mut typed, Some(&WAIT)) {
-        Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(0),
-        other => other?,
-    };
-    match rustix::io::read(&stdin, bytes)? {
-        0 => Err(io::ErrorKind::UnexpectedEof.into()),
-        count => Ok(count),
-    }
+/// Errors: the terminal's settings can't be read or changed.
+pub(super) fn listen(to: Sender<PlaybackCommand>, speed: Option<f64>) -> Result<Keyboard, Failure> {
+    let mut hand = Hand::new(speed, aside);
+    let keyboard = Keyboard::listen(move |bytes| {
+        let mut commands = keys(bytes).into_iter().filter_map(|key| hand.command(key));
+        commands.all(|command| to.send(command).is_ok() && command != PlaybackCommand::End)
+    })?;
+    aside(&format!("KEYS     {KEYS}"));
+    Ok(keyboard)
 }
 
 /// Playback speed and pause as set by the keys.
@@ -179,7 +116,7 @@ fn keys(mut bytes: &[u8]) -> Vec<Key> {
             (b'-' | b'_', _) => keys.push(Key::Slower),
             (b'.', _) => keys.push(Key::Tick),
             // Ctrl-C and Ctrl-D also end playback.
-            (b'q' | b'Q' | 0x03 | 0x04, _) => keys.push(Key::Leave),
+            (b'q' | b'Q' | &INTERRUPT | 0x04, _) => keys.push(Key::Leave),
             (b'?' | b'h', _) => keys.push(Key::Help),
             _ => {}
         }

@@ -7,7 +7,7 @@ pub(super) const INTERRUPT: char = '\x03';
 
 /// A key of the terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Key {
+pub(crate) enum Key {
     Character(char),
     Enter,
     Escape,
@@ -37,7 +37,7 @@ impl Key {
 }
 
 /// Keys that some bytes represent. A terminal sends all bytes of a key at once.
-pub(super) fn keys(bytes: &[u8]) -> Vec<Key> {
+pub(crate) fn keys(bytes: &[u8]) -> Vec<Key> {
     let text = String::from_utf8_lossy(bytes);
     let mut rest = text.as_ref();
     let mut keys = Vec::new();

@@ -6,7 +6,7 @@
 mod alerts;
 mod draw;
 mod frame;
-mod keys;
+pub(crate) mod keys;
 mod listen;
 mod message;
 mod mode;

@@ -22,7 +22,7 @@ use crate::scene::Scene;
 use crate::sensing::{
     Device, Echosounder, Head, Line, Mounted, Rays, Reach, Samples, Scenery, Slice, Source,
 };
-use crate::stages::{self, AIM_HELD, Held, Stage};
+use crate::stages::{self, AIM_HELD, Frozen, Held, Stage};
 use crate::trajectory::PilotAdvice;
 use crate::truth::{self, TruthRow};
 
@@ -120,6 +120,10 @@ impl Simulation {
             effect.build(&mut sim)?;
         }
         sim.base();
+        if asker == Asker::Hosts {
+            // Before the counters encode their counts, and so after all effects on them.
+            sim.system(Stage::Tell, stages::freeze);
+        }
         add_base_systems(&mut sim);
         let (schedule, added, base) = sim.schedule(noting);
         let duration_s = match world.get_resource::<Scenery>() {
@@ -239,6 +243,44 @@ impl Simulation {
             self.end =
                 if at == NEVER { NEVER } else { at + DurNs::from_secs_f64(scenery.trajectory.duration_s()) };
         }
+    }
+
+    /// Replaces device number `source` of the vehicle file by one that is switched on now. A cable counter keeps its
+    /// count.
+    pub fn restart(&mut self, scene: &Scene, source: usize) {
+        let (facts, _) = programmed(scene);
+        let parts = (self.entities.get(source), scene.vehicle.sensors.get(source), facts.sensors.get(source));
+        let (Some(entity), Some(sensor), Some(facts)) = parts else { return };
+        let Some(slice) = self.world.get_resource::<Slice>() else { return };
+        let site = scene.vehicle.site;
+        let setup = EmulatorSetup { start: slice.until, head: facts.program, site, polled: false };
+        let mut entity = self.world.entity_mut(*entity);
+        match sensor.emulator(&setup) {
+            Emulated::Head(device) | Emulated::Echosounder(device) => _ = entity.insert(Device(device)),
+            Emulated::Depth(device) => _ = entity.insert(Device(device)),
+            Emulated::Inertial(device) => _ = entity.insert(Device(device)),
+            Emulated::VelocityLog(device) => _ = entity.insert(Device(device)),
+            Emulated::Tether(_) => {}
+        }
+    }
+
+    /// Makes the cable counters repeat their next count, or count again. Returns the counters' numbers in the vehicle
+    /// file.
+    pub fn freeze_counters(&mut self, is_frozen: bool) -> Vec<usize> {
+        let mut frozen = Vec::new();
+        for (number, entity) in self.entities.iter().enumerate() {
+            let mut entity = self.world.entity_mut(*entity);
+            if !entity.contains::<Samples<Payout>>() {
+                continue;
+            }
+            frozen.push(number);
+            if !is_frozen {
+                entity.remove::<Frozen>();
+            } else if !entity.contains::<Frozen>() {
+                entity.insert(Frozen::default());
+            }
+        }
+        frozen
     }
 
     /// Simulates up to `until`, for real hosts. [`Simulation::waiting_message`] then returns the messages that crossed
@@ -423,5 +465,53 @@ fn add_base_systems(sim: &mut Builder<'_>) {
         sim.system(Stage::Begin, stages::begin::<Payout>);
         sim.system(Stage::Feel, stages::feel_cable);
         sim.system(Stage::Tell, stages::tell::<Payout>);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing_motion::Bench;
+
+    /// Counts of the cable in half a second of a simulation for hosts, m.
+    fn counts_m(simulation: &mut Simulation, tether: usize, at: &mut MonoNs) -> Vec<f64> {
+        *at = *at + DurNs(500_000_000);
+        simulation.go_on(*at);
+        let samples = simulation.world.get::<Samples<Payout>>(simulation.entities[tether]).unwrap();
+        samples.list.iter().map(|payout| payout.chainage_m).collect()
+    }
+
+    #[test]
+    fn frozen_cable_counter_repeats_its_count_until_released() {
+        let bench = Bench::turning("");
+        let mut simulation = Simulation::for_hosts(&bench.scene()).unwrap();
+        simulation.set_out(START);
+        let (tether, mut at) = (bench.source("tether"), START);
+        let mut count = |simulation: &mut Simulation| counts_m(simulation, tether, &mut at);
+        let is_moving = |counts: &[f64]| counts.windows(2).all(|pair| pair[0] < pair[1]);
+        assert!(is_moving(&count(&mut simulation)));
+        assert_eq!(simulation.freeze_counters(true), [tether]);
+        let frozen = [count(&mut simulation), count(&mut simulation)].concat();
+        assert!(frozen.len() > 10 && frozen.iter().all(|m| m.to_bits() == frozen[0].to_bits()), "{frozen:?}");
+        assert_eq!(simulation.freeze_counters(false), [tether]);
+        let after = count(&mut simulation);
+        assert!(is_moving(&after) && after[0] > frozen[0] + 0.05, "{after:?}");
+    }
+
+    #[test]
+    fn restarted_echosounder_forgets_the_request_for_continuous_pings() {
+        let bench = Bench::turning("");
+        let scene = bench.scene();
+        let mut simulation = Simulation::for_hosts(&scene).unwrap();
+        let (ping, mut at) = (bench.source("ping"), START);
+        // Message 1400 to all devices, with the id of the profile and the checksum.
+        simulation.hear(ping, at, &[0x42, 0x52, 2, 0, 0x78, 0x05, 0, 255, 0x14, 0x05, 0x2B, 0x02]);
+        let mut pings = |simulation: &mut Simulation| {
+            counts_m(simulation, bench.source("tether"), &mut at);
+            simulation.world.get::<Samples<Sounding>>(simulation.entities[ping]).unwrap().list.len()
+        };
+        assert!(pings(&mut simulation) > 1);
+        simulation.restart(&scene, ping);
+        assert_eq!(pings(&mut simulation), 0);
     }
 }

@@ -215,6 +215,19 @@ pub(crate) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, 
     }
 }
 
+/// Marks a cable counter that repeats a count, with the chainage of this count, m.
+#[derive(Debug, Default, Component)]
+pub(crate) struct Frozen(Option<f64>);
+
+/// Frozen cable counters repeat their first count since they were frozen.
+pub(crate) fn freeze(mut counters: Query<'_, '_, (&mut Samples<Payout>, &mut Frozen)>) {
+    for (mut samples, mut frozen) in &mut counters {
+        for payout in &mut samples.list {
+            payout.chainage_m = *frozen.0.get_or_insert(payout.chainage_m);
+        }
+    }
+}
+
 /// Devices encode their measurements onto their lines.
 pub(crate) fn tell<M: Measurement>(mut devices: Query<'_, '_, (&mut Device<M>, &Samples<M>, &mut Line)>) {
     for (mut device, samples, mut line) in &mut devices {

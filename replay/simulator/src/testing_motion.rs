@@ -121,6 +121,10 @@ impl Bench {
         Scene::parse(Document::new("scene", &self.scene), &KINDS, &|_| Ok(vehicle.clone().into_bytes()), None)
     }
 
+    pub(crate) fn scene(&self) -> Scene {
+        self.parse().unwrap()
+    }
+
     pub(crate) fn simulation(&self) -> Simulation {
         self.parse().and_then(|scene| Simulation::new(&scene)).unwrap()
     }

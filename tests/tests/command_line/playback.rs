@@ -1,13 +1,14 @@
-//! `replay --interactive` with keys on a terminal and with commands from a pipe, and an interrupted demonstration.
+//! `replay --interactive` with keys on a terminal and with commands from a pipe; demonstrations on a terminal.
 
 use std::io::Write as _;
 use std::process::Stdio;
 
 use headrace_tests::json_schema::faults;
+use headrace_tests::page_client::Viewer;
 use headrace_tests::screen::Screen;
 use headrace_tests::{Folder, program};
 use rustix::process::Signal;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 const PLAY: [&str; 5] = ["replay", "dive.mcap", "--interactive", "--speed", "0.5x"];
 
@@ -90,4 +91,56 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     // A replay of the interrupted dive's log gives the same digest as the dive's report.
     let (_, replayed) = folder.replay("demo/dive.mcap", &[]);
     assert_eq!(replayed["digest"], report["digest"]);
+}
+
+/// Address of the page in a program's output.
+fn page_address(screen: &Screen) -> String {
+    let shown = screen.until("m/s");
+    let (_, rest) = shown.split_once("page   http://").unwrap();
+    rest.split_whitespace().next().unwrap().to_owned()
+}
+
+#[test]
+fn finished_demonstration_is_replayed_on_its_open_page_until_q() {
+    let folder = Folder::new();
+    let arguments = ["demo", "--speed", "max", "--no-open", "--page=127.0.0.1:0", "--out", "demo"];
+    let mut screen = Screen::run(&folder, &arguments, 100, &[]);
+    let mut viewer = Viewer::connect_to(&page_address(&screen), "", &[]).unwrap();
+    viewer.until("the result", |viewer| viewer.state["ended"] == true && !viewer.state["playback"].is_null());
+    let end_s = viewer.state["playback"]["at_s"].as_f64().unwrap();
+    assert_eq!(
+        (&viewer.state["playback"]["paused"], viewer.state["now_s"].as_f64()),
+        (&true.into(), Some(end_s))
+    );
+    viewer.send(&json!({"do": "play", "command": "pause"}));
+    viewer.send(&json!({"do": "play", "command": "seek", "to_s": end_s - 300.0}));
+    viewer.until("the jump", |viewer| viewer.state["now_s"].as_f64().unwrap() < end_s - 299.0);
+    assert_eq!((&viewer.state["ended"], &viewer.state["playback"]["paused"]), (&false.into(), &true.into()));
+    viewer.send(&json!({"do": "note", "text": "too late", "by": "test"}));
+    let refused = viewer.until_type("refused");
+    assert!(refused["why"].as_str().unwrap().contains("this dive has ended"), "{refused}");
+    viewer.send(&json!({"do": "play", "command": "seek", "to_s": end_s}));
+    viewer.until("the end", |viewer| viewer.state["now_s"].as_f64() == Some(end_s));
+    // At the end of the log, the dive is played from its beginning.
+    viewer.send(&json!({"do": "play", "command": "go"}));
+    viewer.until("the beginning", |viewer| viewer.state["now_s"].as_f64().unwrap() < end_s - 300.0);
+    screen.press(b"q");
+    let (code, shown) = screen.end();
+    assert_eq!(code, Some(0), "{shown}");
+    assert!(screen.is_in_order(), "the terminal is as before");
+    assert_eq!(shown.matches("0+001.25 to 0+024.75: 23.50 m").count(), 1, "one summary: {shown}");
+    assert_eq!(viewer.until_closed(), Some((1001, "ended".to_owned())));
+    let results = viewer.others.iter().filter(|message| message["type"] == "end").count();
+    assert_eq!(results, 1, "a replay that was left early has no result");
+}
+
+#[test]
+fn demonstration_with_exit_or_without_page_ends_by_itself() {
+    for option in ["--exit", "--no-page"] {
+        let folder = Folder::new();
+        let arguments = ["demo", "--speed", "max", "--no-open", "--out", "demo", option];
+        let (code, shown) = Screen::run(&folder, &arguments, 100, &[]).end();
+        assert_eq!(code, Some(0), "{option}: {shown}");
+        assert!(shown.contains("log    demo/dive.mcap") && !shown.contains("q quit"), "{option}: {shown}");
+    }
 }

@@ -57,6 +57,7 @@ fn tutorial_commands_succeed_in_their_order() {
             let started = program()
                 .args(&arguments)
                 .current_dir(folder.path(""))
+                .stdin(Stdio::null())
                 .stdout(Stdio::null())
                 .stderr(Stdio::null())
                 .spawn();

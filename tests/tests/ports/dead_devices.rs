@@ -33,6 +33,8 @@ fn screen_shows_growing_age_after_all_devices_die() {
     assert!(of_old.iter().all(|status| status.starts_with("\x1b[1;31m")), "in red: {of_old:#?}");
     let last = written.split("\r\x1b[K").last().unwrap();
     assert!(!last.contains("ok up to"), "{last}");
-    let wide: Vec<_> = shown_lines(&written).into_iter().filter(|line| line.chars().count() >= 60).collect();
+    // A single word, such as the path of a serial port, can't be broken.
+    let is_wide = |line: &String| line.chars().count() >= 60 && line.trim().contains(' ');
+    let wide: Vec<_> = shown_lines(&written).into_iter().filter(is_wide).collect();
     assert!(wide.is_empty(), "{wide:#?}");
 }

@@ -18,6 +18,8 @@ mod kernel_can_hid;
 mod kernel_drivers;
 #[cfg(unix)]
 mod rehearsal;
+#[cfg(unix)]
+mod rehearsal_faults;
 #[cfg(target_os = "linux")]
 mod restarts;
 #[cfg(target_os = "linux")]

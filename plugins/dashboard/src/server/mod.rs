@@ -180,11 +180,16 @@ impl Page {
         self.shared.counts.viewers.load(Ordering::Relaxed)
     }
 
+    /// Shows the result of the dive, and goes on serving the page.
+    pub fn show_result(&self, end: serde_json::Value) {
+        // Sending fails if the page's thread has ended early, which `stop` reports.
+        let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
+    }
+
     /// Ends the page. Within a second, viewers get the last messages, and `end` after all others.
     pub fn end(mut self, end: Option<serde_json::Value>) {
         if let Some(end) = end {
-            // Sending fails if the page's thread has ended early, which `stop` reports.
-            let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
+            self.show_result(end);
         }
         self.stop();
     }

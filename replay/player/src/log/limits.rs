@@ -3,7 +3,7 @@
 //! Each limit is several times the value found in logs of dives and robots. Together they keep a reader below about
 //! 130 MiB. Content beyond a limit is reported as a loss that states the limit.
 //!
-//! `docs/reference/limits.md` has the same table with the messages.
+//! `docs/reference/limits.md` lists the same limits for users.
 
 use headrace_geometry::time::MonoNs;
 
