@@ -30,12 +30,12 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::failure::Failure;
 use crate::feeds;
+use crate::interruption::{Earlier, Interruption};
 use crate::memory;
 use crate::outputs::SIMULATED;
 use crate::phase::Phase;
 use crate::progress::Progress;
 use crate::recordings::Recordings;
-use crate::resume::{BOOT, Earlier, Resuming, boot_id};
 use crate::watch::Watch;
 
 /// Capacity of the queue of notices to the terminal.
@@ -47,6 +47,9 @@ const NOTICES: usize = 1 << 10;
 /// nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
+/// Metadata keys of a live dive's log: the boot in which it was recorded, and how far the dive's clock was ahead of the
+/// host's clock, ns.
+pub(crate) const BOOT: [&str; 2] = ["boot_id", "clock_ahead_ns"];
 /// Function that is called after every tick.
 type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
 
@@ -140,7 +143,7 @@ impl<'a> Assembly<'a> {
     /// Errors: there is too little memory, a device or plugin doesn't fit, or a recording can't be created.
     pub(crate) fn assemble(self) -> Result<Dive, Failure> {
         let vehicle = self.vehicle;
-        memory::check_room(ring_bytes(vehicle))?;
+        memory::check_room(ring_bytes(vehicle), vehicle.tunnel.length_m)?;
         let (mut app, notices) = app(vehicle)?;
         if self.keeps_results {
             app.keep_results();
@@ -249,12 +252,19 @@ fn anchor(header: &mut LogHeader) {
 
 /// A loop without outlets. It gives the same results as one that is recorded.
 pub(crate) fn silent(vehicle: &VehicleConfig) -> Result<Loop, Failure> {
+    memory::check_room(ring_bytes(vehicle), vehicle.tunnel.length_m)?;
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref())?;
     }
     app.keep_results();
     arm(app, vehicle, vehicle.navigation())
+}
+
+/// Identifier of the computer's present boot; `None` if the system has none.
+pub(crate) fn boot_id() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok()?;
+    Some(text.trim().to_owned())
 }
 
 /// A unique name for a recording.
@@ -404,13 +414,13 @@ impl Dive {
         }
     }
 
-    /// Rebuilds the state of the interrupted dive `resuming`, while packets of the ports are only recorded. Returns
+    /// Rebuilds the state of the dive before an interruption, while packets of the ports are only recorded. Returns
     /// false if `ended` returned true meanwhile.
     ///
     /// If the state can't be rebuilt, the dive goes on without the earlier part, and the report says so.
     pub(crate) fn rebuild(
         &mut self,
-        resuming: &Resuming,
+        interruption: Interruption,
         rebuild: Rebuild,
         (supervisor, ended): (&Supervisor, &dyn Fn() -> bool),
         watch: &mut Watch,
@@ -419,14 +429,14 @@ impl Dive {
         let _phase = Phase::start("rebuilding the dive so far");
         let rebuild = RefCell::new(rebuild);
         if let Some(operator) = &mut self.operator {
-            operator.restarted(resuming.gap);
+            operator.restarted(interruption.gap);
             operator.input.take_in(headrace_ports::now());
         }
         let near = || ended() || rebuild.borrow().is_near();
         supervisor.run(&mut self.armed, &near, &mut |dive| {
             rebuild.borrow_mut().take(&dive.view().placed().inbox);
             tell_recordings(&mut self.recordings, watch, dive, None);
-            watch.rebuilding(resuming.read_pct(rebuild.borrow().at()));
+            watch.rebuilding(interruption.read_pct(rebuild.borrow().at()), dive);
             if let Some(operator) = &mut self.operator {
                 operator.input.take_in(dive.now());
             }
@@ -437,9 +447,8 @@ impl Dive {
             rebuild.cancel();
             return false;
         }
-        let losses = resuming.recordings.iter().map(|interrupted| interrupted.loss().to_string());
-        let words = match self.go_on(rebuild, losses.collect()) {
-            Ok(replayed) => format!("{}; {replayed} packets replayed", resuming.words()),
+        let words = match self.go_on(rebuild, interruption.losses) {
+            Ok(replayed) => format!("{}; {replayed} packets replayed", interruption.words),
             Err(error) => {
                 let words = format!("the dive before the interruption can't be read again: {error}");
                 self.earlier.losses.push(words.clone());

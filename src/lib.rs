@@ -21,6 +21,7 @@ mod followers;
 mod foxglove_live;
 pub mod import;
 mod interrupt;
+mod interruption;
 mod inventory;
 mod keyboard;
 mod live;

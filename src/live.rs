@@ -105,7 +105,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
         }
     };
     if let Some((resuming, rebuild)) = resuming.as_ref().zip(rebuild)
-        && !dive.rebuild(resuming, rebuild, (&supervisor, &ended), &mut watch, &mut beside)
+        && !dive.rebuild(resuming.interruption(), rebuild, (&supervisor, &ended), &mut watch, &mut beside)
     {
         return Err(Failure::Required(
             "the dive was ended before its earlier part was read again: there is no report; replay the recording for one"

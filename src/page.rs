@@ -494,7 +494,7 @@ impl Follower for PageFollower {
     }
 
     fn recorded(&mut self, state: &RecordingState) {
-        self.collector.recorded(state.words());
+        self.collector.recorded(state.words(), state.rebuilt_pct);
     }
 
     fn rebuilt(&mut self, dive: &Loop) {

@@ -3,22 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::report::LogReport;
-use headrace_replay::log::{Interrupted, LogInfo, PartFile, Unfinished};
+use headrace_replay::log::{Interrupted, LogInfo, Unfinished};
 use headrace_replay::rebuild::Rebuild;
 use headrace_replay::saved_state::SavedState;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Run;
-use crate::dive::{CLOCK_ANCHOR, Dive, silent};
+use crate::dive::{BOOT, CLOCK_ANCHOR, Dive, boot_id, silent};
 use crate::failure::Failure;
-use crate::feeds::share;
+use crate::interruption::Interruption;
 use crate::outputs::SIMULATED;
-use crate::report_output::files_report;
 
-/// Metadata keys of a live dive's log: the boot in which it was recorded, and how far the dive's clock was ahead of the
-/// host's clock, ns.
-pub(crate) const BOOT: [&str; 2] = ["boot_id", "clock_ahead_ns"];
 /// Longest interruption after which a dive is continued without being named, seconds.
 const LONGEST_S: f64 = 12.0 * 3600.0;
 /// Shortest interruption that is assumed if the clocks show none.
@@ -30,28 +25,6 @@ pub(crate) struct Resuming {
     pub(crate) recordings: Vec<Interrupted>,
     /// Time without data.
     pub(crate) gap: DurNs,
-}
-
-/// The parts of a dive that were recorded before it was interrupted.
-#[derive(Default)]
-pub(crate) struct Earlier {
-    pub(crate) files: Vec<PartFile>,
-    pub(crate) losses: Vec<String>,
-}
-
-impl Earlier {
-    /// Adds the earlier parts to the report's entry for the recording that continues them.
-    pub(crate) fn complete(self, log: &mut LogReport) {
-        log.losses.splice(0..0, self.losses);
-        if self.files.is_empty() {
-            return;
-        }
-        let earlier = self.files.iter().map(|file| (file.path.as_path(), file.messages));
-        let later = log.parts.iter().map(|part| (Path::new(&part.path), part.messages));
-        let whole = files_report(Path::new(&log.path), &earlier.chain(later).collect::<Vec<_>>());
-        log.losses.extend(whole.losses);
-        (log.sha256, log.parts) = (whole.sha256, whole.parts);
-    }
 }
 
 impl Resuming {
@@ -113,10 +86,14 @@ impl Resuming {
         Ok(Self { gap, recordings: recordings.into_iter().map(stated).collect() })
     }
 
-    /// Share of the interrupted dive's log that comes before `at`, percent.
-    pub(crate) fn read_pct(&self, at: MonoNs) -> u8 {
-        let share = self.longest().and_then(|longest| share(longest.recording.span, at)).unwrap_or(0.0);
-        headrace_geometry::math::floor_to_i64(share * 100.0).try_into().unwrap_or(0)
+    /// Data about the interruption for the dive that goes on.
+    pub(crate) fn interruption(&self) -> Interruption {
+        Interruption {
+            gap: self.gap,
+            span: self.longest().and_then(|longest| longest.recording.span),
+            words: self.words(),
+            losses: self.recordings.iter().map(|interrupted| interrupted.loss().to_string()).collect(),
+        }
     }
 
     /// Text about the dive that is continued.
@@ -171,11 +148,12 @@ fn unfinished(args: &Run, log: &Path) -> Result<Option<PathBuf>, Failure> {
     Ok(last.filter(|recording| interruption_s(recording).is_none_or(|seconds| seconds < LONGEST_S)))
 }
 
-/// Error if `--resume` names a recording that ended in order.
+/// Error if `--resume` names a recording that can't be continued.
 fn named_is_complete(args: &Run) -> Option<Failure> {
     let named = args.resume.clone().flatten()?;
     Some(Failure::Usage(format!(
-        "run --resume: {} ended in order, so it can't be continued; begin another dive with --new",
+        "run --resume: {} can't be continued: it ended in order, has no data, or another program is recording to it; begin \
+         another dive with --new",
         named.display()
     )))
 }
@@ -222,10 +200,4 @@ fn set_clock(dive: &Unfinished) -> DurNs {
     let gap = DurNs(gap.0.max(SHORTEST.0));
     headrace_ports::set_ahead((dive.last + gap).since(host));
     gap
-}
-
-/// Identifier of the computer's present boot; `None` if the system has none.
-pub(crate) fn boot_id() -> Option<String> {
-    let text = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok()?;
-    Some(text.trim().to_owned())
 }

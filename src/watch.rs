@@ -207,7 +207,8 @@ impl Watch {
     }
 
     /// Shows how much of an interrupted dive's log has been read again, percent.
-    pub(crate) fn rebuilding(&mut self, pct: u8) {
+    pub(crate) fn rebuilding(&mut self, pct: u8, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.tick(dive));
         if self.recorded.rebuilt_pct == Some(pct) {
             return;
         }

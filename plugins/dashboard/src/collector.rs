@@ -32,6 +32,8 @@ pub(crate) const WAITING: usize = 64;
 const MOST_SAMPLES: usize = 20_000;
 /// Maximum length of wall whose samples are read from the loop's store for one message, m.
 const MENDED_AT_ONCE_M: f64 = 10.0;
+/// Length of wall that isn't divided further, m. A densely sampled piece of this length is sent incompletely.
+const SHORTEST_MENDED_M: f64 = 0.01;
 /// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
 /// Maximum number of sections in one message.
@@ -139,6 +141,7 @@ impl Collector {
                 on: recorded_to.is_some(),
                 fails: false,
                 words: None,
+                read_again_pct: None,
                 path: recorded_to,
             },
             playback: None,
@@ -223,7 +226,9 @@ impl Collector {
     }
 
     /// Sets the displayed text about the recordings, and whether it is an alarm; `None` if recording works.
-    pub fn recorded(&mut self, shown: Option<(String, bool)>) {
+    /// `read_again_pct` is not `None` while an interrupted dive's log is read again.
+    pub fn recorded(&mut self, shown: Option<(String, bool)>, read_again_pct: Option<u8>) {
+        self.recording.read_again_pct = read_again_pct;
         let (words, fails) = shown.unzip();
         (self.recording.words, self.recording.fails) = (words, fails.unwrap_or_default());
     }
@@ -417,11 +422,19 @@ impl Collector {
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn mended(&mut self, dive: &Loop) -> Vec<SampleRecord> {
         let Some([from_m, whole_to_m]) = self.lacking_m.take() else { return Vec::new() };
-        let to_m = whole_to_m.min(from_m + MENDED_AT_ONCE_M);
+        let (store, mut to_m) = (&dive.view().coverage().store, whole_to_m.min(from_m + MENDED_AT_ONCE_M));
+        let count = |to_m: f64| {
+            let mut count = 0;
+            store.each_between(from_m, to_m, |_, _| count += 1);
+            count
+        };
+        while count(to_m) > MOST_SAMPLES && to_m - from_m > SHORTEST_MENDED_M {
+            to_m = from_m.midpoint(to_m);
+        }
         self.lacking_m = (to_m < whole_to_m).then_some([to_m, whole_to_m]);
         let (profile, t_ms) = (&dive.mission().profile, self.t_ms(dive.now()));
         let mut mended = Vec::new();
-        dive.view().coverage().store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
+        store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
             if mended.len() < MOST_SAMPLES {
                 let [y_m, z_m] = profile.point_at(arc_m).map(|value| value as f32);
                 let arc = SampleRecord::arc_of(arc_m, profile.perimeter_m());
@@ -513,12 +526,13 @@ impl Collector {
         let mut time_s = Some(0.0);
         let mut shown = Vec::new();
         for leg in &legs {
-            way_m += at_m.map_or(0.0, |at_m| (at_m - leg.from_m).abs()) + leg.from_m - leg.to_m;
-            at_m = Some(leg.to_m);
+            way_m += at_m.map_or(0.0, |at_m| (at_m - leg.from_m).abs()) + leg.from_m - leg.back_to_m;
+            at_m = Some(leg.back_to_m);
             time_s = time_s.zip(leg.takes_s).map(|(sum, takes_s)| sum + takes_s);
             let why: Vec<_> = leg.actions.iter().map(|action| action.as_str().replace('_', " ")).collect();
             let at_most_mps = (leg.at_most_mps > 0.0).then_some(leg.at_most_mps);
-            shown.push(json!({"from_m": leg.from_m, "to_m": leg.to_m, "at_most_mps": at_most_mps, "why": why.join(", ")}));
+            shown.push(json!({"from_m": leg.from_m, "to_m": leg.to_m, "back_to_m": leg.back_to_m,
+                "at_most_mps": at_most_mps, "why": why.join(", ")}));
         }
         let legs = Value::from(shown);
         let is_old =

@@ -122,6 +122,8 @@ pub struct RecordingJson {
     pub fails: bool,
     /// Text about the recording, the same on all screens; `None` if recording works.
     pub words: Option<String>,
+    /// How much of an interrupted dive's log has been read again, percent; `None` if the dive's state is complete.
+    pub read_again_pct: Option<u8>,
     /// Path of the recording.
     pub path: Option<String>,
 }

@@ -82,7 +82,12 @@ impl SavedState {
         if program.is_empty() || program != this_program() {
             return Err(from.unfit("another program saved it".to_owned()));
         }
-        Ok(Self { consumed: from.value()?, snapshot: from.raw()?.to_vec() })
+        let (consumed, checksum): (Consumed, u64) = (from.value()?, from.value()?);
+        let snapshot = from.raw()?;
+        if xxh64(snapshot, 0) != checksum {
+            return Err(from.unfit("its checksum is wrong".to_owned()));
+        }
+        Ok(Self { consumed, snapshot: snapshot.to_vec() })
     }
 
     /// Writes the state for the running program.
@@ -98,6 +103,7 @@ impl SavedState {
         to.part("saved state");
         to.value(program);
         to.value(&self.consumed);
+        to.value(&xxh64(&self.snapshot, 0));
         to.raw(&self.snapshot);
         let bytes = to.finish().map_err(std::io::Error::other)?;
         let mut file = AtomicFile::create(path)?;

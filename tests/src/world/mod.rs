@@ -28,7 +28,10 @@ use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Attached, Common, LineHistory, LineRecord, LineService, StatusQueue, Waker};
 use headrace_replay::drive::{Pace, drive};
-use headrace_replay::log::{LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo};
+use headrace_replay::log::{
+    Interrupted, LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Unfinished,
+    files_of, in_the_way,
+};
 use headrace_replay::player::Player;
 use headrace_replay::record::{RecorderOutlet, result_channels};
 use headrace_sensor::connect::Connect;
@@ -326,12 +329,51 @@ impl DiveResult {
         for (path, file) in files.iter().zip(&self.left) {
             std::fs::write(path, &file.bytes).unwrap();
         }
-        let played = replayed(&files);
-        for path in files {
+        let mut played = replayed(&files);
+        let recording = folder.path("dive.mcap");
+        if let Ok(so_far) = &played
+            && let Err(why) = resumed(&recording, so_far)
+        {
+            played = Err(format!("it can't be continued: {why}"));
+        }
+        for path in in_the_way(&recording).unwrap() {
             std::fs::remove_file(path).unwrap();
         }
         played
     }
+}
+
+/// Continues a recording that did not end in order by some ticks, and replays both.
+///
+/// Errors: packets of either are missing, or the interruption is not stated.
+fn resumed(recording: &Path, so_far: &Replayed) -> Result<(), String> {
+    const TICKS: u64 = 20;
+    let Some(unfinished) = Unfinished::read(recording).map_err(|error| error.to_string())? else {
+        return Ok(());
+    };
+    let (tick, to) = (unfinished.next_tick(), unfinished.last + DurNs(1_000_000_000));
+    let earlier = Interrupted { recording: unfinished, to, words: "interrupted".to_owned() };
+    let text = vehicle_text();
+    let header = header(&vehicle(&text), &text);
+    let begun = Recorder::go_on(&earlier, &header, None, QUEUE_BYTES, None);
+    let (mut port, handle) = begun.map_err(|error| error.to_string())?;
+    for number in 0..TICKS {
+        port.raw(0, to, to, &number.to_le_bytes()).map_err(|_| "the queue is full".to_owned())?;
+        port.tick(tick + number, to, &[0]).map_err(|_| "the queue is full".to_owned())?;
+    }
+    handle.finish().map_err(|error| error.to_string())?;
+    let files = files_of(&[recording.to_owned()]).map_err(|error| error.to_string())?;
+    let both = replayed(&files)?;
+    let (before, after) = both.consumed.split_at(so_far.consumed.len().min(both.consumed.len()));
+    if before != so_far.consumed || after.len() as u64 != TICKS {
+        let (all, wanted) = (both.consumed.len(), so_far.consumed.len());
+        return Err(format!(
+            "{all} packets, expected the {wanted} before and {TICKS} more; losses {:?}",
+            both.losses
+        ));
+    }
+    let is_stated = both.losses.iter().any(|loss| loss.contains("interrupted"));
+    if is_stated { Ok(()) } else { Err(format!("no loss states the interruption: {:?}", both.losses)) }
 }
 
 fn replayed(files: &[PathBuf]) -> Result<Replayed, String> {
@@ -360,24 +402,28 @@ fn app(vehicle: &VehicleConfig) -> App {
     app
 }
 
+fn header(vehicle: &VehicleConfig, text: &str) -> LogHeader {
+    let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
+        id: sensor.id.clone(),
+        plugin: sensor.plugin.clone(),
+        connect: sensor.connect.clone(),
+    });
+    LogHeader {
+        vehicle_toml: text.to_owned(),
+        sources: sources.collect(),
+        ticks: true,
+        results: result_channels(),
+        ..LogHeader::default()
+    }
+}
+
 /// Creates the loop and the recorder of a dive.
 fn assemble(
     vehicle: &VehicleConfig,
     text: &str,
     disk: &SimulatedDisk,
 ) -> (Loop, RecorderWorker, NoticeReceiver) {
-    let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
-        id: sensor.id.clone(),
-        plugin: sensor.plugin.clone(),
-        connect: sensor.connect.clone(),
-    });
-    let header = LogHeader {
-        vehicle_toml: text.to_owned(),
-        sources: sources.collect(),
-        ticks: true,
-        results: result_channels(),
-        ..LogHeader::default()
-    };
+    let header = header(vehicle, text);
     let (storage, path) = (Box::new(disk.clone()), Path::new("dive.mcap"));
     let rotation = Rotation::default();
     let (port, worker) = Recorder::unthreaded(storage, path, &header, &rotation, QUEUE_BYTES, None).unwrap();

@@ -162,6 +162,19 @@ fn lack_of_address_space_gives_an_error_and_no_abort() {
         assert_eq!(output.status.code(), Some(1), "{limit_kib}: {said}");
         assert!(said.contains("MiB of address space for the dive: the system refuses it"), "{said}");
     }
+    // A long tunnel needs more. With any limit the dive is refused or replayed, but never aborted.
+    folder.write("long.toml", headrace_tests::VEHICLE.replace("length_m = 100", "length_m = 20000"));
+    let mut refused = 0;
+    for limit_kib in [250_000, 400_000, 700_000, 1_000_000, 1_300_000, 1_700_000, 2_500_000] {
+        let mut limited = Command::new("sh");
+        let line = format!("ulimit -v {limit_kib} && exec \"$0\" replay dive.mcap --vehicle long.toml -q");
+        limited.args(["-c", &line]).arg(headrace.get_program()).current_dir(folder.path(""));
+        let output = limited.output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(matches!(output.status.code(), Some(0 | 1)), "{limit_kib}: {:?}: {said}", output.status);
+        refused += usize::from(said.contains("MiB of address space for the dive: the system refuses it"));
+    }
+    assert!((3..7).contains(&refused), "{refused} of 7 limits are too small");
 }
 
 #[cfg(target_os = "linux")]

@@ -4,6 +4,7 @@
 
 mod dependencies;
 mod english;
+mod entry_points;
 mod hard_cases;
 mod image;
 mod import_cycles;

@@ -190,7 +190,7 @@ fn saved_state_shortens_the_replay_only_if_it_fits_the_log() {
     }
     state.write(&path).unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    for (which, at) in [("another program", 20), ("cut off", usize::MAX)] {
+    for (which, at) in [("another program", 20), ("one bit", bytes.len() / 2), ("cut off", usize::MAX)] {
         let mut damaged = bytes.clone();
         match damaged.get_mut(at) {
             Some(byte) => *byte ^= 1,

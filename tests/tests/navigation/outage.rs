@@ -60,8 +60,8 @@ fn short_tether_silence_is_bridged() {
     }
 }
 
-/// The dive is interrupted for half a minute, in which the vehicle drives on. What no head saw does not pass, and the
-/// stretches before and after it are judged as usual.
+/// The dive is interrupted for half a minute, in which the vehicle drives on. Wall that no head
+/// saw does not pass. The stretch before is judged as usual.
 #[test]
 fn interrupted_dive_passes_nothing_that_was_not_seen() {
     for way in ["direct", "filter"] {

@@ -65,8 +65,8 @@ fn with_verdict(report: &Value, verdict: &str) -> BTreeSet<String> {
     these.map(|section| format!("{:9.3}", section["start_m"].as_f64().unwrap())).collect()
 }
 
-#[test]
 #[ignore = "takes a minute or more at real speed; .ci/run runs it beside other tests"]
+#[test]
 fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     let restarts = std::env::var("HEADRACE_RESTARTS").map_or(RESTARTS, |text| text.parse().unwrap());
     let folder = Folder::new();
@@ -132,8 +132,8 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     assert!(!folder.path(begun.to_str().unwrap()).exists(), "a dive that ended leaves no state behind");
 }
 
-#[test]
 #[ignore = "needs the time of .ci/run's rehearsal step"]
+#[test]
 fn unfinished_dive_is_offered_and_declined() {
     let folder = Folder::new();
     folder.write("vehicle.toml", headrace_tests::VEHICLE);
@@ -162,5 +162,5 @@ fn unfinished_dive_is_offered_and_declined() {
     assert!(folder.path("third.mcap").exists());
     let named = run(&["--record", "fourth.mcap", "--resume=second.mcap"]);
     assert_eq!(named.code, Some(2));
-    insta::assert_snapshot!(named.stderr, @"headrace: run --resume: second.mcap ended in order, so it can't be continued; begin another dive with --new");
+    insta::assert_snapshot!(named.stderr, @"headrace: run --resume: second.mcap can't be continued: it ended in order, has no data, or another program is recording to it; begin another dive with --new");
 }

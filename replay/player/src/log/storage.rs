@@ -47,6 +47,8 @@ impl Storage for Disk {
         // The file is opened in append mode. If another program truncates it, its length stays below the written
         // length, which shows the fault.
         let file = OpenOptions::new().append(true).create_new(true).open(path)?;
+        // Another program sees by the lock that the file is being written. Some file systems have no locks.
+        file.try_lock().ok();
         // The folder is synced only on Unix, because other systems can't open folders.
         let synced = if cfg!(unix) {
             File::open(folder_of(path)).and_then(|folder| folder.sync_all())

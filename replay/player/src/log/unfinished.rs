@@ -1,6 +1,7 @@
 //! Recordings that did not end in order, because the program or the computer was stopped.
 
 use std::collections::BTreeMap;
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -59,7 +60,8 @@ impl Interrupted {
 }
 
 impl Unfinished {
-    /// Reads the recording named `recording`. `None` if it ended in order, or if its logs aren't parts of a recording.
+    /// Reads the recording named `recording`. `None` if it ended in order, has no data, or is being written, or if its logs
+    /// aren't parts of a recording.
     ///
     /// Errors: a log can't be read.
     pub fn read(recording: &Path) -> Result<Option<Self>, LogError> {
@@ -153,7 +155,8 @@ impl Unfinished {
     }
 }
 
-/// Returns the last part of a recording and its metadata, if the recording has data and did not end in order.
+/// Returns the last part of a recording and its metadata, if the recording has data, did not end in order, and isn't being
+/// written.
 fn unended(files: &[PathBuf]) -> Result<Option<(&Path, PartHead)>, LogError> {
     let heads = files.iter().filter_map(|file| Some((file, part_head(file)?)));
     let Some((last, head)) = heads.max_by_key(|(_, head)| head.number) else { return Ok(None) };
@@ -161,5 +164,10 @@ fn unended(files: &[PathBuf]) -> Result<Option<(&Path, PartHead)>, LogError> {
     let end = reader.header().part.as_ref().and_then(|part| part.end.as_ref());
     let has_ended = end.is_some_and(|end| !end.follows);
     let is_empty = head.number == 1 && reader.times().is_none();
-    Ok(if has_ended || is_empty { None } else { Some((last.as_path(), head)) })
+    Ok(if has_ended || is_empty || is_being_written(last) { None } else { Some((last.as_path(), head)) })
+}
+
+/// Whether a program holds the lock of a log that it writes.
+fn is_being_written(log: &Path) -> bool {
+    File::open(log).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }

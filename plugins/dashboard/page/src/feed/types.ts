@@ -60,7 +60,7 @@ export interface State {
   pose?: { y_m: number; z_m: number; roll_deg: number; pitch_deg: number; yaw_deg: number } | null;
   echosounders?: Echosounder[];
   rates?: { id: string; hz: number }[];
-  recording?: { on: boolean; fails: boolean; words: string | null; path: string | null } | null;
+  recording?: { on: boolean; fails: boolean; words: string | null; path: string | null; read_again_pct?: number | null } | null;
   playback?: Playback | null;
 }
 
@@ -85,7 +85,8 @@ export interface Note {
   /** Set for a voice note. `seconds` is null if the log has no recording of it. */
   voice?: { id: number; seconds: number | null } | null;
 }
-export interface Leg { from_m: number; to_m: number; at_most_mps: number | null; why: string }
+/** A stretch is passed again as far as `back_to_m`, so that all heads pass it. */
+export interface Leg { from_m: number; to_m: number; back_to_m?: number; at_most_mps: number | null; why: string }
 /** `time_s` is null if a leg has no speed. */
 export interface Back { legs: Leg[]; way_m: number; time_s: number | null }
 export interface History { t_s: number[]; v_mps: (number | null)[]; v_max_mps: (number | null)[]; t_m: (number | null)[] }

@@ -79,7 +79,7 @@ export function Back() {
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
               <button type="button" class="leg" title={`${station(leg.from_m, 2)}–${station(leg.to_m, 2)}`} onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
-                <b>{stretch(leg.from_m, leg.to_m)}</b>{leg.at_most_mps === null ? "" : <> <span class="at-most">≤ {speedDown(leg.at_most_mps)} m/s</span></>} <span class="leg-why">{plain(leg.why)}</span>
+                <b>{stretch(leg.from_m, leg.to_m)}</b>{leg.at_most_mps === null ? "" : <> <span class="at-most">≤ {speedDown(leg.at_most_mps)} m/s</span></>}{leg.back_to_m === undefined ? "" : <> until <b>{station(leg.back_to_m, 1)}</b></>} <span class="leg-why">{plain(leg.why)}</span>
               </button>
             </li>
           ))}

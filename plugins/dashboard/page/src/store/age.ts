@@ -68,6 +68,10 @@ export function shown(store: Store): Shown {
     return { word: CONDITIONS.no_data.name, advice, lamp: "amber", old: true };
   }
   const gone = sinceState_s(store);
+  const readAgain_pct = state.recording?.read_again_pct ?? null;
+  if (readAgain_pct !== null) {
+    return { word: "RESUMING", advice: `reading the dive so far again: ${readAgain_pct} %`, lamp: "amber", old: false };
+  }
   if (hasEnded(store)) {
     return { word: "DIVE ENDED", advice: "all verdicts are final", lamp: "ended", old: false };
   }

@@ -111,6 +111,13 @@ fn last_recording_of_a_folder_is_found_if_it_did_not_end_in_order() {
     cut(&first, std::fs::metadata(&first).unwrap().len() * 3 / 4);
     std::fs::write(folder.0.join("z.mcap"), b"no log").unwrap();
     assert_eq!(last(), Some(first.clone()));
+    let unfinished = Unfinished::read(&first).unwrap().unwrap();
+    let to = unfinished.last;
+    let interrupted = Interrupted { recording: unfinished, to, words: String::new() };
+    let writing = Recorder::go_on(&interrupted, &header(true), None, QUEUE_BYTES, None).unwrap();
+    assert_eq!(last(), None, "it is being written");
+    drop(writing);
+    std::fs::remove_file(folder.0.join("b.part002.mcap")).unwrap();
     go_on(&first);
     assert_eq!(last(), None, "its continuation ended in order");
     let part = folder.part(2).with_file_name("b.part002.mcap");
