@@ -271,9 +271,9 @@ pub(crate) struct Run {
     /// Don't record.
     #[arg(long, conflicts_with = "record")]
     pub(crate) no_record: bool,
-    /// Continue the last dive in the folder of the recording, if it did not end in order, for instance after a
-    /// power cut: recording goes on in a further part, and the dive so far is read again. Otherwise begin a dive.
-    /// With a path, continue that recording.
+    /// Continue the last dive in the folder of the recording, if it did not end in order within the last 12
+    /// hours, for instance after a power cut: recording goes on in a further part, and the dive so far is read
+    /// again. Otherwise begin a dive. With a path, continue that recording.
     #[arg(long, value_name = "LOG.mcap", num_args = 0..=1, require_equals = true, conflicts_with_all = ["no_record", "source"])]
     pub(crate) resume: Option<Option<PathBuf>>,
     /// Begin a new dive, although the last one did not end in order.

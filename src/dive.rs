@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use headrace_fusion::Navigation;
+use headrace_geometry::snapshot::SnapshotError;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleInput, ConsolePort};
@@ -19,8 +20,7 @@ use headrace_replay::log::{
     DerivedChannels, Every, Interrupted, LinePort, LogHeader, Recorder, Rotation, SourceInfo, VoicePort,
     dive_name,
 };
-use headrace_replay::playback::PlaybackError;
-use headrace_replay::rebuild::Rebuild;
+use headrace_replay::rebuild::{Rebuild, Rebuilt};
 use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
 use headrace_replay::saved_state::StateKeeper;
 use headrace_replay::threads::drive_on;
@@ -417,7 +417,10 @@ impl Dive {
     /// Rebuilds the state of the dive before an interruption, while packets of the ports are only recorded. Returns
     /// false if `ended` returned true meanwhile.
     ///
-    /// If the state can't be rebuilt, the dive goes on without the earlier part, and the report says so.
+    /// If the log can't be read, the dive goes on without the earlier part, and the report says so. If the dive ends
+    /// before its state is rebuilt, the recording can be continued.
+    ///
+    /// Errors: the loop can't take the rebuilt state.
     pub(crate) fn rebuild(
         &mut self,
         interruption: Interruption,
@@ -425,7 +428,7 @@ impl Dive {
         (supervisor, ended): (&Supervisor, &dyn Fn() -> bool),
         watch: &mut Watch,
         beside: &mut dyn FnMut(&Supervisor, &mut Watch),
-    ) -> bool {
+    ) -> Result<bool, Failure> {
         let _phase = Phase::start("rebuilding the dive so far");
         let rebuild = RefCell::new(rebuild);
         if let Some(operator) = &mut self.operator {
@@ -445,31 +448,35 @@ impl Dive {
         let rebuild = rebuild.into_inner();
         if ended() {
             rebuild.cancel();
-            return false;
+            self.recordings.abandon();
+            return Ok(false);
         }
-        let words = match self.go_on(rebuild, interruption.losses) {
-            Ok(replayed) => format!("{}; {replayed} packets replayed", interruption.words),
+        self.earlier.losses = interruption.losses;
+        let words = match rebuild.finish() {
+            Ok(rebuilt) => {
+                let replayed = rebuilt.consumed.packets - rebuilt.saved_packets;
+                self.go_on(rebuilt)?;
+                format!("{}; {replayed} packets replayed", interruption.words)
+            }
             Err(error) => {
+                self.armed.go_on(None)?;
                 let words = format!("the dive before the interruption can't be read again: {error}");
                 self.earlier.losses.push(words.clone());
                 words
             }
         };
         watch.rebuilt(&self.armed, &words);
-        true
+        Ok(true)
     }
 
-    /// Restores the rebuilt state. Returns the number of packets that were replayed for it.
-    fn go_on(&mut self, rebuild: Rebuild, interruption: Vec<String>) -> Result<u64, PlaybackError> {
-        self.earlier.losses = interruption;
-        let rebuilt = rebuild.finish().inspect_err(|_| self.armed.go_on(None).unwrap_or(()))?;
+    fn go_on(&mut self, rebuilt: Rebuilt) -> Result<(), SnapshotError> {
         self.armed.go_on(Some(&rebuilt.snapshot))?;
         self.earlier.losses.splice(0..0, rebuilt.losses);
         self.earlier.files = rebuilt.files;
         if let Some(states) = &mut self.states {
             states.counted(rebuilt.consumed);
         }
-        Ok(rebuilt.consumed.packets - rebuilt.saved_packets)
+        Ok(())
     }
 
     /// Runs the loop on the ports until `ended` returns true. `beside` is called after every tick.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::calibrate::collect::CollectError;
 use headrace_config::{ConfigError, ConfigErrors};
 use headrace_dashboard::export::ExportError;
+use headrace_geometry::snapshot::SnapshotError;
 use headrace_import::ImportError;
 use headrace_import::routing::RoutingError;
 use headrace_monitor::PluginError;
@@ -61,6 +62,8 @@ pub(crate) enum Failure {
     EffectInfluence(#[from] EffectInfluenceError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
     #[error(transparent)]
     Export(#[from] ExportError),
     #[error("writing the report as JSON: {0}")]

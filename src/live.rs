@@ -1,6 +1,6 @@
 //! `headrace run` on real ports: connections, drivers, and the state of each sensor.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     let required = required(args, vehicle)?;
     output::never_wait();
     let mut logs = if args.record.is_empty() { vec![new_log()] } else { args.record.clone() };
-    let resuming = Resuming::of(args, &logs, text)?;
+    let resuming = Resuming::of(args, &logs, (vehicle, text))?;
     match &resuming {
         Some(resuming) => logs = resuming.paths(),
         None if args.no_record => {}
@@ -65,7 +65,8 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag_of_a_dive()?;
-    let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
+    // The time of --for begins when the dive has begun, or goes on.
+    let until = Cell::new(None);
     let show = followers.show(args.output.show());
     let mut watch = Watch::new(show).live();
     let served = is_served.then(|| live_page(args, vehicle, &logs, &dive, &mut watch)).flatten();
@@ -96,7 +97,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     let ended = || {
         let now = headrace_ports::now();
         interrupted.load(Ordering::Relaxed)
-            || until.is_some_and(|until| now >= until)
+            || until.get().is_some_and(|until| now >= until)
             || states.borrow().missing(now).is_some()
     };
     let mut beside = |supervisor: &Supervisor, watch: &mut Watch| {
@@ -105,13 +106,14 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
         }
     };
     if let Some((resuming, rebuild)) = resuming.as_ref().zip(rebuild)
-        && !dive.rebuild(resuming.interruption(), rebuild, (&supervisor, &ended), &mut watch, &mut beside)
+        && !dive.rebuild(resuming.interruption(), rebuild, (&supervisor, &ended), &mut watch, &mut beside)?
     {
-        return Err(Failure::Required(
-            "the dive was ended before its earlier part was read again: there is no report; replay the recording for one"
-                .to_owned(),
-        ));
+        let why = states.borrow().missing(headrace_ports::now()).unwrap_or_else(|| {
+            "the dive was ended before its earlier part was read again, so there is no report".to_owned()
+        });
+        return Err(Failure::Required(format!("{why}; --resume goes on with the dive")));
     }
+    until.set(args.duration.map(|seconds| headrace_ports::now() + DurNs::from_secs_f64(seconds)));
     dive.run_live(&supervisor, &ended, &mut watch, &mut beside);
     let mut report = dive.end_live(supervisor, &mut watch);
     state_utc(&mut report, Some(utc_of_zero_s()));

@@ -83,6 +83,11 @@ impl Recordings {
         self.all.iter().map(|one| one.handle.voice_port()).collect()
     }
 
+    /// Tells all recordings to end without an end mark, so that the dive can be continued.
+    pub(crate) fn abandon(&mut self) {
+        self.all.iter_mut().for_each(|one| one.handle.begin_to_abandon());
+    }
+
     /// Ends all recordings at the same time.
     ///
     /// The result has the files of the first recording and the losses of all. If a medium is missing, the

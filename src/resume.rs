@@ -1,9 +1,12 @@
 //! `headrace run --resume`: continues a dive whose recording did not end in order.
 
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_replay::log::{Interrupted, LogInfo, Unfinished};
+use headrace_replay::log::{
+    Interrupted, LogInfo, RECOVERED_FROM, TRIMMED, Unfinished, files_of, in_the_way, named_part,
+};
 use headrace_replay::rebuild::Rebuild;
 use headrace_replay::saved_state::SavedState;
 use headrace_vehicle::VehicleConfig;
@@ -16,12 +19,14 @@ use crate::outputs::SIMULATED;
 
 /// Longest interruption after which a dive is continued without being named, seconds.
 const LONGEST_S: f64 = 12.0 * 3600.0;
+/// Longest interruption for which UTC is believed after a reboot, seconds.
+const LONGEST_BY_UTC_S: f64 = 30.0 * 86_400.0;
 /// Shortest interruption that is assumed if the clocks show none.
 const SHORTEST: DurNs = DurNs(1_000_000_000);
 
 /// An interrupted dive that is to be continued.
 pub(crate) struct Resuming {
-    /// The recordings of the dive, in the order of `--record`.
+    /// The recordings of the dive, beginning with the one that has the most data.
     pub(crate) recordings: Vec<Interrupted>,
     /// Time without data.
     pub(crate) gap: DurNs,
@@ -31,42 +36,62 @@ impl Resuming {
     /// The dive that the arguments ask to continue. `None` for a new dive.
     ///
     /// Errors: a dive did not end in order, and the arguments don't say what to do; or the dive can't be continued.
-    pub(crate) fn of(args: &Run, logs: &[PathBuf], vehicle_text: &str) -> Result<Option<Self>, Failure> {
+    pub(crate) fn of(
+        args: &Run,
+        logs: &[PathBuf],
+        vehicle: (&VehicleConfig, &str),
+    ) -> Result<Option<Self>, Failure> {
         if args.new || args.no_record {
             return Ok(None);
         }
-        let mut found = Vec::new();
-        for log in logs {
-            found.extend(unfinished(args, log)?.map(|recording| (log, recording)));
+        if let Some(Some(named)) = &args.resume {
+            return Self::continuing(vec![named_recording(args, named)?], vehicle).map(Some);
         }
-        let Some((_, first)) = found.first() else {
-            return named_is_complete(args).map_or(Ok(None), Err);
-        };
-        let shown = first.display();
+        let found = logs.iter().map(|log| unfinished(log)).collect::<Result<Vec<_>, _>>()?;
+        let found: Vec<PathBuf> = found.into_iter().flatten().collect();
+        let Some(first) = found.first().map(|first| first.display()) else { return Ok(None) };
         if args.resume.is_none() {
             return Err(Failure::Usage(format!(
-                "run: the last dive, {shown}, did not end in order; --resume continues it in a further part, --new begins \
+                "run: the last dive, {first}, did not end in order; --resume continues it in a further part, --new begins \
                  another dive"
             )));
         }
         if found.len() < logs.len() {
             return Err(Failure::Usage(format!(
-                "run --resume: {shown} can be continued, but one of the other recordings can't; give --record only for those \
+                "run --resume: {first} can be continued, but one of the other recordings can't; give --record only for those \
                  that can, or --new"
             )));
         }
-        let recordings =
-            found.iter().map(|(_, recording)| Unfinished::read(recording)).collect::<Result<Vec<_>, _>>()?;
-        Self::continuing(recordings.into_iter().flatten().collect(), vehicle_text).map(Some)
+        let recordings = found.iter().map(|found| Unfinished::read(found)).collect::<Result<Vec<_>, _>>()?;
+        let recordings: Vec<Unfinished> = recordings.into_iter().flatten().collect();
+        if recordings.len() < logs.len() {
+            // Two paths led to the same recording, or another program has just continued one.
+            return Err(Failure::Usage(format!(
+                "run --resume: {first} can be continued only once at a time; give --record once, or the paths of the recordings"
+            )));
+        }
+        Self::continuing(recordings, vehicle).map(Some)
     }
 
-    fn continuing(recordings: Vec<Unfinished>, vehicle_text: &str) -> Result<Self, Failure> {
-        let Some(longest) = recordings.iter().max_by_key(|recording| recording.last) else {
-            return Err(Failure::Usage("run --resume: the recording has no data yet; use --new".to_owned()));
+    fn continuing(
+        mut recordings: Vec<Unfinished>,
+        (vehicle, text): (&VehicleConfig, &str),
+    ) -> Result<Self, Failure> {
+        // The report and the rebuilt state are those of the first recording.
+        recordings.sort_by_key(|recording| Reverse(recording.last));
+        let Some(longest) = recordings.first() else {
+            return Err(Failure::Usage(
+                "run --resume: another program has just continued the dive".to_owned(),
+            ));
         };
         let shown = longest.recording.display();
-        let recorded = longest.info.vehicle_toml.as_deref().unwrap_or_default();
-        if !is_same_vehicle(recorded, vehicle_text) {
+        if let Some(other) = recordings.iter().find(|other| other.dive != longest.dive) {
+            let other = other.recording.display();
+            return Err(Failure::Usage(format!(
+                "run --resume: {shown} and {other} are recordings of different dives; continue one of them with --resume=PATH"
+            )));
+        }
+        if !is_same_vehicle(&longest.info, vehicle, text) {
             return Err(Failure::Usage(format!(
                 "run --resume: {shown} was recorded with another vehicle file (only lines with connect may differ); give that \
                  file, or begin another dive with --new"
@@ -90,7 +115,7 @@ impl Resuming {
     pub(crate) fn interruption(&self) -> Interruption {
         Interruption {
             gap: self.gap,
-            span: self.longest().and_then(|longest| longest.recording.span),
+            span: self.recordings.first().and_then(|first| first.recording.span),
             words: self.words(),
             losses: self.recordings.iter().map(|interrupted| interrupted.loss().to_string()).collect(),
         }
@@ -110,21 +135,17 @@ impl Resuming {
         )
     }
 
-    /// The recording that has the most data.
-    pub(crate) fn longest(&self) -> Option<&Interrupted> {
-        self.recordings.iter().max_by_key(|interrupted| interrupted.recording.last)
-    }
-
     /// Begins to rebuild the dive's state, and makes the loop of `dive` only record until then.
     ///
     /// Errors: the log can't be opened, or the loop can't be armed.
     pub(crate) fn begin(&self, vehicle: &VehicleConfig, dive: &mut Dive) -> Result<Rebuild, Failure> {
         let next_tick = self.recordings.iter().map(|interrupted| interrupted.recording.next_tick()).max();
         dive.armed.hold(next_tick.unwrap_or(0));
-        let files = self.longest().map(|longest| longest.recording.files.clone()).unwrap_or_default();
-        // States are saved beside the first recording.
-        let first = self.recordings.first().map(|first| SavedState::path(&first.recording.recording));
-        Ok(Rebuild::start(silent(vehicle)?, files, first.unwrap_or_default())?)
+        let files = self.recordings.first().map(|first| first.recording.files.clone()).unwrap_or_default();
+        // States are saved beside one of the recordings.
+        let states = self.recordings.iter().map(|of| SavedState::path(&of.recording.recording));
+        let state = states.into_iter().find(|path| path.exists()).unwrap_or_default();
+        Ok(Rebuild::start(silent(vehicle)?, files, state)?)
     }
 
     /// Paths that name the recordings.
@@ -133,34 +154,42 @@ impl Resuming {
     }
 }
 
-/// The recording that a dive recorded to `log` would continue.
-fn unfinished(args: &Run, log: &Path) -> Result<Option<PathBuf>, Failure> {
-    let named = args.resume.clone().flatten();
-    if let Some(named) = named.filter(|_| args.record.len() < 2) {
-        return Ok(Unfinished::read(&named)?.map(|recording| recording.recording));
+/// The recording that `--resume=PATH` names.
+///
+/// Errors: it can't be continued, or there are several recordings.
+fn named_recording(args: &Run, named: &Path) -> Result<Unfinished, Failure> {
+    let shown = named.display();
+    if args.record.len() > 1 || named.is_dir() {
+        return Err(Failure::Usage(format!(
+            "run --resume={shown}: expected one recording; with --record twice, write --resume without a path"
+        )));
     }
+    let recording = named_part(named).map_or_else(|| named.to_owned(), |(recording, _)| recording);
+    Unfinished::read(&recording)?.ok_or_else(|| {
+        Failure::Usage(format!(
+            "run --resume: {shown} can't be continued: it ended in order, has no data, or another program is recording to \
+             it; begin another dive with --new"
+        ))
+    })
+}
+
+/// The recording that a dive recorded to `log` would continue: `log` itself, or the last one in its folder.
+fn unfinished(log: &Path) -> Result<Option<PathBuf>, Failure> {
     let folder = log.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         return Ok(None);
+    }
+    if !in_the_way(log).unwrap_or_default().is_empty() && Unfinished::is_at(log)? {
+        return Ok(Some(log.to_owned()));
     }
     let last = Unfinished::last_in(folder, &is_no_live_dive)?;
     // A dive of another day isn't continued by a service that starts anew.
     Ok(last.filter(|recording| interruption_s(recording).is_none_or(|seconds| seconds < LONGEST_S)))
 }
 
-/// Error if `--resume` names a recording that can't be continued.
-fn named_is_complete(args: &Run) -> Option<Failure> {
-    let named = args.resume.clone().flatten()?;
-    Some(Failure::Usage(format!(
-        "run --resume: {} can't be continued: it ended in order, has no data, or another program is recording to it; begin \
-         another dive with --new",
-        named.display()
-    )))
-}
-
 /// Time since a recording was last written to, by the file system, seconds; `None` if unknown.
 fn interruption_s(recording: &Path) -> Option<f64> {
-    let files = headrace_replay::log::files_of(&[recording.to_owned()]).ok()?;
+    let files = files_of(&[recording.to_owned()]).ok()?;
     let modified = files.iter().filter_map(|file| file.metadata().ok()?.modified().ok()).max()?;
     let (_, utc) = headrace_ports::clock_anchor();
     let since_1970_s = modified.duration_since(std::time::UNIX_EPOCH).ok()?.as_secs_f64();
@@ -169,16 +198,23 @@ fn interruption_s(recording: &Path) -> Option<f64> {
 
 /// Whether a log isn't the recording of a live dive.
 fn is_no_live_dive(info: &LogInfo) -> bool {
-    info.metadata.contains_key(SIMULATED) || !info.metadata.contains_key(CLOCK_ANCHOR[0])
+    let is_changed = [SIMULATED, RECOVERED_FROM, TRIMMED].iter().any(|key| info.metadata.contains_key(*key));
+    is_changed || !info.metadata.contains_key(CLOCK_ANCHOR[0])
 }
 
-/// Whether two vehicle files differ at most in the connections of the sensors.
-fn is_same_vehicle(one: &str, other: &str) -> bool {
+/// Whether a log was recorded with this vehicle file and the files that it names. The connections of the sensors may
+/// differ.
+fn is_same_vehicle(recorded: &LogInfo, vehicle: &VehicleConfig, text: &str) -> bool {
     let lines = |text: &str| -> Vec<String> {
         let lines = text.lines().map(str::trim).filter(|line| !line.starts_with("connect"));
         lines.map(str::to_owned).collect()
     };
-    lines(one) == lines(other)
+    let attached = |(name, text): &(String, String)| {
+        let found = recorded.attachments.iter().find(|(other, _)| other == name);
+        found.is_some_and(|(_, bytes)| bytes == text.as_bytes())
+    };
+    lines(recorded.vehicle_toml.as_deref().unwrap_or_default()) == lines(text)
+        && vehicle.attachments.iter().all(attached)
 }
 
 /// Sets the dive's clock so that it continues the clock of the interrupted dive. Returns the time without data.
@@ -189,13 +225,14 @@ fn set_clock(dive: &Unfinished) -> DurNs {
     let [of_clock, of_utc] = CLOCK_ANCHOR.map(number);
     let since_anchor = of_clock.map_or(0, |anchor| dive.last.0.cast_signed() - anchor);
     let by_utc = of_utc.map(|then| DurNs(utc.0 - then - since_anchor));
-    let is_plausible = |gap: &DurNs| gap.0 > 0 && gap.as_secs_f64() < LONGEST_S;
+    let is_plausible = |gap: &DurNs| gap.0 > 0 && gap.as_secs_f64() < LONGEST_BY_UTC_S;
+    let since_boot = host.since(MonoNs(0));
     let ahead = number(BOOT[1]).unwrap_or(0);
     let gap = if is_same_boot {
         DurNs(host.0.cast_signed() + ahead - dive.last.0.cast_signed())
     } else {
-        // Without a valid UTC, the computer was off for an unknown time before it ran for that of its clock.
-        by_utc.filter(is_plausible).unwrap_or(host.since(MonoNs(0)))
+        // The interruption includes the time since the reboot. A UTC that was set back is no evidence against that.
+        by_utc.filter(is_plausible).map_or(since_boot, |gap| DurNs(gap.0.max(since_boot.0)))
     };
     let gap = DurNs(gap.0.max(SHORTEST.0));
     headrace_ports::set_ahead((dive.last + gap).since(host));

@@ -216,7 +216,7 @@ impl Watch {
         let words = self.recorded.words().map(|(words, _)| words).unwrap_or_default();
         match self.show {
             Show::JsonLines => {
-                self.print(json!({"type": "rebuilding", "read_pct": pct, "text": words}).to_string())
+                self.json(dive.now(), json!({"type": "resuming", "read_pct": pct, "text": words}));
             }
             Show::Lines if pct.is_multiple_of(10) => self.say(&format!("RESUMING  {words}")),
             Show::Lines | Show::Nothing | Show::Followers => {}

@@ -381,12 +381,12 @@ impl Loop {
     ///
     /// Errors: as for [`Loop::restore`].
     pub fn go_on(&mut self, snapshot: Option<&[u8]>) -> Result<(), SnapshotError> {
-        if let Some(snapshot) = snapshot {
-            let (ticks, time) = (self.ticks, self.time);
-            self.restore_parts(snapshot)?;
-            (self.ticks, self.time) = (ticks, time);
-        }
         self.held = false;
+        if let Some(snapshot) = snapshot {
+            let last = (self.ticks, self.time);
+            self.restore_parts(snapshot)?;
+            (self.ticks, self.time) = last;
+        }
         // Outlets that count results learn the counts of the restored state.
         self.placed = Arc::new(self.placed.followed_by_nothing());
         self.advised = self.advised.followed_by_nothing();

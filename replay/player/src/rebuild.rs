@@ -134,11 +134,9 @@ impl Rebuild {
         self.thread.join().unwrap_or(Err(PlaybackError::Log(LogError::Panicked)))
     }
 
-    /// Ends the thread without a result.
+    /// Tells the thread to end without a result. It isn't waited for, because its medium may not respond.
     pub fn cancel(self) {
         self.progress.cancelled.store(true, Ordering::Relaxed);
-        drop(self.packets);
-        drop(self.thread.join());
     }
 }
 
@@ -165,7 +163,11 @@ impl Rejoined {
         dive: &mut Loop,
         files: &[PathBuf],
     ) -> Result<u64, PlaybackError> {
-        while self.consumed.packets < state.consumed.packets && self.player.coming()?.is_some() {
+        while self.consumed.packets < state.consumed.packets
+            && !self.progress.cancelled.load(Ordering::Relaxed)
+        {
+            let Some(coming) = self.player.coming()? else { break };
+            self.progress.at_ns.store(coming.at.0, Ordering::Relaxed);
             self.player.pass(&mut self.consumed);
         }
         if self.consumed == state.consumed {

@@ -161,9 +161,9 @@ impl StateKeeper {
         Ok(Self { path, consumed: Consumed::default(), due: None, waiting: None, states, ended })
     }
 
-    /// Sets the packets of the dive so far.
+    /// Sets the packets of the dive so far, after its state has been rebuilt. The next tick saves the state.
     pub fn counted(&mut self, consumed: Consumed) {
-        self.consumed = consumed;
+        (self.consumed, self.due) = (consumed, Some(MonoNs(0)));
     }
 
     /// Counts the packets of a tick, and saves the loop's state if that is due. Call it after every tick.

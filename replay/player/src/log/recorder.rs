@@ -57,7 +57,8 @@ pub struct RecorderPort {
 
 /// Handle that ends the recorder.
 ///
-/// On drop, without [`RecorderHandle::finish`], the file is still completed, but errors are discarded.
+/// On drop, without [`RecorderHandle::finish`], everything is synced, but the recording gets no end mark and can be
+/// continued ([`Recorder::go_on`]). Errors are discarded.
 pub struct RecorderHandle {
     thread: Option<JoinHandle<Summary>>,
     state: Arc<State>,
@@ -152,6 +153,7 @@ impl Recorder {
         let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
         let state = Arc::new(State {
             stopping: AtomicBool::new(false),
+            abandoned: AtomicBool::new(false),
             closed: AtomicBool::new(false),
             failing: AtomicBool::new(false),
             gaps: ArrayQueue::new(EVENTS),
@@ -367,6 +369,14 @@ impl RecorderHandle {
         }
     }
 
+    /// Tells the thread to end within 30 s without an end mark, unless it has been told to end already.
+    pub fn begin_to_abandon(&mut self) {
+        if self.ending.is_none() {
+            self.state.abandoned.store(true, Ordering::Release);
+            self.begin_to_end(true);
+        }
+    }
+
     /// Writes the rest of the queue and the summary, and ends the thread. Write errors are in [`Summary::faults`].
     ///
     /// Errors: the thread panicked, or its medium neither accepts data nor fails.
@@ -396,6 +406,7 @@ impl RecorderHandle {
 
 impl Drop for RecorderHandle {
     fn drop(&mut self) {
+        self.begin_to_abandon();
         self.stop();
     }
 }

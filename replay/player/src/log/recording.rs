@@ -467,6 +467,12 @@ impl Recording {
         self.sum.parts.push(PartSummary { path, raw_messages });
     }
 
+    /// Ends the recording without an end mark. A later dive can continue it.
+    pub(super) fn abandon(mut self) -> Summary {
+        self.sync();
+        self.sum
+    }
+
     /// Ends the recording, and returns its totals.
     pub(super) fn finish(mut self) -> Summary {
         for _ in 0..LAST_ATTEMPTS {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::SystemTime;
 
 use headrace_geometry::time::MonoNs;
@@ -30,12 +31,15 @@ pub struct Unfinished {
     pub span: Option<(MonoNs, MonoNs)>,
     /// Files of the parts, in order.
     pub files: Vec<PathBuf>,
-    pub(super) dive: String,
+    /// Identifier of the recording, equal for all recordings of a dive.
+    pub dive: String,
     /// Number of the last part, and number in its file name.
     pub(super) number: u32,
     pub(super) named: u32,
     /// Totals of all readable messages.
     pub(super) progress: Progress,
+    /// The last file, locked, so that no other program continues the recording. `None` on file systems without locks.
+    _lock: Option<Arc<File>>,
 }
 
 /// An interrupted recording that is continued, and the statement about the interruption in its log.
@@ -69,6 +73,12 @@ impl Unfinished {
         let Some((last_file, head)) = unended(&files)?.map(|(file, head)| (file.to_owned(), head)) else {
             return Ok(None);
         };
+        let lock = match File::open(&last_file).map(|file| (file.try_lock(), file)) {
+            Ok((Err(TryLockError::WouldBlock), _)) => return Ok(None),
+            Ok((Ok(()), file)) => Some(Arc::new(file)),
+            // Some file systems have no locks.
+            Ok((Err(TryLockError::Error(_)), _)) | Err(_) => None,
+        };
         let span = DiveLog::open(&files)?.times();
         let mut reader = LogReader::open(&last_file)?;
         let topics: BTreeMap<u16, String> =
@@ -98,6 +108,7 @@ impl Unfinished {
             number,
             named: named.unwrap_or(1),
             progress,
+            _lock: lock,
         };
         Ok(last.map(unfinished))
     }
@@ -133,6 +144,15 @@ impl Unfinished {
             return Ok(unended(&files)?.map(|_| recording));
         }
         Ok(None)
+    }
+
+    /// Whether the recording named `recording` exists and can be continued, judged as in [`Unfinished::read`].
+    ///
+    /// Errors: a log can't be read.
+    pub fn is_at(recording: &Path) -> Result<bool, LogError> {
+        let files = files_of(&[recording.to_owned()])?;
+        let has_head = files.iter().any(|file| part_head(file).is_some());
+        Ok(has_head && unended(&files)?.is_some())
     }
 
     /// Returns the path of the last part.

@@ -187,7 +187,9 @@ impl RecorderWorker {
         let (sent_dropped, results_missing) =
             (count(&self.state.sent_dropped), count(&self.state.results_missing));
         let skipped = self.skipped;
-        let summary = Summary { left_out, sent_dropped, skipped, results_missing, ..self.recording.finish() };
+        let is_abandoned = self.state.abandoned.load(Ordering::Acquire);
+        let ended = if is_abandoned { self.recording.abandon() } else { self.recording.finish() };
+        let summary = Summary { left_out, sent_dropped, skipped, results_missing, ..ended };
         let Summary { messages, bytes, faults, .. } = &summary;
         tracing::info!(
             messages,
