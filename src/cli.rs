@@ -28,6 +28,8 @@ pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use value_parsers::{Speed, speed, time};
 
+/// Value of `run --resume` without a path.
+pub(crate) const LAST: &str = "last";
 /// Commands of `replay --interactive`.
 pub(crate) const COMMANDS: &str =
     "pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end or quit";
@@ -274,8 +276,8 @@ pub(crate) struct Run {
     /// Continue the last dive in the folder of the recording, if it did not end in order within the last 12
     /// hours, for instance after a power cut: recording goes on in a further part, and the dive so far is read
     /// again. Otherwise begin a dive. With a path, continue that recording.
-    #[arg(long, value_name = "LOG.mcap", num_args = 0..=1, require_equals = true, conflicts_with_all = ["no_record", "source"])]
-    pub(crate) resume: Option<Option<PathBuf>>,
+    #[arg(long, value_name = "LOG.mcap", num_args = 0..=1, require_equals = true, default_missing_value = LAST, conflicts_with_all = ["no_record", "source"])]
+    pub(crate) resume: Option<PathBuf>,
     /// Begin a new dive, although the last one did not end in order.
     #[arg(long, conflicts_with = "resume")]
     pub(crate) new: bool,
@@ -408,7 +410,7 @@ pub(crate) struct Simulate {
     pub(crate) take: Option<TakeWhat>,
     /// List the effects that would be simulated, with their reasons, without simulating. With =worth, also
     /// measure over several seeds the cost of each effect, and how this scene's results change without it.
-    #[arg(long, value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "list", value_name = "WHAT")]
+    #[arg(long, value_enum, num_args = 0..=1, require_equals = true, default_missing_value = LAST, default_missing_value = "list", value_name = "WHAT")]
     pub(crate) explain: Option<Explain>,
     /// Number of seeds that --explain=worth simulates, beginning with the scene's.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=1000))]

@@ -6,7 +6,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::report::{LogReport, Report};
 use headrace_ports::LineRecord;
 use headrace_replay::log::{
-    LeftOut, LinePort, RecorderHandle, RecordingEvent, RecordingFault, Summary, VoicePort,
+    LeftOut, LinePort, RecorderHandle, RecordingEvent, RecordingFault, RecordingHealth, Summary, VoicePort,
 };
 use headrace_replay::player::seconds;
 
@@ -27,14 +27,14 @@ pub(crate) struct Recordings {
 struct One {
     path: PathBuf,
     handle: RecorderHandle,
-    /// Whether the recording is failing at present; `None` if it has never failed.
-    fails: Option<bool>,
+    /// State of the recording; `None` if it has never failed.
+    health: Option<RecordingHealth>,
     is_late: bool,
 }
 
 impl Recordings {
     pub(crate) fn of(recorders: Vec<(PathBuf, RecorderHandle)>, is_live: bool) -> Self {
-        let one = |(path, handle)| One { path, handle, fails: None, is_late: false };
+        let one = |(path, handle)| One { path, handle, health: None, is_late: false };
         Self { all: recorders.into_iter().map(one).collect(), is_live, unsafe_for: DurNs(0) }
     }
 
@@ -44,7 +44,7 @@ impl Recordings {
         self.unsafe_for = DurNs(0);
         for one in &mut self.all {
             while let Some(event) = one.handle.next_event() {
-                one.fails = Some(event.fails());
+                one.health.get_or_insert_default().take(&event);
                 news.push(event);
             }
             if self.is_live {
@@ -58,7 +58,7 @@ impl Recordings {
 
     /// State of all recordings together, for the screens.
     pub(crate) fn state(&self) -> RecordingState {
-        let fails = self.all.iter().filter_map(|one| one.fails).reduce(|one, other| one | other);
+        let fails = self.all.iter().filter_map(One::fails).reduce(|one, other| one | other);
         let unsafe_s = self.unsafe_for.0.max(0).unsigned_abs() / 1_000_000_000;
         RecordingState { fails, unsafe_s, rebuilt_pct: None }
     }
@@ -70,7 +70,7 @@ impl Recordings {
 
     /// Whether a recording fails, or would lose the last seconds of the dive in a power cut.
     pub(crate) fn is_alarm(&self) -> bool {
-        self.all.iter().any(|one| one.is_late || one.fails == Some(true))
+        self.all.iter().any(|one| one.is_late || one.fails() == Some(true))
     }
 
     /// Handles by which port threads record device traffic that doesn't pass through the loop.
@@ -124,6 +124,11 @@ impl Recordings {
 }
 
 impl One {
+    /// Whether the recording is failing at present; `None` if it has never failed.
+    fn fails(&self) -> Option<bool> {
+        self.health.as_ref().map(RecordingHealth::fails)
+    }
+
     /// Event if the recording has just fallen behind or caught up.
     fn late(&mut self, unsafe_for: DurNs) -> Option<RecordingEvent> {
         let is_late = unsafe_for >= if self.is_late { SHOWN_FROM } else { ALARM_FROM };

@@ -11,7 +11,7 @@ use headrace_replay::rebuild::Rebuild;
 use headrace_replay::saved_state::SavedState;
 use headrace_vehicle::VehicleConfig;
 
-use crate::cli::Run;
+use crate::cli::{LAST, Run};
 use crate::dive::{BOOT, CLOCK_ANCHOR, Dive, boot_id, silent};
 use crate::failure::Failure;
 use crate::interruption::Interruption;
@@ -44,7 +44,7 @@ impl Resuming {
         if args.new || args.no_record {
             return Ok(None);
         }
-        if let Some(Some(named)) = &args.resume {
+        if let Some(named) = args.resume.as_deref().filter(|named| *named != Path::new(LAST)) {
             return Self::continuing(vec![named_recording(args, named)?], vehicle).map(Some);
         }
         let found = logs.iter().map(|log| unfinished(log)).collect::<Result<Vec<_>, _>>()?;

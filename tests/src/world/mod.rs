@@ -111,6 +111,7 @@ pub struct World {
     /// failure.
     taken: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
+    is_behind: bool,
     /// Number of packets that the recorder skipped because its backlog was too large.
     skipped: usize,
     /// Time since which packets have waited to be taken by the loop. `longest_wait` is the longest such wait while the
@@ -170,7 +171,7 @@ impl World {
             devices.push(Device::new(sensor.emulator(&setup), cable, faults, loses, Random(random.bits())));
         }
         let (consumed, taken, certain) = (Vec::new(), VecDeque::new(), 0);
-        let is_failing = false;
+        let (is_failing, is_behind) = (false, false);
         Self {
             sabotage,
             random,
@@ -185,6 +186,7 @@ impl World {
             recorder,
             taken,
             is_failing,
+            is_behind,
             skipped: 0,
             waiting_since: None,
             longest_wait: DurNs(0),
@@ -263,12 +265,18 @@ impl World {
         let failures = self.disk.failures();
         while self.recorder.step(since_begin) {}
         while let Some(event) = self.recorder.next_event() {
-            self.is_failing = event.fails();
-            if let RecordingEvent::CaughtUp { packets } = event {
-                self.skipped += usize::try_from(packets).unwrap();
+            match event {
+                RecordingEvent::Failed { .. } => self.is_failing = true,
+                RecordingEvent::Resumed(_) => self.is_failing = false,
+                RecordingEvent::Behind => self.is_behind = true,
+                RecordingEvent::CaughtUp { packets } => {
+                    self.is_behind = false;
+                    self.skipped += usize::try_from(packets).unwrap();
+                }
+                _ => {}
             }
         }
-        if self.is_failing || self.disk.failures() != failures {
+        if self.is_failing || self.is_behind || self.disk.failures() != failures {
             self.taken.clear();
             return;
         }

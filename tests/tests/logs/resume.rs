@@ -102,7 +102,7 @@ impl Interrupted {
     /// Continues the dive: `held` packets arrive while it is rebuilt, and `waiting` are in the rings when it goes on.
     fn resume(&self, held: usize, waiting: usize, saved: &Path) -> (Loop, Rebuilt) {
         let unfinished = Unfinished::read(&self.log).unwrap().unwrap();
-        assert_eq!(unfinished.files, [self.log.clone()]);
+        assert_eq!(unfinished.files, std::slice::from_ref(&self.log));
         let mut rebuild =
             Rebuild::start(with_ports(&self.scene), unfinished.files.clone(), saved.to_owned()).unwrap();
         let (mut dive, mut ports) = armed(&self.scene.vehicle);

@@ -4,7 +4,6 @@
 
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader};
-use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
@@ -31,23 +30,11 @@ fn random(n: u64) -> u64 {
 }
 
 /// Starts the dive. Returns the process once it shows that the dive has begun or goes on.
-fn start(folder: &Folder, vehicle: &str, how: &str) -> (Child, Duration) {
+fn start(folder: &Folder, vehicle: &str, (how, logs): (&str, &[&str])) -> (Child, Duration) {
     let begun = wall_clock();
     let mut run = headrace()
-        .args([
-            "run",
-            vehicle,
-            how,
-            "--no-page",
-            "--json-lines",
-            "--record",
-            "dive.mcap",
-            "--record",
-            "second.mcap",
-            "--report",
-            "live.json",
-            "--force",
-        ])
+        .args(["run", vehicle, how, "--no-page", "--json-lines", "--report", "live.json", "--force"])
+        .args(logs.iter().flat_map(|log| ["--record", log]))
         .current_dir(folder.path(""))
         .stdout(Stdio::piped())
         .spawn()
@@ -67,10 +54,8 @@ fn with_verdict(report: &Value, verdict: &str) -> BTreeSet<String> {
     these.map(|section| format!("{:9.3}", section["start_m"].as_f64().unwrap())).collect()
 }
 
-#[ignore = "takes a minute or more at real speed; .ci/run runs it beside other tests"]
-#[test]
-fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
-    let restarts = std::env::var("HEADRACE_RESTARTS").map_or(RESTARTS, |text| text.parse().unwrap());
+/// Kills and resumes a dive with these recordings. Checks that its report is that of a replay, and returns the folder.
+fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     let folder = Folder::new();
     folder.write("scene.toml", scene(20.0 + restarts as f64));
     let emulate = headrace()
@@ -83,7 +68,7 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     let mut emulate = Running(emulate);
     let mut said = BufReader::new(emulate.0.stdout.take().unwrap()).lines().map(Result::unwrap);
     let vehicle = said.find_map(|line| line.strip_prefix("vehicle ").map(str::to_owned)).unwrap();
-    let (mut run, _) = start(&folder, &vehicle, "--new");
+    let (mut run, _) = start(&folder, &vehicle, ("--new", logs));
     std::thread::sleep(Duration::from_secs(12));
     let (mut slowest, mut dead) = (Duration::ZERO, Duration::ZERO);
     for number in 0..restarts {
@@ -92,7 +77,7 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
         run.kill().unwrap();
         run.wait().unwrap();
         std::thread::sleep(Duration::from_millis(random(number + 1000) % 1500));
-        let (next, took) = start(&folder, &vehicle, "--resume");
+        let (next, took) = start(&folder, &vehicle, ("--resume", logs));
         run = next;
         (slowest, dead) = (slowest.max(took), dead + killed.elapsed());
         assert!(took < RESUMED_WITHIN, "restart {number} took {took:?}");
@@ -103,8 +88,12 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     assert_eq!(status.code(), Some(3), "data of the gaps is lost");
     let live = report(&folder.path("live.json"));
     let losses = live["log"]["losses"].as_array().unwrap();
-    // The interruptions of the recording that the report is about, and the last one of the other recording.
-    assert_eq!(losses.len() as u64, restarts + 1, "each interruption is one loss: {losses:#?}");
+    // The interruptions of the recording that the report is about, and the last one of other recordings.
+    assert_eq!(
+        losses.len() as u64 + 1,
+        restarts + logs.len() as u64,
+        "each interruption is a loss: {losses:#?}"
+    );
     assert!(
         losses.iter().all(|loss| loss.as_str().unwrap().contains("the program was stopped")),
         "{losses:#?}"
@@ -122,16 +111,10 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     for key in ["sha256", "messages", "parts"] {
         assert_eq!(live["log"][key], replayed["log"][key], "log.{key}");
     }
-    for log in ["dive.mcap", "second.mcap"] {
+    for log in logs {
         let (code, report) = folder.replay(log, &[]);
-        assert_eq!(
-            (code, report["log"]["losses"].as_array().unwrap().len() as u64),
-            (Some(3), restarts),
-            "{log}"
-        );
-        let verified = folder.headrace(&["verify", log]);
-        let is_it = log == recording;
-        assert!(verified.code == Some(3) || !is_it, "{log}: {}{}", verified.stdout, verified.stderr);
+        let losses = report["log"]["losses"].as_array().unwrap().len() as u64;
+        assert_eq!((code, losses), (Some(3), restarts), "{log}");
     }
     let passed = with_verdict(&live, "pass").len();
     eprintln!(
@@ -141,9 +124,25 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
         live["dive"]["duration_s"].as_f64().unwrap_or(f64::NAN),
         slowest.as_secs_f64()
     );
-    assert!(passed > 0, "stretches between the gaps pass");
-    let begun = Path::new("dive.mcap.state");
-    assert!(!folder.path(begun.to_str().unwrap()).exists(), "a dive that ended leaves no state behind");
+    assert!(!folder.path("dive.mcap.state").exists(), "a dive that ended leaves no state behind");
+    folder
+}
+
+#[ignore = "takes a minute or more at real speed; .ci/run runs it beside other tests"]
+#[test]
+fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
+    let restarts = std::env::var("HEADRACE_RESTARTS").map_or(RESTARTS, |text| text.parse().unwrap());
+    let folder = killed_and_resumed(restarts, &["dive.mcap"]);
+    let verified = folder.headrace(&["verify", "dive.mcap"]);
+    assert_eq!(verified.code, Some(3), "{}{}", verified.stdout, verified.stderr);
+}
+
+/// A kill may leave one recording longer than the other. The dive goes on from the longer one, so live results that
+/// come later may differ from a replay of the other.
+#[ignore = "takes a minute at real speed; .ci/run runs it beside other tests"]
+#[test]
+fn dive_with_two_recordings_goes_on_in_both() {
+    killed_and_resumed(3, &["dive.mcap", "second.mcap"]);
 }
 
 #[ignore = "needs the time of .ci/run's rehearsal step"]

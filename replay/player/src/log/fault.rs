@@ -109,6 +109,33 @@ impl RecordingEvent {
     }
 }
 
+/// State of a recording, from its events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RecordingHealth {
+    has_failed: bool,
+    is_behind: bool,
+    is_late: bool,
+}
+
+impl RecordingHealth {
+    /// Takes the recording's next event. The end of one fault doesn't end another.
+    pub fn take(&mut self, event: &RecordingEvent) {
+        match event {
+            RecordingEvent::Failed { .. } => self.has_failed = true,
+            RecordingEvent::Resumed(_) => self.has_failed = false,
+            RecordingEvent::Behind => self.is_behind = true,
+            RecordingEvent::CaughtUp { .. } => self.is_behind = false,
+            RecordingEvent::Late { .. } => self.is_late = true,
+            RecordingEvent::InTime { .. } => self.is_late = false,
+        }
+    }
+
+    /// Whether new data is being lost, or would be lost in a power cut.
+    pub fn fails(&self) -> bool {
+        self.has_failed || self.is_behind || self.is_late
+    }
+}
+
 /// Adds a fault to a list of limited length.
 pub(super) fn add(faults: &mut Vec<RecordingFault>, fault: RecordingFault) {
     if faults.len() < MAX_FAULTS {
@@ -116,5 +143,25 @@ pub(super) fn add(faults: &mut Vec<RecordingFault>, fault: RecordingFault) {
     } else if let Some(last) = faults.last_mut() {
         last.lost += fault.lost;
         (last.to, last.continued) = (fault.to, fault.continued);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn end_of_one_fault_does_not_end_another() {
+        let failed = RecordingEvent::Failed { path: PathBuf::new(), error: String::new() };
+        let (path, error) = (PathBuf::new(), String::new());
+        let resumed = RecordingFault { path, error, lost: 0, from: None, to: None, continued: None };
+        let mut health = RecordingHealth::default();
+        let fails = [RecordingEvent::Behind, failed, RecordingEvent::CaughtUp { packets: 7 }].map(|event| {
+            health.take(&event);
+            health.fails()
+        });
+        assert_eq!(fails, [true, true, true], "the medium still fails when the queue is empty again");
+        health.take(&RecordingEvent::Resumed(resumed));
+        assert!(!health.fails());
     }
 }

@@ -67,7 +67,7 @@ mod writer;
 pub use digest::{file_digest, files_digest};
 pub use dive_log::{DiveLog, DivePlace, PartFile};
 pub use error::LogError;
-pub use fault::{RecordingEvent, RecordingFault};
+pub use fault::{RecordingEvent, RecordingFault, RecordingHealth};
 pub use loss::{Loss, LossKind, Many};
 pub use part::{Part, PartEnd, PartHead, Progress, dive_name, named_part, part_path};
 pub use queue::{Full, LinePort};

@@ -85,7 +85,7 @@ fn recording_cut_at_any_byte_is_continued_without_gaps_or_repetitions() {
         };
         for kind in ["Raw", "Tick", "Result"] {
             let numbers = of(kind);
-            assert_eq!(numbers, (0..numbers.len() as u32).collect::<Vec<_>>(), "cut at {bytes}: {kind}");
+            assert_eq!(numbers, (0..).take(numbers.len()).collect::<Vec<u32>>(), "cut at {bytes}: {kind}");
         }
         assert_eq!(after.len(), kept.len() + 3 * 30, "cut at {bytes}");
         for part in [2, 3] {
