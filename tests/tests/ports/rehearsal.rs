@@ -64,8 +64,11 @@ impl Drop for Running {
     }
 }
 
-/// Runs a live dive with an emulator; returns exit code and report.
-fn live(folder: &Folder, scene: &Path) -> (Option<i32>, Value) {
+/// Starts an emulator. Returns its process, its further lines, and the path of the vehicle file that it has written.
+pub(crate) fn emulate(
+    folder: &Folder,
+    scene: &Path,
+) -> (Running, impl Iterator<Item = String> + use<>, String) {
     let emulate = headrace()
         .args(["emulate", "--stand", "0", "--linger", "30", "--out"])
         .arg(folder.path("rehearsal"))
@@ -76,6 +79,12 @@ fn live(folder: &Folder, scene: &Path) -> (Option<i32>, Value) {
     let mut emulate = Running(emulate);
     let mut said = BufReader::new(emulate.0.stdout.take().unwrap()).lines().map(Result::unwrap);
     let vehicle = said.find_map(|line| line.strip_prefix("vehicle ").map(str::to_owned)).unwrap();
+    (emulate, said, vehicle)
+}
+
+/// Runs a live dive with an emulator; returns exit code and report.
+fn live(folder: &Folder, scene: &Path) -> (Option<i32>, Value) {
+    let (_emulate, mut said, vehicle) = emulate(folder, scene);
     let run = headrace()
         .args(["run", &vehicle, "--record"])
         .arg(folder.path("live.mcap"))

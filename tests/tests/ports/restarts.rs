@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use headrace_tests::Folder;
 use serde_json::Value;
 
-use crate::rehearsal::{Running, headrace, interrupt, report, scene};
+use crate::rehearsal::{emulate, headrace, interrupt, report, scene};
 
 /// Number of restarts, unless the environment sets another one.
 const RESTARTS: u64 = 6;
@@ -58,16 +58,7 @@ fn with_verdict(report: &Value, verdict: &str) -> BTreeSet<String> {
 fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     let folder = Folder::new();
     folder.write("scene.toml", scene(20.0 + restarts as f64));
-    let emulate = headrace()
-        .args(["emulate", "--stand", "0", "--linger", "30", "--out"])
-        .arg(folder.path("rehearsal"))
-        .arg(folder.path("scene.toml"))
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut emulate = Running(emulate);
-    let mut said = BufReader::new(emulate.0.stdout.take().unwrap()).lines().map(Result::unwrap);
-    let vehicle = said.find_map(|line| line.strip_prefix("vehicle ").map(str::to_owned)).unwrap();
+    let (_emulate, _said, vehicle) = emulate(&folder, &folder.path("scene.toml"));
     let (mut run, _) = start(&folder, &vehicle, ("--new", logs));
     std::thread::sleep(Duration::from_secs(12));
     let (mut slowest, mut dead) = (Duration::ZERO, Duration::ZERO);
