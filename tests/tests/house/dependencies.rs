@@ -1,6 +1,6 @@
 //! Limits on dependencies: licences, sources, and libraries in other languages.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 use serde_json::Value;
@@ -22,6 +22,30 @@ fn packages() -> Vec<Value> {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
     metadata["packages"].as_array().unwrap().clone()
+}
+
+/// Crates on which each package of this tree depends by a lock file.
+fn locked_dependencies(lock_file: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let text = std::fs::read_to_string(root().join(lock_file)).unwrap();
+    let lock: toml::Table = toml::from_str(&text).unwrap();
+    let ours = lock["package"].as_array().unwrap().iter().filter(|package| package.get("source").is_none());
+    // A dependency with several versions is listed as "name version".
+    let name = |entry: &toml::Value| entry.as_str().unwrap().split(' ').next().unwrap().to_owned();
+    let dependencies = |package: &toml::Value| {
+        package.get("dependencies").map_or_else(Vec::new, |list| list.as_array().unwrap().clone())
+    };
+    ours.map(|package| (name(&package["name"]), dependencies(package).iter().map(name).collect())).collect()
+}
+
+/// Crates that the build of each package of the workspace always needs.
+fn built_dependencies() -> BTreeMap<String, BTreeSet<String>> {
+    let needs = |package: &Value| {
+        let all = package["dependencies"].as_array().unwrap().iter();
+        let built = all.filter(|dependency| dependency["kind"] != "dev" && dependency["optional"] == false);
+        built.map(|dependency| dependency["name"].as_str().unwrap().to_owned()).collect()
+    };
+    let ours = packages().into_iter().filter(|package| package["source"].is_null());
+    ours.map(|package| (package["name"].as_str().unwrap().to_owned(), needs(&package))).collect()
 }
 
 /// Licences allowed by `deny.toml`.
@@ -89,6 +113,23 @@ fn crates_come_from_the_registry_or_this_tree() {
             source.is_none_or(|source| source == "registry+https://github.com/rust-lang/crates.io-index");
         assert!(of_the_registry, "{}: {source:?}", package["name"]);
     }
+}
+
+/// With an old lock file, builds of `lab/` with `--locked` fail, and those without it change the file.
+#[test]
+fn lock_file_of_the_lab_lists_the_dependencies_of_the_product() {
+    let lab = locked_dependencies("lab/Cargo.lock");
+    let mut compared = 0;
+    for (package, dependencies) in built_dependencies() {
+        let Some(locked) = lab.get(&package) else { continue };
+        let missing: Vec<&String> = dependencies.difference(locked).collect();
+        assert!(
+            missing.is_empty(),
+            "lab/Cargo.lock: {missing:?} of {package} are missing; `cargo check` in lab/ adds them"
+        );
+        compared += 1;
+    }
+    assert!(compared > 10, "{compared} packages are in both lock files");
 }
 
 #[test]
