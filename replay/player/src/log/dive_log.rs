@@ -387,6 +387,12 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
         match (LogReader::open(path), by_name) {
             (Ok(reader), by_name) => match (&reader.header().part, by_name) {
                 (Some(part), _) => parts.push((path.clone(), Glance::of(&reader, part.head.number))),
+                // The power was cut while the header was written. The part that follows has this number, too.
+                (None, Some(part)) if reader.times().is_none() && !reader.losses().is_empty() => {
+                    let why = "it ends within its header".to_owned();
+                    losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));
+                    unread = Some(LogError::NotAPart { path: path.clone() });
+                }
                 (None, Some(number)) if !reader.losses().is_empty() => {
                     losses.push(loss(LossKind::PartByName { part: number }, None, None));
                     parts.push((path.clone(), Glance::of(&reader, number)));
@@ -395,7 +401,8 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
             },
             // An empty file that was created just before a power cut.
             (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
-                losses.push(loss(LossKind::PartUnreadable { part, found: found.clone() }, None, None));
+                let why = format!("it begins with [{found}], which no MCAP file does");
+                losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));
                 unread = Some(LogError::NotMcap { name, found, wanted });
             }
             (Err(error), _) => return Err(error),
