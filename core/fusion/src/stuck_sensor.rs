@@ -13,12 +13,11 @@ use headrace_geometry::time::{DurNs, MonoNs};
 const HANGS_AFTER: DurNs = DurNs(500_000_000);
 /// Maximum probability that noise alone causes the repetition, as a natural logarithm: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
-/// Weight of the latest difference between readings and of the latest run of identical readings in their running
-/// means.
+/// Weight of the newest value in the running means: of sign reversals on all three axes, and of run lengths.
 const LATEST: f64 = 1.0 / 64.0;
-/// Minimum share of differences between readings with a reversed sign at which the readings count as noisy.
+/// Minimum share of sign reversals among the differences of successive readings at which these count as noisy.
 ///
-/// White noise reverses the sign of two thirds of the differences, and a motion reverses hardly any.
+/// White noise reverses the sign of two thirds of the differences. A motion reverses hardly any.
 const NOISY: f64 = 0.3;
 
 /// Statistics of repeated readings of one sensor; part of the loop's saved state.

@@ -10,7 +10,7 @@ use headrace_sampling::target::{CONFIDENCE_SD, Target};
 /// Parameters for the verdicts on the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageConfig {
-    /// Maximum width of the bounds on a hole's size, m; zero for the exact search.
+    /// Maximum difference between the upper and the lower bound of a hole's size, m; zero for the exact search.
     pub hole_tolerance_m: f64,
     /// Deviation from the design profile above which a sample contradicts the profile, m.
     ///

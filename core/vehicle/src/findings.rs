@@ -50,7 +50,7 @@ const BEAMS: u32 = 720;
 const LEAST_SHARE: f64 = 0.5;
 /// Relative difference of turn periods below which heads stay in phase for hours.
 const SAME_TURN: f64 = 1e-6;
-/// Finest range step of a sonar, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet).
+/// Finest range step of a sonar, m: the step of an 881L with a range setting of 5 m or less (data sheet).
 ///
 /// No return resolves finer details of a wall.
 const FINEST_M: f64 = 0.002;

@@ -67,7 +67,7 @@ impl Agreement {
     pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
-            // Of an attitude, only the tilt is checked, because a compass may stay disturbed for long.
+            // For attitudes, only the tilt is checked, because a compass may stay disturbed for long.
             SensorKind::Imu if row.h.get(HEADING) == Some(&0.0) => self.tilt.note(agrees),
             _ => {}
         }
@@ -81,8 +81,9 @@ impl Agreement {
         if wall {
             add(variances, POSITION + 1..POSITION + 3, LOST_M);
             add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
-            // A tilt error also moves the estimate, through gravity. The cause of the tilt error has probably also
-            // caused a yaw error, and the compass deviation may have absorbed it.
+            // A tilt error also moves the estimate, through gravity. Its cause has probably also caused a yaw error.
+            // The
+            // estimated compass deviation may have absorbed the yaw error.
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);

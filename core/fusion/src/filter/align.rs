@@ -286,12 +286,12 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sensor::reading::{Level, TetherLength};
 
-    /// Repeated readings of cable and compass add no information.
+    /// Repeated readings of cable and compass have the same errors, so they do not make the estimate more certain.
     ///
     /// The chainage stays as uncertain as slack and scale make it. The yaw stays as uncertain as the compass
     /// deviation makes it.
     #[test]
-    fn repeated_readings_after_alignment_add_no_information() {
+    fn repeated_readings_do_not_reduce_systematic_errors_of_cable_and_compass() {
         let context = Context {
             profile: shapes::ceran().unwrap(),
             site: Site::default(),

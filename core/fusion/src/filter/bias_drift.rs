@@ -11,7 +11,7 @@ use headrace_geometry::math;
 
 /// Averaging time of the ratio of squared corrections to expected squares, s.
 const MEMORY_S: f64 = 10.0;
-/// Mean ratio above which the process noise is raised. Per second, it is multiplied by the ratio to the power
+/// Mean ratio above which the process noise is raised. Each second, the noise is multiplied by the ratio to the power
 /// `RAISES_PER_S`.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;

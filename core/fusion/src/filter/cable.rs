@@ -1,9 +1,9 @@
 //! Decides whether cable counter and estimate agree.
 //!
-//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are kept.
-//! The counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the
-//! chainage equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
-//! estimate disagree".
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement, both stay possible. The
+//! counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the chainage
+//! equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and estimate
+//! disagree".
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ const RECENT_S: f64 = 1.0;
 const DISPUTED_SDS: f64 = 5.0;
 /// Limit at which each innovation is clipped, in standard deviations.
 const MOST_SDS: f64 = 6.0;
-/// Smallest innovation at which counter and estimate disagree, m.
+/// Innovations smaller than this start no disagreement, m.
 const LEAST_M: f64 = 0.01;
 /// Time after which an unchanged count means a stuck counter, if slack has moved the counter constantly before.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
@@ -45,7 +45,7 @@ const SAME_M: f64 = 0.01;
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// Difference between counter and estimate at which the estimate is given up, m; includes the innovation's sd.
+/// Difference at which the estimate is given up, m: root sum square of innovation and its sd.
 ///
 /// The counter must also have counted `ALIVE_M` since the difference was reached, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
@@ -277,9 +277,8 @@ mod tests {
         CableReading { at, shown_m, off_m, sd_m, agrees, is_usual: true, is_lively: false }
     }
 
-    /// Returns the time at which counter and estimate begin to disagree, s. The vehicle moves at 0.1 m/s; from 10 s
-    /// on, the counter shows
-    /// `share` of the motion.
+    /// Returns the time at which counter and estimate begin to disagree, s. The vehicle moves at 0.1 m/s. From 10 s on,
+    /// the counter shows `share` of the motion.
     fn disputed_at(share: f64, change: impl Fn(f64, &mut CableReading)) -> Option<f64> {
         let mut cable = Cable::default();
         (0..200).map(|k| f64::from(k) / 10.0).find(|t| {
@@ -350,13 +349,13 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // Ten equal corrections a second are summed, and the sum decays over a second. The sum tends to 1 / (e^0.1 -
-        // 1) corrections.
+        // The sum gets ten equal corrections a second and decays with a time constant of a second. It tends to
+        // 1 / (e^0.1 - 1) corrections.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
     #[test]
-    fn cable_disagreement_is_reported_after_1_s_with_the_last_innovation() {
+    fn cable_disagreement_is_reported_after_1_s_with_the_largest_difference() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -388,9 +387,9 @@ mod tests {
         times.map(|t| (t, dispute.take(&reading(t)))).find(|(_, used)| *used != Use::Withhold)
     }
 
-    /// A counter follows the vehicle if the difference is within a tenth of the distance plus a centimetre.
+    /// A counter follows the vehicle if their distances differ by at most a tenth plus a centimetre.
     ///
-    /// While the estimated distance is uncertain, the tolerance is four tenths of the distance plus a centimetre.
+    /// While the estimated distance is uncertain, the tolerance is four tenths plus a centimetre.
     #[test]
     fn counter_counts_as_slipped_once_its_speed_matches_the_vehicle_again() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [

@@ -1,8 +1,8 @@
 //! Resolution step of a tether counter, recognised from its counts.
 //!
-//! A vehicle file may state a smaller step than the counter has, for instance the step of the converter instead of
-//! that of the wheel. If a counter pauses between changes, its smallest change is the step. If all changes are
-//! multiples of one length, this length is the step.
+//! A vehicle file may state a smaller step than the counter has, for instance the converter's step instead of the
+//! wheel's. If a counter pauses between changes, its smallest change is the step. If all changes are multiples of one
+//! length, this length is the step.
 
 use serde::{Deserialize, Serialize};
 

@@ -6,7 +6,7 @@ use headrace_geometry::math;
 
 /// Maximum number of range sources whose settings are checked.
 pub(super) const FOLLOWED: usize = 12;
-/// One reading in this many is compared with alternative mounts, because each comparison costs a ray.
+/// One reading in this many is compared with alternative mounts, because each comparison costs a ray cast.
 pub(super) const COMPARED: u32 = 4;
 /// Minimum number of blocks of distance for computing the uncertainty of a parameter.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
@@ -209,7 +209,7 @@ mod tests {
     /// The gain of an alternative mount varies between blocks. The mount is only as certain as the mean of these
     /// gains.
     #[test]
-    fn alternative_setting_is_less_certain_if_its_gain_scatters_between_blocks() {
+    fn alternative_mount_is_less_certain_if_its_gain_scatters_between_blocks() {
         let sure_sd = |scatter_m2: f64| {
             let mut alternative = Alternative::default();
             for k in 0..8 {
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn setting_with_negligible_effect_is_not_certain_despite_low_scatter() {
+    fn setting_that_hardly_changes_the_ranges_is_never_certain() {
         assert!(alike(1.0, 0.05).certain(0.03).is_some());
         assert!(alike(0.2, 0.2).certain(0.03).is_some(), "ranges change by 6 mm, noise 3 cm");
         assert_eq!(alike(0.1, 0.2).certain(0.03), None, "ranges change by 3 mm");

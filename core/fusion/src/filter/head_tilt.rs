@@ -19,7 +19,7 @@ const LEAST_LEFT: f64 = 0.05;
 /// A smaller lean is mostly error of the heading, so the window shows nothing.
 const LEAST_LEAN_RAD: f64 = 0.012;
 
-/// Minimum size of the smallest reported tilt, in standard deviations caused by range noise.
+/// Minimum ratio of the smallest reported tilt to the sd that declared range noise causes in the tilt.
 const SHOWS: f64 = 3.0;
 /// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
@@ -100,9 +100,10 @@ impl TiltSums {
 impl TiltFit {
     /// Adds the tilt sums of a pose window to the fit.
     ///
-    /// Unlike other settings, a tilt needs no blocks of distance: its effect changes sign as the vehicle swings, and
-    /// that of the wall's shape does not. The vehicle must move on between windows, because bumps that are seen again in
-    /// every swing do not average out.
+    /// Unlike other settings, a tilt needs no blocks of distance. Its effect changes sign as the vehicle swings, and
+    /// the
+    /// effect of the wall's shape does not. The vehicle must move on between windows, because bumps that are seen again
+    /// in every swing do not average out.
     pub(super) fn add(&mut self, window: [f64; SUMS]) {
         let [pattern_2, _, tilt_2, ..] = window;
         if pattern_2 <= 0.0 || tilt_2 < LEAST_LEAN_RAD * LEAST_LEAN_RAD * pattern_2 {
@@ -134,8 +135,8 @@ impl TiltFit {
 
     /// Returns the standard deviation of the head's tilt, radians; `None` if the vehicle has not turned enough.
     ///
-    /// It comes from the scatter of pose windows, and is at least the one caused by range noise, whose variance is
-    /// `level` times the declared variance.
+    /// The value comes from the scatter of pose windows, but range noise sets a lower limit. The variance of this noise
+    /// is `level` times the declared variance.
     pub(super) fn sd_rad(&self, level: f64) -> Option<f64> {
         let (rad, weight) = self.estimate()?;
         let [pattern_2, both, _, pattern_off, _] = self.sums;

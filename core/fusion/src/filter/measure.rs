@@ -92,7 +92,7 @@ impl ScalarUpdate {
         vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
-    /// Returns the part of the residual that comes from errors found since the errors in `known`.
+    /// Returns the part of the residual that the corrections from `known` to `errors` explain.
     pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
         self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
     }
@@ -158,8 +158,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // The slope is d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The true range may be as short as the nearest ray of the wider cone. The true range is assumed to be uniformly
-    // distributed between both values.
+    // The true range may be as short as the nearest ray of the wider cone. It is assumed to be uniformly distributed
+    // between this value and the expected one.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);

@@ -69,7 +69,7 @@ use headrace_sensor::reading::{MAX_SOURCES, Reading};
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
 /// If the clock goes back by more than this, the clock has been reset.
 ///
-/// Readings stamped further than this in the future are rejected.
+/// Readings whose timestamp is further than this ahead of their receive time are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
 /// Standard deviations of the estimate above which it is restarted, because linearised updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;
@@ -385,8 +385,8 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // Either the clock was reset, or the previous timestamp was wrong. Waiting until the clock catches up
-            // would not be better.
+            // Either the clock was reset, or the previous timestamp was wrong. In both cases, a restart is better than
+            // to wait until the clock catches up.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();

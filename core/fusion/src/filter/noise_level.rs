@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
 
-/// Change of the noise level's logarithm by a measurement whose squared normalised innovation is one too large.
+/// Change of the noise level's natural logarithm per unit by which the normalised square of a difference exceeds 1.
 const GAIN: f64 = 0.01;
 /// Limit at which squared normalised innovations are clipped, because one outlier does not show the noise.
 const MOST: f64 = 9.0;
@@ -84,7 +84,7 @@ impl NoiseLevel {
 
     /// Processes the squared normalised innovation of any measurement, whether fused or rejected.
     ///
-    /// Returns the square divided by the earlier mean, if this mean exceeds its expected value of 1.
+    /// Returns the square divided by the earlier mean. A mean below its expected value of 1 counts as 1.
     pub fn relative(&mut self, nis: f64) -> f64 {
         let usual = if self.seen >= FEW { self.nis.max(1.0) } else { 1.0 };
         self.seen = (self.seen + 1).min(MEMORY);

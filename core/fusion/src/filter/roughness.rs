@@ -118,7 +118,7 @@ mod tests {
         sd_m * (math::sin((19.0 + 2.0 * side) * along_m) + math::sin((31.7 + 4.0 * side) * along_m))
     }
 
-    /// Returns the roughness found by two opposite echosounders in a drive at 0.1 m/s, m.
+    /// Returns the roughness that two opposite echosounders find while the vehicle moves at 0.1 m/s, m.
     ///
     /// The vehicle sways between the walls.
     fn found_m(rough_m: f64, white_m: f64, scale_m2: f64, end_s: f64) -> f64 {

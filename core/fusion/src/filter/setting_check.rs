@@ -6,7 +6,8 @@
 //! uncertainty of a parameter. For a head's tilt, each pose window is a block. Summary: `docs/why/navigation.md`,
 //! "Settings in doubt".
 //!
-//! A residual is r = x b, with x the error of the setting and b as follows (t, A, p: as in the range's derivatives):
+//! A residual is r = x b, with x the error of the setting and b as follows. The vectors t, A and p belong to the
+//! range: its derivative by rotation, the sonar's lever arm, and its derivative by position.
 //!
 //! - speed of sound, or a wider wall: b is the expected range
 //! - head turned about its axis a: b = (t - A x p) . a
@@ -170,8 +171,8 @@ struct Look {
     sd_m: f64,
 }
 
-/// A range's derivatives by the vehicle's pose and by a rotation about the head, its expected value, its residual, and its
-/// weight in the fits.
+/// A range in the fits: its derivatives with respect to the vehicle's pose and to a rotation of the head, its
+/// expected value, residual and weight.
 struct Seen {
     by_pose: [f64; POSE],
     own_turn: Vec3<Tunnel>,
@@ -250,18 +251,19 @@ impl SettingChecks {
         self.doubt.or_else(|| is_scaled.then_some(SettingDoubt { setting, source: None, sure_sd }))
     }
 
-    /// Whether the ranges have not shown yet that all heads point along their mounts.
+    /// Whether the ranges have not yet verified the pitch and yaw of all heads on their mounts.
     ///
-    /// They show it while the vehicle swings from side to side. A single head needs no check: a tilt moves all of its
-    /// samples alike.
+    /// Ranges verify them while the vehicle swings from side to side. A single head needs no check, because a tilt
+    /// moves
+    /// all of its samples alike.
     pub fn has_unverified_mounts(&self) -> bool {
         self.compared_heads().flatten().any(|sd_rad| *sd_rad > VERIFIED_RAD)
     }
 
-    /// Returns the covariance between samples of two heads that is due to their mounts.
+    /// Returns the relative covariance that mount errors cause between samples of two heads.
     ///
-    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. A swing does not reduce
-    /// it, because each head is compared with others whose mounts are just as uncertain.
+    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. A swing of the vehicle
+    /// does not reduce the covariance: each head is compared with others whose mounts are just as uncertain.
     pub fn mount_error(&self, declared_rad: f64) -> Relative {
         let is_compared = self.compared_heads().next().is_some();
         let variance = if is_compared { 2.0 * declared_rad * declared_rad } else { 0.0 };
@@ -320,8 +322,8 @@ impl SettingChecks {
         let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
         let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
-        // A known scale error makes no range an outlier: of the residuals with and without it, the smaller one
-        // counts.
+        // A known scale error must not make a range an outlier. Of the residuals with and without this error, the
+        // smaller one counts.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;

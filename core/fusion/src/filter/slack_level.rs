@@ -298,7 +298,7 @@ fn third_square(x: f64) -> f64 {
 pub(super) struct Noises {
     /// Variance of the counter's noise and rounding, m^2.
     pub counter_m2: f64,
-    /// Variance of the change of a gyro bias error within [`MEMORY_S`], rad^2/s^2. Such a change tilts gravity.
+    /// Variance of the change of a gyro bias within [`MEMORY_S`], rad^2/s^2. The change tilts the direction of gravity.
     pub rate_bias_rad2ps2: f64,
 }
 
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn taut_or_slow_cable_has_the_declared_slack() {
+    fn taut_cable_and_slowly_varying_slack_keep_the_declared_slack() {
         let declared = Settings::default().slack;
         for slack_m in [0.0, 0.02] {
             let (level, unusual) = level_after(|t| slack_m * math::sin(t / 6.0));
@@ -391,7 +391,7 @@ mod tests {
     ///
     /// Three standard deviations of the slack model's rate are compared with this speed.
     #[test]
-    fn strongly_varying_cable_gets_larger_and_faster_slack_than_declared() {
+    fn estimated_slack_covers_slack_larger_and_faster_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
             let omega = math::TAU / period_s;
             let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));

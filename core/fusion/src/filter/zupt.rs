@@ -9,7 +9,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// Averaging window, and the number of equal successive means that show rest. A floating vehicle never reaches it.
+/// Averaging window, and the number of equal successive means that show rest. A floating vehicle has fewer of them.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
 /// Number of mean turn rates at rest after which the gyro bias is known.
@@ -51,7 +51,7 @@ pub struct RestDetector {
     asks_from: Option<MonoNs>,
 }
 
-/// Means over successive averaging windows. Each mean is compared with the first mean of a steady run.
+/// Means over successive averaging windows. Each mean is compared with the first mean of a steady series.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Means {
     since: Option<MonoNs>,
@@ -153,12 +153,12 @@ impl RestDetector {
         Some(Vec3::new(x, y, z))
     }
 
-    /// Records the time of an estimate, which counts if it is the first; the request to keep still begins then.
+    /// Records the time of the first estimate, when the request to keep still begins. Later calls have no effect.
     pub fn ask_from(&mut self, at: MonoNs) {
         self.asks_from.get_or_insert(at);
     }
 
-    /// Returns how much longer the vehicle should stand still for its gyro bias to become known, s.
+    /// Returns how much longer the vehicle should stand still, s, until the gyro bias is known.
     ///
     /// 0 if the vehicle floats or its inertial unit is too noisy, because then no stop counts as rest. Also 0 later
     /// in a dive, because by then the gyros seldom cause uncertain passes.

@@ -95,7 +95,7 @@ proptest! {
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// From a start half a metre away, a fit to the echoes from a position ends at this position.
+    /// The echoes come from a known position. A fit that starts about half a metre away ends at this position.
     ///
     /// With arbitrary ranges, the fit still ends inside the tunnel.
     #[test]
@@ -250,8 +250,8 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the change in chainage error, at `arm`, from the clone `back` before the newest until
-    /// now.
+    /// Standard deviation of the change in chainage error, at `arm`, until now. The change is counted from the clone
+    /// that is `back` clones before the newest.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];

@@ -175,7 +175,7 @@ impl Profile {
 
     /// Casts a ray like [`Profile::cast`], but does not check that `origin` is inside.
     ///
-    /// For many rays from one point that is known to be inside.
+    /// Use it for many rays from one point that is known to be inside.
     pub fn cast_from_inside(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         self.hit(origin, direction)
     }

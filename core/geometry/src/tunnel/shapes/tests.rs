@@ -92,7 +92,7 @@ fn rays_through_a_corner_and_an_ulp_beside_it_hit_the_corner() {
 }
 
 #[test]
-fn rays_from_1_mm_off_the_wall_end_on_the_wall() {
+fn rays_that_start_1_mm_from_the_wall_end_on_the_wall() {
     for (name, profile) in all() {
         for step in 0..50 {
             let wall = profile.cast(profile.reference(), {
