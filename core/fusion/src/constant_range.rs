@@ -31,7 +31,7 @@ impl ConstantRange {
 
     /// Whether at least `fewest` returns have the same range while the design range varies by more than `varies_m`.
     ///
-    /// Where the design range varies, the ranges to a real wall vary by more than 2 mm.
+    /// If the design range varies, the ranges to a real wall vary as well, by more than 2 mm.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }

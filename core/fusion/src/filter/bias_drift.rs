@@ -52,8 +52,8 @@ fn most(wander: GaussMarkov, worst: f64) -> f64 {
 impl BiasDrift {
     /// Records the correction of the biases by a measurement.
     ///
-    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the variance of the
-    /// innovation, and its normalised square.
+    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the innovation's variance, and the
+    /// normalised squared innovation.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
             // The expected square is (P h / s)^2 s, summed over the axes. P h is a covariance, and s is the

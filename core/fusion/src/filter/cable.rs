@@ -14,7 +14,8 @@ use headrace_sensor::reading::SourceId;
 
 /// Averaging time of the cable counter's innovations, s.
 const RECENT_S: f64 = 1.0;
-/// Mean innovation at which counter and estimate disagree, as a multiple of the mean's sd for white innovations.
+/// Mean innovation at which counter and estimate disagree, in units of the sd that it would have if innovations were
+/// white.
 ///
 /// For limits from 3 to 6, about the same number of seeded dives has an unreported error. With 4, a slack of seven
 /// times the declared size makes a sound counter disagree.
@@ -30,13 +31,14 @@ const SAME_COUNT_M: f64 = 1e-6;
 /// Time after which a disagreement is reported, and time for which readings must agree with the estimate to end it.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum sd of the innovation at which an agreeing reading proves that the counter has lost no length, m.
+/// An agreeing reading proves that the counter has lost no length only if the innovation's sd is at most this, m.
 const SURE_M: f64 = 0.3;
-/// Maximum difference at which the counter has caught up with the vehicle, m: a share of the vehicle's distance since
-/// the disagreement began, plus a length.
+/// The counter has caught up with the vehicle if both differ by at most this, m: a share of the vehicle's distance
+/// since the disagreement began, plus a length.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// Maximum difference at which the counter follows the vehicle's motion, m: a share of the distance, plus a length.
+/// The counter follows the vehicle if their distances differ by at most this, m: a share of the distance, plus a
+/// length.
 ///
 /// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
@@ -298,9 +300,9 @@ mod tests {
         assert_eq!(disputed_at(1.0, |_, _| {}), None);
     }
 
-    /// The running mean of white innovations has a standard deviation of 0.22. A constant innovation of 1.5 standard
-    /// deviations brings the mean to five times this value after 1.4 s. A constant innovation of 1 standard deviation
-    /// never does.
+    /// The running mean of white innovations has a standard deviation of 0.22, in units of an innovation's sd. A
+    /// constant innovation of 1.5 sd brings the mean to five times this value after 1.4 s. A constant innovation of 1
+    /// sd never does.
     #[test]
     fn persistently_biased_innovations_start_a_cable_disagreement() {
         let off = |sds: f64, sd_m: f64| {

@@ -95,7 +95,7 @@ impl ErrorClones {
         }
     }
 
-    /// Adds a clone if the newest one is old enough, or if the chainage has suddenly become more certain since.
+    /// Adds a clone if the newest one is old enough, or if the chainage has suddenly become more certain since then.
     pub fn note(&mut self, at: MonoNs, factors: &Factors<ERRORS>) {
         let is_enough = |newest: &Moment| {
             at.since(newest.at).0 < STEP.0 && !newest.is_unsure_beside(factors.variance(POSITION))

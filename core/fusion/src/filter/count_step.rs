@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of changes per block. The larger step of the last two blocks counts, because a garbled reading spoils only
-/// one block.
+/// Number of changes per block. The step is the larger of those found in the last two blocks, because a garbled reading
+/// spoils only one block.
 const BLOCK: u32 = 50;
 /// Assumed step of a counter that has not moved yet, m; common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;

@@ -56,7 +56,7 @@ const ESTIMATE: usize = 2;
 /// Recent distances by each source, and the doubt about the cable counter if the distances differ.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceComparison {
-    /// Last chainages by the counter, distances by the velocity log, and chainages by the estimate, m.
+    /// Recent chainages by the counter, distances by the velocity log, and chainages by the estimate, m.
     cable: Vec<(MonoNs, [f64; 1])>,
     log: Vec<(MonoNs, [f64; 1])>,
     estimate: Vec<(MonoNs, [f64; 1])>,
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_with_errors_within_the_data_sheets_agree() {
+    fn distances_agree_if_their_errors_are_within_the_data_sheets() {
         for period_s in [3.0, 20.0, 60.0] {
             let cable_m = |t: f64| 1.002 * way_m(t) + 0.15 * math::sin(t * math::TAU / period_s);
             let none = compared(300, cable_m, |t| Some(1.01 * speed_mps(t) + 0.002), |t| Some(way_m(t)));

@@ -48,14 +48,14 @@ const REST_GATE: f64 = 15.1;
 const NEAR_M: f64 = 0.03;
 /// Standard deviation of the prior for the vehicle's speed, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// Standard deviation by which the position uncertainty of an estimate beyond the wall is increased, m.
+/// Standard deviation that is added, as a variance, to the position of an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
 /// Standard deviation below which the gyro bias counts as known, rad/s.
 ///
 /// An error of this size turns the attitude by a milliradian in a head pass of 3 s. A longer stop would gain little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
-/// Maximum normalised squared innovation of a range at which the learnt smoothness of the wall applies.
+/// The learnt smoothness of the wall applies to a range if its normalised squared innovation is at most this.
 const SMOOTH: f64 = 4.0;
 /// Maximum step of a counter, as a share of its noise, at which the rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
@@ -151,7 +151,7 @@ impl Default for Eskf {
     }
 }
 
-/// Innovation of an update, with the variances that it is weighed by.
+/// Innovation of an update, with the variances that determine its weight.
 struct Weighed {
     innovation: f64,
     /// Variance of the estimate.
@@ -188,7 +188,7 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// Records that earlier samples are unrelated to later ones whenever the standard deviation of yaw has halved.
+    /// Each time the standard deviation of yaw has halved, records that earlier samples are unrelated to later ones.
     ///
     /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
     /// about the errors between later passes.
@@ -287,7 +287,7 @@ impl Eskf {
         }
     }
 
-    /// Adds the speed change of an implausible force to the uncertainty, because the force may have been real.
+    /// Adds the speed change by an implausible force to the uncertainty, because the force may have been real.
     fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
         let way = variance * epoch_s * epoch_s;
@@ -378,7 +378,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Fuses a scalar update whose residual refers to the estimate corrected by the errors in `known`.
+    /// Fuses a scalar update. The residual of `row` refers to the estimate corrected by the errors in `known`.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,

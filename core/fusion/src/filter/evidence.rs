@@ -8,7 +8,7 @@ use headrace_geometry::math;
 pub(super) const FOLLOWED: usize = 12;
 /// One reading in this many is compared with alternative mounts, because each comparison costs a ray cast.
 pub(super) const COMPARED: u32 = 4;
-/// Minimum number of blocks of distance for computing the uncertainty of a parameter.
+/// Minimum number of blocks for computing the uncertainty of a parameter. A block covers a distance of at least 3 m.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
 /// Number of standard deviations from zero above which a fitted parameter counts as certainly non-zero.
 ///
@@ -24,12 +24,12 @@ pub(super) const POSE: usize = 5;
 /// Limit at which residuals are clipped in a comparison of mounts, m, because some echoes come from objects other
 /// than the wall.
 const MOST_MISSED_M: f64 = 0.5;
-/// Minimum mean square residual of a source whose mount is doubted, m^2. Maximum ratio of the squared residuals with
-/// the alternative mount to those with the configured mount.
+/// A mount is doubted if the mean square residual is at least the first value, m^2, and if the alternative mount leaves
+/// at most the second value, as a share of the squared residuals.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Least-squares sums of one parameter within a pose window, and its products with the vehicle's pose.
+/// Least-squares sums of one parameter within a pose window, and the cross sums of parameter and pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) by_pose: [f64; POSE],
@@ -49,7 +49,8 @@ pub(super) struct Fit {
     values_2: f64,
 }
 
-/// Comparison of a sonar's residuals at its configured mount with those at another mount or turned by half a turn.
+/// Comparison of a sonar's residuals at its configured mount with those at an alternative. The alternative is the mount
+/// of another sonar, or the sonar's own mount turned by half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Alternative {
     pub(super) source: u16,
@@ -123,11 +124,12 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// Returns the estimated parameter and its distance from zero in sd, if it certainly exceeds `least`.
+    /// Returns the estimated parameter and its distance from zero in sd, if its size is at least `least` and it is
+    /// certainly not zero.
     ///
-    /// The standard deviation is computed from the scatter of blocks and from the noise of ranges, and the larger
-    /// result counts, because blocks alone may hardly scatter. `None` if the parameter hardly changes any range:
-    /// changes of millimetres only show errors of the wall and beam models.
+    /// The standard deviation is the larger of two: one from the scatter of blocks, and one from the noise of ranges.
+    /// Blocks alone may hardly scatter. `None` if the parameter hardly changes any range: changes of millimetres only
+    /// show errors of the wall and beam models.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));

@@ -55,10 +55,10 @@ impl Default for NoiseLevel {
 
 /// Returns the limits of the noise level, as factors of the declared variance; `None` if the level is not learnt.
 ///
-/// The declared tilt noise of an inertial unit covers its slow errors, which differences between successive
-/// innovations do not show. The declared range noise of a head also covers bumps and shape of the wall, which a
-/// leaning beam would confuse with yaw. So differences can only raise a head's level. Only the square of the total
-/// residual can lower it ([`NoiseLevel::smoothness`]).
+/// The declared tilt noise of an inertial unit covers its slow errors, which differences between successive innovations
+/// do not show. The declared range noise of a head also covers bumps and shape of the wall, which could be mistaken for
+/// yaw if beams lean. So differences can only raise a head's level. Only the square of the total residual can lower it
+/// ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
         SensorKind::Head => Some([1.0, 9.0]),

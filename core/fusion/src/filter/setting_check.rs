@@ -33,12 +33,12 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Length of a pose window: about the time for which a filter with wrong ranges keeps its position.
+/// Length of a pose window. For about this time, a filter keeps its position although ranges are wrong.
 const SPELL: DurNs = DurNs(5_000_000_000);
 /// Minimum distance between two pose windows that count for the tilt of a head, m. Bumps of the wall are about as long.
 const MOVES_ON_M: f64 = 0.2;
-/// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that is too short by
-/// then is dropped.
+/// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that has not covered the
+/// minimum distance by then is dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
@@ -47,7 +47,7 @@ const FEWEST_READINGS: u32 = 100;
 /// Smallest setting errors that are reported: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
-/// Largest standard deviation of a head's pitch and yaw with which its mount counts as verified, radians.
+/// A mount counts as verified if the standard deviations of the head's pitch and yaw are at most this, radians.
 ///
 /// The smallest angle that is reported then differs from zero by two standard deviations.
 const VERIFIED_RAD: f64 = LEAST_ANGLE_RAD / 2.0;
@@ -254,8 +254,7 @@ impl SettingChecks {
     /// Whether the ranges have not yet verified the pitch and yaw of all heads on their mounts.
     ///
     /// Ranges verify them while the vehicle swings from side to side. A single head needs no check, because a tilt
-    /// moves
-    /// all of its samples alike.
+    /// moves all of its samples alike.
     pub fn has_unverified_mounts(&self) -> bool {
         self.compared_heads().flatten().any(|sd_rad| *sd_rad > VERIFIED_RAD)
     }

@@ -111,8 +111,8 @@ pub struct Settings {
     ///
     /// Readings are fused, and errors propagated, once per epoch. Epochs begin at whole multiples of this length.
     pub epoch: DurNs,
-    /// Whether noise levels of the sources are learnt. Without learning, likelihoods of different settings can be
-    /// compared.
+    /// Whether noise levels of the sources are learnt. Likelihoods of different settings can be compared only without
+    /// learning.
     pub learns: bool,
     /// Share of a wall range's computed correction that is applied to the attitude and related errors.
     ///
@@ -183,7 +183,7 @@ impl Settings {
         }
     }
 
-    /// Measurement variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
+    /// Declared noise variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
     /// compared with it.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {

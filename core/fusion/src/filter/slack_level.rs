@@ -2,10 +2,10 @@
 //!
 //! The difference between counter and inertial motion contains the slack. It also contains the effect of the inertial
 //! unit's constant errors, which is a polynomial of second degree in time. So its third differences show the slack
-//! alone. At several lags, these are compared with the third differences of the slack model. If the measured ones are
-//! larger, the slack is larger or faster than declared. A single third difference far above the usual size means that
-//! the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it uses
-//! only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
+//! alone. At several lags, they are compared with the third differences of the slack model. If they are larger than the
+//! model's, the slack is larger or faster than declared. A single third difference far above the usual size means that
+//! the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it uses only
+//! the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
 //!
 //! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant
 //! T:
@@ -165,7 +165,7 @@ impl SlackEstimate {
         let gain = up.x - self.speed_mps / FORGETS_S;
         self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
         self.speed_mps += gain * dt_s;
-        // On average, the specific force points up. So a lean of its mean is an attitude error, which is removed
+        // On average, the specific force points up. So if its mean leans, the attitude is wrong. This error is removed
         // slowly.
         let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
         let back = rotation(back.scaled(dt_s / LEVELS_S));
@@ -214,7 +214,8 @@ impl SlackEstimate {
 
     /// Returns the third difference of counter minus inertial position, m.
     ///
-    /// The second value is the difference between the counter's longest and shortest distance in the three lags, m.
+    /// The second value is the difference between the longest and the shortest of the counter's distances in the three
+    /// lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];

@@ -27,12 +27,12 @@ struct Moment {
     own: [Errors; 3],
     /// Cross-covariances of these errors with all errors at the current epoch of the backward pass.
     with: [Errors; 3],
-    /// Time from the backward pass's current epoch to this epoch, s, and the relative covariance of both.
+    /// Time from the current epoch of the backward pass to this epoch, s, and the relative covariance of both epochs.
     age_s: f64,
     relative: Relative,
 }
 
-/// Epochs that wait for the backward pass to reach their previous head pass, the latest first.
+/// Epochs that wait until the backward pass reaches their previous head pass, the latest first.
 #[derive(Debug, Clone, Default)]
 pub struct Later {
     waiting: Vec<Moment>,
@@ -91,7 +91,7 @@ impl Later {
         });
     }
 
-    /// Ends a piece of the track, and returns the relative covariances of all epochs still waiting.
+    /// Ends a piece of the track, and returns the relative covariances of all epochs that still wait.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;

@@ -139,8 +139,8 @@ fn smoother_equals_batch_least_squares() {
     };
     let last = filtered.last().unwrap();
     let (mut mean, mut factors) = (last.mean, last.factors);
-    // For each later time, the columns of the cross-covariance between the errors at that time and the current
-    // errors.
+    // For each later time: the columns of the cross-covariance between the errors at the later time and those at the
+    // current time.
     let unit = |m: usize| core::array::from_fn(|i| if i == m { 1.0 } else { 0.0 });
     let mut later = vec![(TIMES - 1, core::array::from_fn::<[f64; N], N, _>(|m| factors.along(&unit(m))))];
     for time in (0..TIMES - 1).rev() {

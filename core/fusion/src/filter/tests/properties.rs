@@ -126,7 +126,7 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// If a sensor sends too often, its used readings are at least one period apart. No other reading is skipped.
+    /// Used readings are at least one period apart if a sensor sends too often. No other reading is skipped.
     #[test]
     fn readings_of_a_source_are_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
@@ -224,7 +224,7 @@ fn whole(transition: &Transition) -> Square {
     }))
 }
 
-/// An augmented filter as in textbooks: clones' errors are appended to the present errors and are not corrected.
+/// An augmented filter as in textbooks: errors of clones are appended to the present errors and are not corrected.
 struct Augmented {
     now: Square,
     /// Covariance of the errors at the time of each clone, and their cross-covariance with the present errors.

@@ -182,8 +182,8 @@ impl Profile {
 
     /// Returns the arc length of the wall in the direction of `point`, as seen from the reference point.
     ///
-    /// This arc length is the coordinate for spacing if the wall differs from the design. Zero for the reference
-    /// point itself.
+    /// If the wall differs from the design, the spacing of samples is measured by this arc length. Zero for the
+    /// reference point itself.
     pub fn arc_of(&self, point: Yz) -> f64 {
         let direction = sub(point, self.reference);
         self.hit(self.reference, direction).map_or(0.0, |hit| hit.arc_m)

@@ -150,7 +150,7 @@ fn ray_from_outside_has_no_hit() {
 }
 
 #[test]
-fn invalid_curve_is_rejected_with_its_vertex() {
+fn error_of_an_invalid_curve_names_its_vertex() {
     let bow_tie = [[1.0, 0.0], [-1.0, 2.0], [1.0, 2.0], [-1.0, 0.0]];
     assert!(Profile::polygon(&bow_tie, Some([0.0, 1.0])).is_err());
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];
