@@ -125,8 +125,8 @@ mod tests {
     /// detection takes.
     #[test]
     fn coarsely_quantised_inertial_unit_at_rest_does_not_count_as_stuck() {
-        // About one reading in 200 differs from the others, which are equal. Runs of three to 2000 equal readings are
-        // therefore normal, and no evidence that the unit is stuck.
+        // About one reading in 200 differs from the others, which are equal. So series of three to 2000 equal readings
+        // are normal, and no evidence that the unit is stuck.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

@@ -55,7 +55,7 @@ struct Stamped {
 /// Number of kinds of readings: turn rate, force, attitude. A stamp belongs to the first reading of each kind after
 /// it.
 const KINDS: usize = 3;
-/// Minimum of `leads` at which stamps count as coming before the readings, and the limit at which `leads` is clamped.
+/// Stamps count as coming before the readings if `leads` is at least the first value. The second value limits `leads`.
 const SURE_LEADS: i8 = 8;
 const MOST_LEADS: i8 = 16;
 

@@ -11,11 +11,12 @@ use headrace_geometry::math;
 
 /// Averaging time of the ratio of squared corrections to expected squares, s.
 const MEMORY_S: f64 = 10.0;
-/// Mean ratio above which the process noise is raised. Each second, the noise is multiplied by the ratio to the power
-/// `RAISES_PER_S`.
+/// The process noise is raised if the mean ratio is above this. Each second, the noise is multiplied by the ratio to
+/// the power `RAISES_PER_S`.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// Mean ratio below which a raised process noise decays, and the time constant of this decay, s.
+/// A raised process noise decays if the mean ratio is below this. The second value is the time constant of the decay,
+/// s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
 /// Initial noise factor: biases of an inertial unit are assumed to drift fast until its readings show otherwise.
@@ -43,7 +44,7 @@ impl Default for BiasDrift {
     }
 }
 
-/// Returns the largest noise factor of a bias, at which the bias drifts as fast as in the worst supported unit.
+/// Returns the largest noise factor of a bias. With it, the bias drifts as fast as in the worst supported unit.
 fn most(wander: GaussMarkov, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)

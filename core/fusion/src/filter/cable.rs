@@ -20,11 +20,11 @@ const RECENT_S: f64 = 1.0;
 /// For limits from 3 to 6, about the same number of seeded dives has an unreported error. With 4, a slack of seven
 /// times the declared size makes a sound counter disagree.
 const DISPUTED_SDS: f64 = 5.0;
-/// Limit at which each innovation is clipped, in standard deviations.
+/// Each innovation is clipped at this many standard deviations.
 const MOST_SDS: f64 = 6.0;
-/// Innovations smaller than this start no disagreement, m.
+/// A mean innovation over its limit starts a disagreement only if the latest innovation is larger than this, m.
 const LEAST_M: f64 = 0.01;
-/// Time after which an unchanged count means a stuck counter, if slack has moved the counter constantly before.
+/// If slack has moved the counter constantly before, a count that is unchanged for this time means a stuck counter.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
 /// Counts that differ by less than this are equal, m.
 const SAME_COUNT_M: f64 = 1e-6;
@@ -47,9 +47,10 @@ const SAME_M: f64 = 0.01;
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// Difference at which the estimate is given up, m: root sum square of innovation and its sd.
+/// The estimate is given up if counter and estimate differ by more than this, m. The difference is the root sum square
+/// of the innovation and its sd.
 ///
-/// The counter must also have counted `ALIVE_M` since the difference was reached, which shows that its wheel turns.
+/// The counter must also have counted `ALIVE_M` since the limit was exceeded, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 

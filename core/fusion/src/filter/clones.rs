@@ -21,7 +21,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Number of clones kept. Together they cover over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// Ratio of the new to the old variance of the chainage below which the chainage counts as suddenly more certain.
+/// The chainage counts as suddenly more certain if its variance falls below this share of the old variance.
 ///
 /// This happens, for instance, when the cable counter sends again after a silence.
 const SURE_SHARE: f64 = 0.1;

@@ -26,7 +26,8 @@ const STUCK_SHARE: f64 = 0.3;
 /// With a limit of 0, stops make positions uncertain: 24 % of all epochs of the seeded dives are `cannot_say`, instead
 /// of 19 %. With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, instead of 6.
 const CHANCE_SDS: f64 = 0.5;
-/// Time for which a possibly lost length adds to the relative error between head passes, s: about one head turn.
+/// Time constant with which a possibly lost length fades from the relative error between head passes, s: about one head
+/// turn.
 ///
 /// Only the corrections in the first such period of a stationary count are added up. Later corrections of a
 /// hovering vehicle say nothing about the wheel.

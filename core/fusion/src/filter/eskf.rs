@@ -42,7 +42,7 @@ const REST_SD_MPS: f64 = 0.02;
 const REST_SD_RADPS: f64 = 1e-3;
 /// Gate for zero-velocity updates (chi-square). A vehicle at rest exceeds the gate once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// Standard deviation of a predicted range up to which the wall counts as flat, m.
+/// The wall counts as flat if the standard deviation of a predicted range is below this, m.
 ///
 /// If the standard deviation of the range noise is smaller, it is the limit instead.
 const NEAR_M: f64 = 0.03;
@@ -57,11 +57,11 @@ const BEYOND_M: f64 = 1.5;
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
 /// The learnt smoothness of the wall applies to a range if its normalised squared innovation is at most this.
 const SMOOTH: f64 = 4.0;
-/// Maximum step of a counter, as a share of its noise, at which the rounding is negligible.
+/// The rounding of a counter is negligible if the counter's step is at most this share of its noise.
 const FINE_SHARE: f64 = 0.2;
 /// Time after the start of an estimate within which the estimate settles: its yaw becomes certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
-/// Standard deviation of yaw below which the estimate counts as settled.
+/// An estimate counts as settled if the standard deviation of its yaw is at most this.
 ///
 /// A yaw error of this size moves a sounding at 6 m by 5 cm. One more restart of the relation between earlier and
 /// later soundings would cost more than it gains.

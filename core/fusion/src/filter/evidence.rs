@@ -10,7 +10,7 @@ pub(super) const FOLLOWED: usize = 12;
 pub(super) const COMPARED: u32 = 4;
 /// Minimum number of blocks for computing the uncertainty of a parameter. A block covers a distance of at least 3 m.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// Number of standard deviations from zero above which a fitted parameter counts as certainly non-zero.
+/// A fitted parameter is certainly not zero if it is at least this many standard deviations from zero.
 ///
 /// The limit for an alternative mount is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;
@@ -21,8 +21,8 @@ pub(super) const SURE_GAIN: f64 = 3.0;
 const EXPLAINS: f64 = 0.02;
 /// Unknowns of the vehicle's pose within a pose window of a few seconds: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// Limit at which residuals are clipped in a comparison of mounts, m, because some echoes come from objects other
-/// than the wall.
+/// Residuals are clipped at this limit in a comparison of mounts, m, because some echoes come from objects other than
+/// the wall.
 const MOST_MISSED_M: f64 = 0.5;
 /// A mount is doubted if the mean square residual is at least the first value, m^2, and if the alternative mount leaves
 /// at most the second value, as a share of the squared residuals.

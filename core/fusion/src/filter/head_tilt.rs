@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
 use headrace_geometry::math;
 
-/// Minimum share of a tilt's weight that remains after the constant excess of the ranges is eliminated.
+/// Minimum share of a tilt's weight that must remain after the constant excess of the ranges is eliminated.
 ///
 /// If less weight remains, the vehicle has not turned to both sides enough.
 const LEAST_LEFT: f64 = 0.05;

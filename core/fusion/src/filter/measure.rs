@@ -10,7 +10,7 @@ use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// Minimum cosine of the incidence at which a head's range may get more weight than declared.
+/// A head's range may get more weight than declared only if the cosine of its incidence is above this.
 ///
 /// If the hull is pitched steeply, the beams look along the tunnel, and only few of them determine the attitude.
 const SQUARE: f64 = 0.8;
@@ -110,13 +110,13 @@ impl ScalarUpdate {
     }
 }
 
-/// Minimum cosine of the incidence.
+/// Minimum cosine of the angle between a beam and the wall's normal.
 ///
 /// The range of a beam at a more grazing angle shows the wall's roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
 /// Minimum distance to the wall that is assumed when its curvature is computed, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// Number of standard deviations from zero above which the side of a beam's inclination counts as certain.
+/// The side of a beam's inclination is certain if the inclination is at least this many sds from zero.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.

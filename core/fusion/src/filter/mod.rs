@@ -74,7 +74,7 @@ pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
 /// An estimate with larger standard deviations is restarted, because linearised updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
-/// Duration of silence of all sensors after which the estimate is restarted.
+/// The estimate is restarted after all sensors have been silent for this time.
 const SILENCE: DurNs = DurNs(5_000_000_000);
 /// Largest plausible turn rate and specific force of an inertial sample. A unit that exceeds them is saturated or
 /// faulty.

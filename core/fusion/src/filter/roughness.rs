@@ -13,8 +13,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Maximum number of bumps in the running mean, and the number of bumps for which the declared roughness counts.
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
-/// Limit at which the squared sum of two residuals is clipped, in variances of the sum, because one outlier is no
-/// bump.
+/// The squared sum of two residuals is clipped at this many variances of the sum, because one outlier is no bump.
 const MOST: f64 = 9.0;
 /// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to bumps with an sd of 6 cm.
 const ROUGHEST: f64 = 4.0;

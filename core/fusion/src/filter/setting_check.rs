@@ -51,12 +51,12 @@ const LEAST_ANGLE_RAD: f64 = 0.03;
 ///
 /// The smallest angle that is reported then differs from zero by two standard deviations.
 const VERIFIED_RAD: f64 = LEAST_ANGLE_RAD / 2.0;
-/// Residual above which a range loses weight, and residual above which a range is ignored, m.
+/// A range loses weight if its residual exceeds the first value, and is ignored if it exceeds the second value, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
 /// Maximum number of pairs of a sonar and an alternative mount for it.
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
-/// Mean square residual above which an echosounder counts as wrongly configured, m^2.
+/// An echosounder counts as wrongly configured if its mean square residual is above this, m^2.
 ///
 /// Such an echosounder pulls the estimate away and makes correct heads look turned.
 const ASTRAY_M2: f64 = 0.04;

@@ -36,9 +36,9 @@ const ROOM: usize = 256;
 const KNOTS: usize = 256;
 /// Averaging time for the mean squares of third differences, s.
 const MEMORY_S: f64 = 40.0;
-/// Limit at which a third difference is clipped, as a multiple of the rms. Faults are rare and large; slack is not.
+/// A third difference is clipped at this multiple of the rms. Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Margin by which the noise is raised before it is subtracted from a mean square, in sds of the mean square.
+/// The noise is raised by this margin before it is subtracted from a mean square, in sds of the mean square.
 ///
 /// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
@@ -51,7 +51,7 @@ const FORGETS_S: f64 = 1000.0;
 const LEVELS_S: f64 = 100.0;
 /// Largest difference between the integrated and the estimated attitude, rad. If exceeded, the integration restarts.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Largest third difference at which counter and inertial motion agree, in multiples of the usual size.
+/// Counter and inertial motion agree up to this third difference, in multiples of the usual size.
 ///
 /// Agreement is judged once there are `FEW` differences. Once there are `ENOUGH`, their usual size counts as known.
 const AGREES_SDS: f64 = 4.0;
@@ -64,7 +64,8 @@ const AT_FIRST: f64 = 2.0;
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Rms third difference at a lag of 1 s, in counter steps, above which slack is taken to move the counter constantly.
+/// Slack is taken to move the counter constantly if the rms third difference at a lag of 1 s exceeds this many steps of
+/// the counter.
 const LIVELY_STEPS: f64 = 4.0;
 /// Time between two comparisons of the averaged third differences with the slack model.
 const COMPARES: DurNs = DurNs(1_000_000_000);

@@ -84,7 +84,7 @@ pub struct Source {
     pub sensor: SensorInfo,
     /// Innovation statistics of the sensor.
     pub consistency: Consistency,
-    /// Time of the last reading that was put into the reordering window.
+    /// Time of the last used reading, for sensors whose readings are used once per period.
     pub taken: Option<MonoNs>,
     /// Rotation of the sensor if it is a head.
     pub turning: Turning,
@@ -143,8 +143,8 @@ impl Source {
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since the source's last reading that was put into the window. If so, this reading
-    /// is recorded as the last one.
+    /// Whether `period` has passed since the last used reading of the source. If so, the present reading becomes the
+    /// last used one.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {

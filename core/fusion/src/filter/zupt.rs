@@ -14,12 +14,12 @@ const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
 /// Number of mean turn rates at rest after which the gyro bias is known.
 const ENOUGH: u32 = 25;
-/// Time after which a vehicle on a stationary cable counts as floating if it has not been at rest, s.
+/// A vehicle on a stationary cable counts as floating if it has not been at rest for this time, s.
 const FLOATS: u32 = 15;
 /// Time after the first estimate during which the pilot is asked to keep the vehicle still.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
-/// Number of remembered pauses of the cable, and the multiple of the longest pause after which the cable is at
-/// rest.
+/// Number of remembered pauses of the cable. The cable is at rest once it has been still for the longest of them times
+/// the second value.
 ///
 /// The pauses matter if a winch operator winds the cable in half a metre at a time. The cable is then stationary
 /// between pulls while the vehicle moves on.

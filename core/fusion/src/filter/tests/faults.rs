@@ -231,7 +231,7 @@ fn jumping_sensor_is_rejected() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // The chainage is unknown while counter and estimate differ by metres, which lasts until a second after the
+        // The chainage is unknown while counter and estimate differ by metres. This lasts until a second after the
         // jump.
         let lacking = if source == TETHER { 45 } else { 0 };
         assert!(

@@ -238,7 +238,7 @@ const CASES: [(&str, usize, f64); 13] = [
     ("swinging", 4, 1e-9),
     ("swinging", 6, 1e-5),
 ];
-/// Multiple of the factored form's tolerance above which the full covariance form counts as failed.
+/// The full covariance form fails if its error exceeds this multiple of the factored form's tolerance.
 const FAILS: f64 = 30.0;
 
 #[test]

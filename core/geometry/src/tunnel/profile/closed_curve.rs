@@ -8,7 +8,7 @@ use crate::math::{self, TAU};
 
 /// Distance below which two points count as equal, m.
 pub(super) const SAME_POINT_M: f64 = 1e-9;
-/// Number of elements above which a polygon has a table of its extent by direction.
+/// A polygon with more elements than this has a table of its extent by direction.
 const MANY: usize = 256;
 /// Number of equidistant wall places that [`Profile::places`] returns.
 const PLACES: u32 = 64;
