@@ -15,7 +15,7 @@ pub enum Action {
     LongerRange,
     /// Roll the vehicle so that it occludes another part of the wall.
     ///
-    /// To turn the vehicle round would not help: it would occlude the same part.
+    /// Turning the vehicle round does not help: the vehicle then occludes the same part.
     OtherSide,
     /// Stay centred in the tunnel, with a steady heading.
     Middle,

@@ -52,7 +52,7 @@ pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) ->
     f64::midpoint(edge_mps(fastest_mps, less_mps, meets), fastest_mps)
 }
 
-/// Finds the edge of a speed interval by bisection between a speed that meets the target and one that misses it.
+/// Finds the edge of a speed interval by bisection: the speed `good` meets the target, the speed `bad` misses it.
 pub(super) fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..30 {
         let middle = f64::midpoint(good, bad);
