@@ -156,11 +156,11 @@ pub struct HeadMotion {
     pub mount: Mount,
     /// Current angle of the head in the sensor frame, radians.
     pub angle_rad: f64,
-    /// Rate of the head's rotation, rad/s, positive where its angle grows.
+    /// Rate of the head's rotation, rad/s, positive if its angle grows.
     pub rate_radps: f64,
     /// Angle between two pings, radians, positive.
     pub step_rad: f64,
-    /// Size of the sector between the last two turning points, radians; `None` for continuous rotation.
+    /// Size of the sector between the two latest turning points, radians; `None` for continuous rotation.
     pub sector_rad: Option<f64>,
 }
 

@@ -36,7 +36,7 @@ const MOST_SHARE: f64 = 0.999;
 pub struct LossRate {
     /// Share of pings with lost returns among all pings, from 0 to 1.
     pub share: f64,
-    /// Share of lost pings among those that follow a lost ping, from 0 to 1.
+    /// Share of lost pings among the pings that follow a lost ping, from 0 to 1.
     pub after_lost: f64,
 }
 
@@ -91,10 +91,10 @@ pub struct Sampled {
 impl Sampled {
     /// Returns the number of passes over each place that lost returns require in place of a single pass.
     ///
-    /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of two distances
-    /// between passes: the one that the target allows, and the one that losses leave. It ranges from 1 without losses
-    /// to [`MOST_PASSES`], and is continuous in all inputs. The model assumes that heads pass in turn, and that the
-    /// heads with the highest losses come first.
+    /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of the distance
+    /// between passes that the target allows without losses to the smaller distance that it allows with losses. The
+    /// number ranges from 1 without losses to [`MOST_PASSES`], and is continuous in all inputs. The model assumes that
+    /// heads pass in turn, and that the heads with the highest losses come first.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {

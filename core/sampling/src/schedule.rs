@@ -29,7 +29,7 @@ impl Schedule {
         self.heads.iter().map(|(_, program)| program)
     }
 
-    /// Angle of a head's last ping at the time `since` after the start, in the sensor frame, radians.
+    /// Angle of a head's latest ping at the time `since` after the start, in the sensor frame, radians.
     ///
     /// The angle is in [0, 2 pi) for continuous rotation, or within the head's sector. `None` for a head that does
     /// not exist, or before the start.
