@@ -9,7 +9,7 @@ use super::cause::{Cause, Causes};
 pub struct Again {
     /// Largest speed that meets the target in every section, except in sections where no speed meets it, m/s.
     ///
-    /// Zero if no speed meets the target in most sections.
+    /// Zero if more than half of the sections have no speed that meets the target.
     pub at_most_mps: f64,
     /// Whether at least a tenth of the sections lose so many returns that no speed makes up for them.
     pub is_beyond_speed: bool,

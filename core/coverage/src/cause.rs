@@ -36,7 +36,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All causes, beginning with those that the pilot can change.
+    /// All causes. Causes that the pilot can change come first.
     ///
     /// If two causes explain a hole equally well, the first in this order is named.
     pub const ALL: [Self; 12] = [

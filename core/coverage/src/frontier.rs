@@ -25,9 +25,9 @@ pub struct Reach {
 pub struct HeadReach {
     /// Receive time of the head's latest ping, with or without a fix; `None` before the first ping.
     heard: Option<MonoNs>,
-    /// Reach at the head's last ping with a fix.
+    /// Reach at the head's latest ping with a fix.
     ///
-    /// For a silent head, this is the reach at the last advice update with a fix.
+    /// For a silent head, this is the reach at the latest advice update with a fix.
     latest: Reach,
     /// Chainages that the head's reach has covered; `None` before the first ping with a fix.
     swept: Option<Reach>,
@@ -52,7 +52,7 @@ impl HeadReach {
 
     /// Records a ping without a fix.
     ///
-    /// The head is alive, and its reach is unchanged since the last fix.
+    /// The head is alive, and its reach is unchanged since the latest fix.
     pub fn heard(&mut self, now: MonoNs) {
         self.heard = Some(now);
     }
@@ -378,8 +378,8 @@ impl Moved {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }
 
-    /// Whether nothing has changed since the last ping or update: no section left the zone or joined the
-    /// coverage extent.
+    /// Whether nothing has changed since the previous ping or update: no section left the zone or joined the coverage
+    /// extent.
     ///
     /// Also true if no head's place is known.
     pub fn is_nothing(&self) -> bool {

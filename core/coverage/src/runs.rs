@@ -36,7 +36,7 @@ pub struct Run {
     pub failed: u32,
     /// Section with the largest hole, and this hole.
     ///
-    /// In a cleared missed stretch, both are those from before the stretch was cleared.
+    /// In a cleared missed stretch, both are from the time before the stretch was cleared.
     pub worst: (i64, Hole),
     /// Time at which the stretch was first flagged.
     pub raised: MonoNs,
@@ -428,7 +428,7 @@ impl Runs {
     }
 }
 
-/// Returns the section with the larger hole; the first one if both holes are equal.
+/// Returns the section with the larger hole; the first section if both holes are equal.
 fn larger(a: (i64, Hole), b: (i64, Hole)) -> (i64, Hole) {
     if b.1.diameter_m > a.1.diameter_m { b } else { a }
 }

@@ -64,8 +64,8 @@ struct HalfTurn {
     between_m: Option<[f64; 2]>,
     /// Number of returns within runs of constant range.
     ///
-    /// The next fields are the smallest and largest range of these returns, m, and the smallest and largest range to the
-    /// design in the same directions, m.
+    /// The next fields are the smallest and largest range of these returns, m, and the smallest and largest range to
+    /// the design in the same directions, m.
     unchanged: u32,
     unchanged_m: Option<[f64; 2]>,
     design_m: Option<[f64; 2]>,
@@ -93,7 +93,7 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether the range is constant in more than one in `parts` returns, although the range to the design varies widely.
+    /// Whether the range is constant in more than one in `parts` returns, although the range to the design varies.
     fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
         let span_m = |of: Option<[f64; 2]>| of.map_or(0.0, |[least_m, most_m]| most_m - least_m);
         parts * self.unchanged > self.returns
@@ -121,8 +121,8 @@ impl HalfTurn {
 
 /// Least ratio of squared changes to squared deviations from the mean at which a range counts as noise.
 ///
-/// Over half a turn, independent noise has a ratio of 2 +- 0.2. The range to a wall has a much smaller ratio, unless the
-/// vehicle is in the centre of a round tunnel.
+/// Over half a turn, independent noise has a ratio of 2 +- 0.2. The range to a wall has a much smaller ratio, unless
+/// the vehicle is in the centre of a round tunnel.
 const NOISE_RATIO: f64 = 1.0;
 /// Resolution of a profiling sonar's range, m. Smaller changes show nothing.
 const RESOLUTION_M: f64 = 0.002;

@@ -70,8 +70,8 @@ pub struct Stretch {
     pub to: i64,
     /// The stretch's sections, in two groups.
     ///
-    /// Sections of the first group are unsure mainly because of the size of their hole. Sections of the second group are
-    /// unsure mainly because of the error of their hole.
+    /// Sections of the first group are unsure mainly because of the size of their hole. Sections of the second group
+    /// are unsure mainly because of the error of their hole.
     of: [Largest; 2],
 }
 
@@ -160,7 +160,7 @@ impl Stretch {
         apart as f64 * section_m > JOIN_M + 1e-9
     }
 
-    /// Adds another stretch to this one; returns false if it is unsure for another reason, or too far away.
+    /// Adds a stretch to this stretch. Returns false if the added stretch has another reason, or is too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
         if self.why != other.why || self.is_beyond(other.from..other.to, section_m) {

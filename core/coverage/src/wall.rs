@@ -1,8 +1,8 @@
 //! Decides which returns are wall: returns near the design profile, and returns that agree with other returns.
 //!
-//! A return within the tolerance of the design is wall. A return is also wall if an earlier pass found wall with the same
-//! deviation nearby. Other successive returns that agree with one another are a *run*, which has odds of being wall, see
-//! `origin`.
+//! A return within the tolerance of the design is wall. A return is also wall if an earlier pass found wall with the
+//! same deviation nearby. Other successive returns that agree with one another are a *run*, which has odds of being
+//! wall, see `origin`.
 //!
 //! A return waits for the head's next returns before it is decided, since a boulder begins with a single return.
 
@@ -72,7 +72,7 @@ impl Run {
         u32::from(self.waits)
     }
 
-    /// Returns the run's returns that wait for classification, with the number of earlier passes that met the same thing.
+    /// Returns the waiting returns of the run, each with the number of earlier passes that met the same thing.
     fn returns(&self) -> impl Iterator<Item = (&PlacedReturn, u8)> {
         self.waiting.iter().zip(self.confirmed_each).take(usize::from(self.waits))
     }
@@ -205,9 +205,9 @@ impl HeadWall {
     /// Classifies a head's new return and the returns that wait for it.
     ///
     /// `confirmed` is the number of earlier passes that met the same thing. `agrees` means that the new return agrees
-    /// with the head's previous return. `slopes` means that it agrees with one of the two previous returns, and that this
-    /// one is wall. Output: the run of waiting returns, its classification (`None` if undecided), and the classification
-    /// of the new return.
+    /// with the head's previous return. `slopes` means that it agrees with one of the two previous returns, and that
+    /// this one is wall. Output: the run of waiting returns, its classification (`None` if undecided), and the
+    /// classification of the new return.
     fn decide(
         &mut self,
         (placed, confirmed): (&PlacedReturn, u8),

@@ -331,7 +331,7 @@ fn removing_the_speed_cause_lowers_the_speed_until_the_target_is_met() {
 ///
 /// The planned speed helps only if it reduces this distance below the share `HELPS` of the actual distance.
 #[test]
-fn planned_speed_replaces_the_speed_without_the_phase_cause_if_passes_come_closer() {
+fn removing_the_phase_cause_sets_the_planned_speed_only_if_passes_come_closer_together() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,

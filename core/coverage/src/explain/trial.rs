@@ -38,7 +38,7 @@ pub(super) struct Trial<'a> {
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// Factors that were present in the section, and those of them that caused missing samples.
+    /// Factors that were present in the section, and the factors among them that caused missing samples.
     present: Causes,
     lacking: Causes,
     left: u32,
@@ -307,8 +307,8 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // The driving figures are those of a single moment, so the size of the hole limits the effect
-        // computed from them.
+        // The driving figures are from a single moment, so the size of the hole limits the effect that is computed
+        // from them.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

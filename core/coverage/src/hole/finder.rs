@@ -322,7 +322,7 @@ impl HoleFinder {
         let from_m = self.window.chainage_m(-radius_m);
         let fidelity = store.fidelity(from_m, self.window.chainage_m(length_m + radius_m));
         let diameter_m = 2.0 * best.distance_m;
-        // If the window was full, samples were dropped. They could have reduced D, so D has no lower bound.
+        // If the window was full, samples were dropped that could reduce D. The lower bound of D is then zero.
         let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
         let hole = Hole {
             diameter_m,

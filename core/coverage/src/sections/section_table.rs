@@ -199,7 +199,7 @@ impl Sections {
         self.target
     }
 
-    /// Distance between a section and the heads' reach from which on the heads have left the section, m.
+    /// Distance from the heads' reach at which the heads count as having left a section, m.
     ///
     /// Samples farther away don't change a pass.
     pub fn left_m(&self) -> f64 {
