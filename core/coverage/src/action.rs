@@ -1,10 +1,10 @@
-//! Recommended action for a failed stretch.
+//! Recommended action for a missed stretch.
 
 use serde::{Serialize, Serializer};
 
 use super::cause::Cause;
 
-/// Change to make when the vehicle passes a failed stretch again.
+/// Change to make when the vehicle passes a missed stretch again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// Drive slower.

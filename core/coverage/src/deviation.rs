@@ -52,7 +52,7 @@ impl Deviation {
         }
     }
 
-    /// Adds the samples of another stretch.
+    /// Adds the deviations of another section's samples.
     pub fn merge(&mut self, other: &Self) {
         self.samples += other.samples;
         self.contradicting += other.contradicting;

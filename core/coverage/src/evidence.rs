@@ -31,7 +31,7 @@ pub struct Evidence {
     pub pass_gap_s: f64,
     /// Longest time between passes over the same wall if the passes had been evenly spread in time, seconds.
     pub even_pass_gap_s: f64,
-    /// The same time if, in addition, all heads had been turning, seconds.
+    /// Longest time between passes over the same wall if all heads had been turning and evenly spread, seconds.
     pub all_pass_gap_s: f64,
     /// Share of pings without a return, including pings whose wall was out of range.
     pub missing_share: f64,
@@ -43,7 +43,7 @@ pub struct Evidence {
     pub lost_in_hole: u32,
     /// Largest step along the perimeter between neighbouring samples of one turn of a head, m.
     pub t_y_m: f64,
-    /// Largest such step as predicted for a level vehicle in the centre of the tunnel, m.
+    /// Largest step along the perimeter predicted for a level vehicle in the centre of the tunnel, m.
     pub middle_t_y_m: f64,
     /// Distance by which the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,

@@ -1,8 +1,8 @@
 //! Explains a fail by the smallest set of factors without which the hole would have met the target.
 //!
 //! The geometry shows how large the hole would be without a factor. Samples that are missing because of the factor
-//! are put back. Without other factors, passes or steps would have been closer together: the wall is compressed by the
-//! same ratio. `docs/why/coverage.md` states the order of the factors and the reasons for it.
+//! are put back. If the factor moved passes or steps apart, the wall is compressed by the same ratio.
+//! `docs/why/coverage.md` states the order of the factors and the reasons for it.
 
 mod case;
 mod trial;

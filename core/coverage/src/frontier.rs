@@ -106,7 +106,7 @@ pub struct Frontier {
 /// Direction of travel along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Course {
-    /// Chainage of the farthest place that the centre of the heads' combined reach has had on this course, m.
+    /// Farthest chainage that the centre of the heads' combined reach has had on this course, m.
     farthest_m: f64,
     astern: bool,
     /// Number of heads that make up the combined reach.
@@ -161,10 +161,9 @@ pub struct Outlook {
 /// Change of the frontier by one ping or one advice update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections that have just left the zone within reach of the heads, behind the vehicle.
+    /// Sections behind the vehicle that have just left the zone.
     pub left_behind: Range<i64>,
-    /// Sections that have just left the zone within reach of the heads, ahead of the vehicle, because it
-    /// moves backwards.
+    /// Sections ahead of the vehicle that have just left the zone, because the vehicle moves backwards.
     pub left_ahead: Range<i64>,
     /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
@@ -286,8 +285,8 @@ impl Frontier {
 
     /// Updates the frontier for a ping at `now` with reach `pinged`.
     ///
-    /// `heads` are the reaches of all heads, including the pinging one. A section leaves the zone once it is farther
-    /// than `margin_m` from the reach of every awaited head.
+    /// `heads` are the reaches of all heads, including the head that pinged. A section leaves the zone once it is
+    /// farther than `margin_m` from the reach of every awaited head.
     pub fn advance(
         &mut self,
         pinged: Reach,

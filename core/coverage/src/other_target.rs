@@ -1,4 +1,4 @@
-//! Verdicts on the holes found in a dive for another target than the dive's own.
+//! Verdicts on the holes of a dive for a target that differs from the dive's own target.
 
 use super::frontier::{Outlook, clear_of};
 use super::hole::Hole;
@@ -115,7 +115,7 @@ mod tests {
         }
     }
 
-    /// The position error allowed for is two standard deviations of 0.05 m each.
+    /// The allowance for the position error is two standard deviations of 0.05 m each.
     #[test]
     fn verdict_for_another_target_respects_position_error_and_doubtful_samples() {
         let mut seen = Seen::new();

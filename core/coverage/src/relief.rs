@@ -32,7 +32,7 @@ impl Pass {
     }
 }
 
-/// A return that deviates from the design, as support for later passes.
+/// A return that deviates from the design, stored as support for later passes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Found {
     placed: PlacedReturn,
@@ -150,12 +150,12 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 }
 
 impl Relief {
-    /// Whether wall found near this return has the same deviation from the design.
+    /// Whether wall with the same deviation from the design was found near this return.
     pub(super) fn is_wall(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         self.near(placed, limits, 1.0).any(|found| found.is_wall)
     }
 
-    /// Whether another head found wall near this return with the same deviation from the design.
+    /// Whether another head found wall with the same deviation from the design near this return.
     pub(super) fn is_wall_of_another(&self, placed: &PlacedReturn, head: u8, limits: &WallLimits) -> bool {
         self.near(placed, limits, 1.0).any(|found| found.is_wall && found.pass.head != head)
     }

@@ -312,7 +312,7 @@ impl Runs {
 
     fn begin(&mut self, section: i64, failing: Failing, telling: &Telling<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
-            // If there were more missed stretches than sections, this section remains flagged without a missed stretch.
+            // All numbers of missed stretches are used up. The section remains flagged, but belongs to no stretch.
             return None;
         }
         let id = RunId(u32::try_from(self.runs.len()).ok()?);

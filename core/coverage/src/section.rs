@@ -394,7 +394,7 @@ mod tests {
 
     /// An open section is unsure only if it is at an end of the coverage extent.
     #[test]
-    fn undecided_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
+    fn open_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
         let unsure = |not_inspected| Section { not_inspected, ..Section::default() }.unsure();
         assert_eq!([unsure(true), unsure(false)], [Some(Unsure::NotInspected), None]);
     }

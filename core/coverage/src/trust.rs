@@ -43,7 +43,7 @@ pub(super) struct Others {
 pub(super) struct Disagreement {
     /// Difference from the previous return, m; `None` if both agree.
     pub(super) jump_m: Option<f64>,
-    /// Number of earlier, waiting returns that this return made doubtful.
+    /// Number of waiting returns that this return made doubtful.
     pub(super) doubtful: u32,
 }
 

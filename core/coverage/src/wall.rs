@@ -58,7 +58,7 @@ struct Run {
     width_m: f64,
     /// Number of earlier passes that met the same thing at a return, summed over all returns of the run.
     confirmed: u32,
-    /// The same number for each waiting return.
+    /// Number of earlier passes that met the same thing, for each waiting return.
     confirmed_each: [u8; MOST_WAITING],
     /// Number of the run's ends that slope to the wall.
     slopes: u8,

@@ -18,7 +18,7 @@ pub struct WallLimits {
     pub radius_m: f64,
     /// Distance along the tunnel within which returns of an earlier pass count as neighbours.
     ///
-    /// The distance doesn't depend on the target T, so the samples don't depend on it either.
+    /// The distance doesn't depend on the target T, so the samples don't depend on T either.
     pub reach_m: f64,
     /// Log odds at which a run of returns counts as wall, computed from the confidence of verdicts.
     ///

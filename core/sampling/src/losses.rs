@@ -66,7 +66,7 @@ impl LossRate {
     /// Length in pings of the longest run of lost pings to expect at this many places of the wall.
     ///
     /// A run of this length occurs at one of these places with the probability [`MAY_FAIL`]. Zero if even a single
-    /// lost ping is less likely.
+    /// lost ping is less likely than that.
     fn longest_run(self, places: f64) -> f64 {
         let expected = places * self.share / MAY_FAIL;
         if expected <= 0.0 {
@@ -167,9 +167,9 @@ impl Sampled {
 
     /// Distance between passes at which the largest circle equals the target, m.
     ///
-    /// One of two neighbouring passes misses a run of pings. With half the distance h between samples of a turn and
-    /// half the gap g, the circle touches both ends of the gap and two neighbouring samples of the previous pass. Its
-    /// centre is (a^2 + h^2 - g^2) / (2 a) from the pass with the gap, where a is the distance between passes.
+    /// One of two neighbouring passes misses a run of pings, which leaves a gap. The circle touches both ends of the
+    /// gap and two neighbouring samples of the other pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with
+    /// the gap: a is the distance between passes, h half the distance between samples of a turn, g half the gap.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

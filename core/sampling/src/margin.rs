@@ -32,7 +32,7 @@ const LONGEST_APART_S: f64 = 20.0;
 ///
 /// The time is the sum of two terms: the time between two passes of evenly spread heads, and a share of the time
 /// until the rearmost head reaches the position of the foremost head. `passes_per_s` is the sum of the heads' turns per
-/// second, above zero; `apart_m` is the length of hull between these two heads.
+/// second, above zero; `apart_m` is the length of hull between the foremost and the rearmost head.
 pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share: f64) -> f64 {
     let apart_s = (apart_m / speed_mps.abs().max(SLOW_MPS)).min(LONGEST_APART_S);
     1.0 / passes_per_s + apart_share * apart_s

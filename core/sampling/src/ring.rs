@@ -1,6 +1,6 @@
 //! Points where a head's beams meet the wall, by ray casting for any profile and pose.
 //!
-//! The functions compute the points where the beams of a head at rest meet the wall.
+//! The head is at rest: the distance that the vehicle travels between pings is left out.
 
 use serde::{Deserialize, Serialize};
 

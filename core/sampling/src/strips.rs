@@ -32,7 +32,7 @@ pub struct Strip {
     pub seen_by: HeadSet,
     /// Whether any part of the strip is hidden from a head whose beam would otherwise sweep it.
     ///
-    /// Pings then stop up to one angular step before the strip's edge. If the strip is merely outside a sector, pings
+    /// Pings then stop up to one angular step before the strip's edge. If the strip is only outside a sector, pings
     /// stop at its edge.
     pub hidden: bool,
     /// Longest time between two passes over the strip, as a share of a sweep there and back: 0.5 to 1.
@@ -88,7 +88,8 @@ pub struct Strips {
     ///
     /// The list is ordered by setting, then by strip. It is empty before the first call of `count_losses`.
     needed: Vec<[f64; 2]>,
-    /// Strip of each sounding of the current ring, and approximate distance from the sounding to the strip's end, m.
+    /// Strip of each sounding of the present ring of rays, and approximate distance from the sounding to the strip's
+    /// end, m.
     strip_of: Vec<(usize, f64)>,
 }
 
@@ -165,8 +166,7 @@ impl Strips {
     /// Measures the largest distance between samples of a turn on each strip, for each of `settings` settings of the
     /// heads.
     ///
-    /// `stride` returns the number of ring soundings in a head's step, by setting and head; `None` for an absent
-    /// head.
+    /// `stride` returns the number of rays in a head's step, by setting and head; `None` for an absent head.
     ///
     /// Allocates: not if the capacity suffices for the settings.
     pub fn measure<'a>(
@@ -198,7 +198,7 @@ impl Strips {
         }
     }
 
-    /// Finds the strip of each sounding of a ring.
+    /// Finds the strip of each sounding of a ring of rays.
     fn find_strips(&mut self, ring: &Ring, forward: bool) {
         let first_m = self.strips.first().map_or(0.0, |strip| strip.arc.from_m);
         let mut number = 0;
@@ -276,7 +276,7 @@ impl Strips {
     ) -> Option<Unmet> {
         let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
-        // The samples on either side of a strip matter only if the strip itself misses the target.
+        // The samples on the two sides of a strip matter only if the strip itself misses the target.
         let is_unmet = |(k, strip): &(usize, &Strip)| {
             !(self.within(setting, (*k, strip), &thin).is_some_and(is_met)
                 || self.across(setting, (*k, strip), &thin).is_some_and(is_met))

@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_vehicle_swing_counts_between_heads_at_different_positions_along_the_hull() {
+    fn slow_swing_counts_between_heads_at_different_positions_along_the_hull() {
         // The rotation between passes is within the navigation errors, but the rotation over ten seconds is not.
         let (looks, now) = looks(80.0, |t| [0.02 * math::sin(TAU * t / 50.0), 0.0]);
         let swing = looks.swing(now, 2.0, 10.0);

@@ -16,7 +16,7 @@ const STRETCH: f64 = 3.0;
 /// Ratio of each tried speed to the speed tried before, and number of tried speeds.
 const SLOWER_BY: f64 = 0.93;
 const TRIED: u32 = 40;
-/// Shares of a speed at which the target must be met, too. A single speed may meet it by chance.
+/// Multiples of a speed that must also meet the target. A single speed may meet the target by chance.
 const ALSO: [f64; 6] = [1.0, 1.1, 1.2, 0.9, 0.8, 0.7];
 
 /// A place on the wall's perimeter, and the heads that see it.

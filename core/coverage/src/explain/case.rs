@@ -33,7 +33,7 @@ pub struct Case<'a> {
     pub none_alive: bool,
     /// Whether no head pinged in the section, and at least one head passed through it in silence.
     pub is_dark: bool,
-    /// Whether the section's samples come from unrelated stretches of navigation.
+    /// Whether the section's samples come from several navigation segments.
     pub is_torn: bool,
     /// Coverage target T, m.
     pub target_m: f64,
@@ -177,7 +177,7 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // The advised speed is lower if the vehicle hides wall from some heads.
+            // If the vehicle hides wall from some heads, the advised speed is lower, and replaces this speed.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

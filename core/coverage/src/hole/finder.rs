@@ -94,7 +94,7 @@ struct Beyond(WallPoint);
 pub(super) enum Near {
     /// No empty circle has its centre in the tile: one sample is within the radius of all points of the tile.
     Settled,
-    /// The sample nearest to the centre, or an equally near one.
+    /// The sample nearest to the centre, or any sample that is near enough.
     Sample(Nearest),
     /// No sample within the search radius.
     Nothing,

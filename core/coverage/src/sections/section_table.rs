@@ -115,7 +115,7 @@ pub struct Sections {
     judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
-    /// Chainages of the ends of the heads' reach at which sections are checked next, m.
+    /// Chainages that the ends of the heads' reach must get to before sections are checked again, m.
     ///
     /// The first chainage is for sections behind the heads, the second for sections ahead.
     pub(super) next_look_m: [f64; 2],

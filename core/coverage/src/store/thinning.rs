@@ -7,8 +7,8 @@ use super::open::{CellAt, OpenBricks};
 
 /// Thinning tiers: a number of samples in the cell, and a share of the cell's edge.
 ///
-/// A tier applies from its number of samples on. It drops a sample if a stored sample is nearer than its share of the
-/// edge.
+/// A tier applies from its number of samples on. A sample is then dropped if a stored sample is nearer than the tier's
+/// share of the edge.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
 /// A sample at the end of a step is dropped only if its cell holds this many samples more than the tier requires.

@@ -214,7 +214,7 @@ fn random_ranges_make_a_head_distrusted() {
 }
 
 #[test]
-fn outvoted_head_is_distrusted_until_it_agrees_with_the_others() {
+fn outvoted_head_is_distrusted_until_it_agrees_with_the_other_heads() {
     for wrong in 0..3 {
         let mut turning = Turning::new(1.0, 3);
         let frozen = |head: usize, _: f64, _: f64, _: [u32; 2]| Some(if head == wrong { 0.55 } else { 1.0 });

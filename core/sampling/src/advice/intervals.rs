@@ -64,7 +64,7 @@ impl Driving<'_> {
             return Err(speed_mps);
         }
         let Some(unmet) = self.strips.unmet(0, &then, speed_mps, target_m, self.going) else { return Ok(()) };
-        // If a strip is narrower than the target, the samples on either side of it may meet the target.
+        // If a strip is narrower than the target, the samples on its two sides together may meet the target.
         let stays = unmet.width_m > most_m;
         let below_mps = |along_m| self.below_mps(speed_mps, unmet.gap_s, along_m).min(speed_mps);
         Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })

@@ -242,7 +242,7 @@ fn mutual_occlusion_lowers_the_speed() {
     let mut advisor = case.advisor();
     let hidden = advisor.advise(&case.situation, Swing::default(), None);
     assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
-    // Each head's neighbour hides a strip of wall from it. Over these strips, half of the passes are missing.
+    // From each head, its neighbour hides a strip of wall. Over these strips, half of the passes are missing.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
     // On the hidden strips, neighbouring samples of a turn are close together.
@@ -350,7 +350,7 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
     let still = advise(Swing::default());
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01, history: None };
     let swung = advise(swing);
-    // The advised speed is reduced by the speed of the swinging beams along the wall at that range.
+    // The advised speed is reduced by the speed at which the swinging beams move along the wall.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
     assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
@@ -405,7 +405,7 @@ fn position_error_lowers_the_speed_by_its_margin() {
 
 /// A previously advised speed is kept only if T exceeds the target by at most `EASE`, whatever the phases become.
 #[test]
-fn retained_speed_exceeds_the_target_by_at_most_the_hysteresis() {
+fn spacing_at_a_retained_speed_exceeds_the_target_by_at_most_the_hysteresis() {
     let mut advisor = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0).advisor();
     let mut kept = 0;
     for k in 0..72 {
@@ -557,8 +557,8 @@ fn nearest_and_highest_speed_intervals_are_advised() {
         };
         outside += 1;
         assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
-        // All speeds between the present speed and the nearest speed, less the search step of 1 %, miss the target. The
-        // limit of 0.48 m instead of 0.5 m tolerates narrow intervals between the steps.
+        // All speeds that are nearer to the present speed miss the target. The search step of 1 % is left out. The
+        // limit is 0.48 m instead of 0.5 m, because the search may miss narrow intervals.
         let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
         for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
             let by = math::exp(nearer);

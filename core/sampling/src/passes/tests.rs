@@ -51,8 +51,8 @@ fn place_hidden_from_some_heads_has_longer_times_between_passes() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-    // Without two of four heads that are half a turn apart, the longest gap doubles. Without two that are a quarter
-    // turn apart, two successive passes are missing.
+    // The place is hidden from two of four heads. If these two are half a turn apart, the longest gap doubles. If they
+    // are a quarter turn apart, two successive passes are missing.
     assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
     assert_eq!(passes.gap_s(HeadSet::default()), None);
     assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);

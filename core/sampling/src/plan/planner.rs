@@ -286,7 +286,7 @@ impl Planner {
         Some((gap_s(planned.passes.heads())?, longest))
     }
 
-    /// The strips of the wall, each seen by the same heads, at the nominal pose.
+    /// The strips of the wall at the nominal pose. The same heads see all places of a strip.
     pub fn nominal_strips(&self) -> Option<&Strips> {
         self.stances.first().map(|stance| &stance.strips)
     }

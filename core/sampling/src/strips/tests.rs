@@ -95,7 +95,7 @@ fn narrow_hidden_strip_counts_like_a_large_distance_between_samples() {
     // On each side, the nearest ping may be one step away from the hidden strip.
     let v = speed(&some, &turning(2), 0.8).unwrap();
     assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
-    // A hidden strip counts even if it is narrower than the spacing of the ring's soundings.
+    // A hidden strip counts even if it is narrower than the distance between two rays on the wall.
     let sliver = strips(&[all_around(&[arc(7.0013, 1e-4)])]);
     let v = speed(&sliver, &turning(1), 0.8).unwrap();
     assert!((v - closed(0.8, 0.4001, 8.0)).abs() < 1e-9, "{v}: {sliver:?}");

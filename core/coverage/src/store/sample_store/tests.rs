@@ -288,7 +288,7 @@ fn memory_does_not_grow_over_a_hundred_passes_back_and_forth() {
     for round in 0..100 {
         for k in 0..500 {
             let k = if round % 2 == 0 { k } else { 499 - k };
-            // The vehicle drives 150 m back and forth, so that the beginning is packed and opened each time.
+            // The vehicle drives 150 m back and forth, so that the first bricks are packed and opened each time.
             let x_m = 0.3 * f64::from(k);
             store.nearest_pass_m(at(x_m, 1.0), 12.0);
             let arc_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
