@@ -101,7 +101,7 @@ pub enum LossKind {
         /// Damage in that part.
         kind: Box<LossKind>,
     },
-    /// Parts missing from a recording; the last one is `None` if unknown.
+    /// Parts missing from a recording. The number of the last one is `None` if unknown.
     PartsMissing {
         /// Number of the first missing part.
         first: u32,

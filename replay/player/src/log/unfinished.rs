@@ -18,7 +18,7 @@ use super::reader::{LogInfo, LogReader, MessageKind};
 use super::rotate::{files_of, in_the_way, part_head};
 use super::writer::LogHeader;
 
-/// A recording that did not end in order, and that a later dive can continue in a further part.
+/// A recording that did not end in order. A later dive can continue it in a new part.
 #[derive(Debug, Clone)]
 pub struct Unfinished {
     /// Path that names the recording, as given to `--record`.

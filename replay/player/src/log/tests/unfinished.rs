@@ -1,4 +1,4 @@
-//! Recordings that were cut off at any byte are continued in further parts, and are read as one log.
+//! Recordings that were cut off at any byte are continued in new parts, and are read as one log.
 
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ fn recording_cut_at_any_byte_is_continued_without_gaps_or_repetitions() {
         assert!(kept[..before.len()] == before, "cut at {bytes}");
         stated.push(go_on(&recording));
         let (after, losses) = messages(&recording);
-        assert_eq!(losses, stated, "cut at {bytes}: only the interruptions are lost");
+        assert_eq!(losses, stated, "cut at {bytes}: only the interruptions are reported");
         assert!(after[..kept.len()] == kept, "cut at {bytes}");
         continued += 1;
         let of = |kind: &str| {
@@ -168,7 +168,7 @@ fn dive_is_continued_at_another_path_if_its_medium_is_gone() {
 }
 
 #[test]
-fn last_recording_of_a_folder_is_found_if_it_did_not_end_in_order() {
+fn latest_recording_of_a_folder_is_found_if_it_did_not_end_in_order() {
     let folder = Folder::new("last");
     let last = || Unfinished::last_in(&folder.0, &|info| info.metadata.contains_key("simulated")).unwrap();
     let create = |name: &str, dive: &str| -> PathBuf {
