@@ -121,7 +121,7 @@ impl Simulation {
         }
         sim.base();
         if asker == Asker::Hosts {
-            // Before the counters encode their counts, and so after all effects on them.
+            // This system runs after all effects on the counters, and before the counters encode their counts.
             sim.system(Stage::Tell, stages::freeze);
         }
         add_base_systems(&mut sim);

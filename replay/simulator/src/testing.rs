@@ -119,7 +119,7 @@ impl Dive {
     /// Text of the error if the scene with these effects is refused.
     pub(crate) fn refusal(&self, effects: &str) -> String {
         match self.simulation(effects) {
-            Ok(_) => panic!("{effects} was taken"),
+            Ok(_) => panic!("{effects} was accepted"),
             Err(why) => why.to_string(),
         }
     }

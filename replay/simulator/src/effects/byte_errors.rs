@@ -19,7 +19,8 @@ use crate::stages::Stage;
 /// Changes bytes from devices at random: a bit is flipped, a byte is lost, or another byte is inserted before it.
 ///
 /// Each byte is affected independently. `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the
-/// rates, all zero by default. A message that loses all its bytes doesn't arrive. Bytes to devices are unchanged.
+/// rates, all zero by default. A message that loses all its bytes doesn't arrive. Bytes that hosts send to devices are
+/// unchanged.
 pub(super) struct ByteErrorsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -109,8 +110,8 @@ impl Hits {
         math::floor_to_i64(math::ln(u) / self.ln_missed).unsigned_abs()
     }
 
-    /// Returns a random number between 0 and 1 if this byte is affected; `None` otherwise. Must be called in order of
-    /// bytes.
+    /// Returns a random number between 0 and 1 if this byte is affected; `None` otherwise. Must be called for the bytes
+    /// in order.
     fn hit(&mut self, byte: u64) -> Option<f64> {
         if byte < self.next {
             return None;

@@ -20,7 +20,7 @@ const OUTSIDE_M: f64 = 20.0;
 /// Interval at which the trajectory is checked against [`OUTSIDE_M`], s.
 const LOOK_S: f64 = 5.0;
 
-/// The water flows along the tunnel and carries a vehicle that holds its speed through water.
+/// The water flows along the tunnel and carries a vehicle that keeps its speed through the water.
 ///
 /// Legs and a pilot's course end at the same place as without a current, after a different duration.
 ///

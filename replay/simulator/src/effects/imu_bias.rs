@@ -63,8 +63,8 @@ struct ImuBias {
     /// Latest tilt of the attitude in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Last sample interval, and two factors each for biases and for tilt: the correlation over the interval, and the
-    /// weight of a new random number.
+    /// Previous sample interval, with two factors for the biases and two for the tilt: the correlation over the
+    /// interval, and the weight of a new random number.
     ///
     /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),

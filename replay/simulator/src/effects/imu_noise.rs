@@ -17,7 +17,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Numbers of the first block of random numbers for each quantity. Each vector takes two blocks.
+/// Index of the first block of random numbers for each quantity. Each vector takes two blocks.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;

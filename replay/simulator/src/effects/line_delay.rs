@@ -22,9 +22,9 @@ pub(super) const SENSES: [Sense; 6] =
 
 /// Messages from a device arrive late, in addition to the latency in the vehicle file.
 ///
-/// All messages are delayed by `latency_ms`, and each one by a further exponentially distributed time with mean
-/// `jitter_ms`. A message that would overtake the previous one on its line arrives together with it. Messages to
-/// devices aren't delayed.
+/// `latency_ms` delays all messages. In addition, a random time delays each message. This time is exponentially
+/// distributed with mean `jitter_ms`. A message that would overtake the previous one on its line arrives together with
+/// it. Messages to devices aren't delayed.
 pub(super) struct LineDelayKind;
 
 #[derive(Debug, Clone, Copy)]

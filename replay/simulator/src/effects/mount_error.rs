@@ -16,7 +16,8 @@ use crate::sensing::Mounted;
 ///
 /// `position_m` and `angles_deg` (roll, pitch and yaw, applied before the file's angles) are added to the mounts of all
 /// named sensors. `position_sd_m`, up to 1, and `angles_sd_deg`, up to 30, are the standard deviations of additional
-/// errors, which are drawn for each axis and sensor. When a head occludes others, its position is that of the file.
+/// errors, which are drawn for each axis and sensor. A head that occludes other heads does so from its position in the
+/// file.
 pub(super) struct MountErrorKind;
 
 #[derive(Debug, Clone, Copy)]

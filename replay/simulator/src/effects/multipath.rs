@@ -31,9 +31,10 @@ use crate::stages::Stage;
 ///   the wall and for a beam along the wall. Both are from 0 to 1. In between, the share grows with 1 minus the cosine
 ///   of incidence.
 /// - `mean_run`, the mean number of consecutive returns by this path once one has arrived, as in missing_returns.
-///   Without it, each return arrives by either path, whatever the return before it.
+///   Without this key, the path of each return is independent of the previous return.
 ///
-/// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see that wall.
+/// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see the second
+/// wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
 pub(super) struct MultipathKind;
 
@@ -51,7 +52,7 @@ struct Parameters {
 struct Multipath {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the last return arrived by way of two walls.
+    /// Whether the previous return arrived by way of two walls.
     is_bounced: bool,
 }
 
@@ -184,8 +185,8 @@ mod tests {
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&pipe, [out_m, radius_m], angle_rad);
-            // The sine of incidence follows from the law of sines. The ends of a chord are seen from the centre under
-            // the angle pi - 2 i.
+            // The sine of incidence follows from the law of sines. Seen from the centre, the ends of a chord are pi - 2
+            // i apart, where i is the incidence.
             let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
             let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
             let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();

@@ -27,8 +27,8 @@ use crate::stages::Stage;
 ///   clusters are uniformly distributed.
 /// - `spread_m` (0.1), the standard deviation of the returns about the cluster's range.
 ///
-/// A cluster beyond the wall gives no return. Source: docs/why/field.md, "murk": 5 % near returns. Runs: see
-/// missing_returns.
+/// A cluster beyond the wall has no effect: the ping returns the wall. Source: docs/why/field.md, "murk": 5 % near
+/// returns. Runs: see missing_returns.
 pub(super) struct NearReturnsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -45,10 +45,10 @@ struct NearReturns {
     cluster: Cluster,
 }
 
-/// The current cluster, and whether the last ping hit it.
+/// The current cluster, and whether the previous ping hit it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cluster {
-    /// Whether the last ping hit a cluster; `None` before the first ping.
+    /// Whether the previous ping hit a cluster; `None` before the first ping.
     met: Option<bool>,
     range_m: f64,
 }

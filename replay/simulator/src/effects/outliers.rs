@@ -17,7 +17,7 @@ use crate::stages::Stage;
 
 /// Some returns are unrelated to the wall. Their range is uniformly distributed.
 ///
-/// Echosounders in a tunnel give such outliers between echoes of all kinds. Keys, with defaults in brackets:
+/// Echosounders in a tunnel give such outliers. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which they occur.
 /// - `share`, the share of outliers among the returns, from 0 (excluded) to 1 (0.08).
 /// - the nearest range `near_m` (0.3) and the farthest `far_m` (a head's range setting in this water; 30 for an

@@ -19,8 +19,8 @@ use crate::stages::Stage;
 /// From time to time a head misses a commanded step. From then on it lags by that step, since hosts command steps and
 /// not angles.
 ///
-/// Of a thousand steps, `per_thousand` are missed, each independently. If `told` is true, the head reports its true
-/// angle; otherwise, as by default, it reports the commanded angle.
+/// `per_thousand` is the mean number of missed steps in a thousand. Each step is missed independently. If `told` is
+/// true, the head reports its true angle; otherwise, as by default, it reports the commanded angle.
 pub(super) struct SkippedStepsKind;
 
 #[derive(Debug, Clone, Copy)]

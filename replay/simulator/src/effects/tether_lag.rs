@@ -30,7 +30,7 @@ struct Parameters {
 #[derive(Component)]
 struct TetherLag {
     parameters: Parameters,
-    /// Time and value of the cable counter's last reading.
+    /// Time and value of the cable counter's previous reading.
     counted: Option<(MonoNs, f64)>,
     winding: bool,
 }

@@ -24,7 +24,7 @@ use crate::trajectory::{Knots, wandering};
 /// control points of a cubic B-spline are half a period apart.
 ///
 /// `swings` are tables of `reach_m` and `period_s`. With each, the cable swings as a sine of full reach and random
-/// phase, even while the vehicle is stationary. If there are swings, the slack varies additionally only if `reach_m` is
+/// phase, even while the vehicle is stationary. If there are swings, the smooth variation is added only if `reach_m` is
 /// given.
 pub(super) struct TetherSlackKind;
 

@@ -28,7 +28,7 @@ const LEAST_STEP_M: f64 = 1e-4;
 const ROOT_M: f64 = 1e-11;
 /// Displacement above which a hit on the wall is attributed to the feature that displaced the wall, m.
 const FEATURE_M: f64 = 1e-3;
-/// Half the distance between the points whose difference gives the normal of a displaced wall, m.
+/// Half the distance between the points from which the normal of a displaced wall is computed, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
 /// The tunnel's wall along the whole tunnel, except openings.
@@ -134,13 +134,13 @@ impl Tube {
         }
     }
 
-    /// Number of the mesh that is the wall anywhere between two chainages, and the mesh.
+    /// A mesh that is the wall somewhere between two chainages, and its number before it.
     fn mesh_over(&self, from_m: f64, to_m: f64) -> Option<(usize, &MeshWall)> {
         let overlaps = |(begin_m, end_m): (f64, f64)| begin_m < to_m && from_m < end_m;
         self.meshes.iter().enumerate().find(|(_, mesh)| overlaps(mesh.span_m()))
     }
 
-    /// Number of the feature with the mesh that is the wall anywhere between two chainages.
+    /// Number of the feature whose mesh is the wall somewhere between two chainages.
     pub(super) fn mesh_within(&self, from_m: f64, to_m: f64) -> Option<u16> {
         self.mesh_over(from_m, to_m).map(|(_, mesh)| mesh.feature())
     }
