@@ -74,8 +74,8 @@ impl Decimal {
         fits.then_some(Self { mantissa, places })
     }
 
-    /// Number nearest to `value`, with as many decimal places as fit but at most `most_places`; zero if none can
-    /// represent it.
+    /// Number nearest to `value`, with as many decimal places as fit but at most `most_places`; zero if `value` doesn't
+    /// fit eight characters.
     pub fn nearest(value: f64, most_places: u8) -> Self {
         let with = |places: u8| {
             let scale = f64::from(*POWERS_OF_TEN.get(usize::from(places))?);

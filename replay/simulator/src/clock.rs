@@ -31,7 +31,7 @@ impl Clock {
         START + DurNs(i64::try_from(true_span).unwrap_or(i64::MAX))
     }
 
-    /// First time shown by the clock for which the true time is at or after `at`.
+    /// Earliest time on this clock at which the true time is `at` or later.
     pub(crate) fn shows(&self, at: MonoNs) -> MonoNs {
         let true_span = i128::from(at.since(START).0);
         let near = (true_span * PARTS).div_euclid(PARTS + self.longer);

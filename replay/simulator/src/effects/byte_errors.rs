@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// Changes bytes from devices at random: a bit is flipped, a byte is lost, or another byte is inserted before it.
+/// Changes bytes from devices at random: bits are flipped, bytes are lost, and other bytes are inserted.
 ///
 /// Each byte is affected independently. `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the
 /// rates, all zero by default. A message that loses all its bytes doesn't arrive. Bytes that hosts send to devices are
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn message_without_bytes_never_arrives() {
+    fn message_that_loses_all_its_bytes_never_arrives() {
         let keys = "[effects.byte_errors]\ndropped_per_million = 500000\n";
         let lost = Bench::turning(keys).messages();
         assert!(lost.iter().all(|message| !message.3.is_empty()));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_rates_are_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_rates_are_refused() {
         let keys = "[effects.byte_errors]\ndropped_per_million = 9000\nflipped_per_million = 9000\n\
                     inserted_per_million = 9000\n";
         same_in_any_slices(&Bench::turning(keys));

@@ -166,7 +166,7 @@ mod tests {
     ///
     /// For times t well above the correlation time T, the variance of the displacement is 2 sd^2 T t.
     #[test]
-    fn gusts_have_the_given_strength_and_correlation_time() {
+    fn gusts_have_the_given_sd_and_correlation_time() {
         let current = Current { flow: Flow::default(), gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
         let (mut speeds, mut lagged, mut ways) = (0.0, 0.0, 0.0);
         let (runs, seconds) = (200_u32, 4000.0);

@@ -20,7 +20,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step number that is reserved for drawing the constant parts. No sample has it.
+/// Step number that is reserved for drawing the constant parts. No sample has this number.
 const CONSTANT: u64 = u64::MAX;
 /// Block of random numbers for the tilt, after the blocks for the biases.
 const TILT: u64 = 3;
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_bias_is_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_bias_is_refused() {
         same_in_any_slices(&Bench::turning(
             "[effects.imu_bias]\ngyro_degps = 0.2\naccel_mps2 = 0.01\ntau_s = 5\n",
         ));

@@ -41,9 +41,9 @@ use pings::{Ping, Pings};
 /// - `margin_deg`, from 0 to 45. The default is half the other head's beam width, since the insonified patch is that
 ///   wide.
 ///
-/// Heads whose bodies overlap are idealised ones and don't hear each other. Pings of another head that begin while a
-/// head is already listening are extrapolated from the two pings before. The extrapolation is wrong for one or two
-/// pings when a head reverses.
+/// Heads whose bodies overlap are idealised. They don't hear each other. Pings of another head that begin while a head
+/// is already listening are extrapolated from the two pings before. The extrapolation is wrong for one or two pings
+/// when a head reverses.
 ///
 /// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, in which the planner uses the same two paths.
 pub(super) struct InterferenceKind;

@@ -105,7 +105,7 @@ fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f
 }
 
 impl Parameters {
-    /// Whether a return arrives by way of two walls, for a beam with this squareness to the wall.
+    /// Whether a return arrives by way of two walls. `square` is the cosine of the beam's incidence.
     fn is_bounced(&self, before: bool, square: f64, chance: f64) -> bool {
         let share = self.share + (self.square_share - self.share) * square;
         let Some(mean) = self.mean_run.filter(|_| share > 0.0 && share < 1.0) else { return chance < share };
@@ -149,7 +149,7 @@ mod tests {
     /// If the rectangular tunnel is mirrored at each wall that the beam meets, the reflected beam becomes a straight
     /// line through the mirrored copies of the tunnel.
     #[test]
-    fn double_reflection_in_a_rectangle_matches_a_straight_beam_through_mirrored_rectangles() {
+    fn multipath_range_in_a_rectangular_tunnel_matches_a_straight_beam_through_mirrored_tunnels() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
         let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn double_reflection_in_a_circle_is_a_chord_with_equal_incidence() {
+    fn multipath_range_in_a_circular_tunnel_matches_trigonometry() {
         let (radius_m, out_m) = (4.0, 1.5);
         let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
         // The circle rests on the floor, so its centre is a radius above the floor.

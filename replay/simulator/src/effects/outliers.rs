@@ -118,7 +118,7 @@ mod tests {
     use crate::testing::{Dive, assert_share};
 
     #[test]
-    fn outliers_have_the_given_share_and_spread() {
+    fn outliers_have_the_given_share_and_uniformly_distributed_ranges() {
         let dive = Dive { seconds: 1000.0, ..Dive::with_sounder() };
         let (base, dived) = (dive.dive(""), dive.dive("[effects.outliers]\nshare = 0.2\nfar_m = 20.3"));
         let pairs = || base.ranges_m(0).into_iter().zip(dived.ranges_m(0));

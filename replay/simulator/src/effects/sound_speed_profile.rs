@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
         assert!(refusal.contains("or per_metre_mps is needed"), "{refusal}");

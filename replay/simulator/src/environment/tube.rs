@@ -134,7 +134,7 @@ impl Tube {
         }
     }
 
-    /// A mesh that is the wall somewhere between two chainages, and its number before it.
+    /// A mesh that is the wall somewhere between two chainages: its number, and the mesh.
     fn mesh_over(&self, from_m: f64, to_m: f64) -> Option<(usize, &MeshWall)> {
         let overlaps = |(begin_m, end_m): (f64, f64)| begin_m < to_m && from_m < end_m;
         self.meshes.iter().enumerate().find(|(_, mesh)| overlaps(mesh.span_m()))

@@ -226,7 +226,7 @@ fn spline_acceleration_has_no_jumps() {
 }
 
 #[test]
-fn random_drift_has_the_given_amplitude_and_spread() {
+fn random_drift_has_the_given_amplitude_and_sd() {
     let reach = [1.0, 2.0, 0.0, 0.1, 0.2, 0.3];
     let knots = wandering(Stream::new(2, "wandering", "test"), 20_000.0, 10.0, reach);
     let (mut squares, mut products, count) = ([0.0; 6], 0.0, 20_000_u32);

@@ -90,7 +90,7 @@ fn place_in(lcg: &mut Lcg, radius_m: f64, x_m: [f64; 2]) -> V3 {
 }
 
 #[test]
-fn mesh_of_the_profile_gives_equal_ranges() {
+fn mesh_of_the_profile_gives_the_ranges_of_the_profile() {
     let environment = wall(&tube(RADIUS_M, 10.0, 3, &[]));
     let within_m = RADIUS_M * (1.0 - SAGITTA);
     let mut lcg = Lcg(60);
