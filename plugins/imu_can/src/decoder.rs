@@ -59,7 +59,7 @@ struct State {
     stamped_by_filter: Option<bool>,
     received: MonoNs,
     group: Option<u16>,
-    /// Components of acceleration received since the last complete vector.
+    /// Components of acceleration received since the latest complete vector.
     acceleration_mps2: [Option<f64>; 3],
     withheld: u64,
 }

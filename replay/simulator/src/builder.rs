@@ -182,7 +182,7 @@ impl<'a> Builder<'a> {
         self.added.push(Added { effect, ..Added::default() });
     }
 
-    /// Ends the last effect. Systems added from now on are base systems.
+    /// Ends the effects. Systems added from now on are base systems.
     pub(crate) fn base(&mut self) {
         self.current = None;
     }
@@ -217,7 +217,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The last two segments of a type's path, and the last segment of its type parameter.
+/// Shortens the path of a type to its last two segments, and the path of its type parameter to the last segment.
 fn short_name(name: &str) -> String {
     let last = |path: &str, count: usize| {
         let parts: Vec<&str> = path.rsplit("::").take(count).collect();

@@ -292,7 +292,7 @@ impl Simulation {
         }
     }
 
-    /// The next message that has crossed its line. Does not simulate further.
+    /// The next message that has crossed its line. Does not advance the simulation.
     pub fn waiting_message(&mut self) -> Option<Message<'_>> {
         self.outbox.has_next().then(|| self.outbox.next()).flatten()
     }

@@ -47,7 +47,7 @@ rate_valid = { signal = "ImuStatus", mask = 0x2E1 }
 sample_time = "ImuTime"
 "#;
 
-/// DBC text with the further content that files of whole vehicles have.
+/// DBC text that also has the other content of files for whole vehicles, such as comments and value tables.
 const RICH: &str = "VERSION \"1\"\n\nNS_ :\n\tNS_DESC_\n\tCM_\n\tBA_DEF_\n\nBS_:\n\nBU_: U H\n\
 VAL_TABLE_ OnOff 1 \"on\" 0 \"off\" ;\n\n\
 BO_ 2147483748 A: 8 U\n SG_ Rate : 7|16@0- (0.01,-1) [-10|10] \"deg/s\" Vector__XXX\n\

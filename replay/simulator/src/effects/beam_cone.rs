@@ -90,7 +90,7 @@ struct BeamCone {
 impl Cone {
     /// Creates a cone of `width_rad` with this many rays.
     ///
-    /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two are at the
+    /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two rays are at the
     /// cone's edges in the plane of turning, where an oblique wall is nearest and farthest.
     pub fn new(width_rad: f64, rays: usize) -> Self {
         let last = rays.max(2) - 1;

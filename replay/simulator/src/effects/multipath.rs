@@ -27,9 +27,9 @@ use crate::stages::Stage;
 ///
 /// Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
-/// - `square_share` (0) and `share` (0.1), the shares of returns that arrive by this path, for a beam perpendicular to
-///   the wall and for a beam along the wall. Both are from 0 to 1. In between, the share grows with 1 minus the cosine
-///   of incidence.
+/// - `square_share` (0) and `share` (0.1), the shares of returns that arrive by this path. The first is for a beam
+///   perpendicular to the wall, the second for a beam along the wall. Both are from 0 to 1. In between, the share grows
+///   with 1 minus the cosine of incidence.
 /// - `mean_run`, the mean number of consecutive returns by this path once one has arrived, as in missing_returns.
 ///   Without this key, the path of each return is independent of the previous return.
 ///

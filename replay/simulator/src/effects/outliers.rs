@@ -20,7 +20,7 @@ use crate::stages::Stage;
 /// Echosounders in a tunnel give such outliers. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which they occur.
 /// - `share`, the share of outliers among the returns, from 0 (excluded) to 1 (0.08).
-/// - the nearest range `near_m` (0.3) and the farthest `far_m` (a head's range setting in this water; 30 for an
+/// - the nearest range `near_m` (0.3) and the farthest `far_m` (a head's range setting in the scene's water; 30 for an
 ///   echosounder), from 0 to 200 m.
 ///
 /// Source: the share is that of the logs of VITA 1, as in the project's scene vita1-field; 30 m is a Ping1D's usual
