@@ -105,8 +105,9 @@ impl Csv {
             let missing: Vec<&str> = missing.map(|(name, ..)| *name).collect();
             if !missing.is_empty() {
                 let (id, missing) = (&target.sensor.id, missing.join(", "));
-                let problem =
-                    format!("have none for {missing} of sensor {id:?}; a sensor needs all of its quantities");
+                let problem = format!(
+                    "no column for {missing} of sensor {id:?}; every quantity of a sensor needs a column"
+                );
                 return Err(mapping.invalid("columns", &problem));
             }
         }
@@ -182,7 +183,7 @@ impl Target {
         if let Some(column) = self.columns.get_mut(slot)
             && column.replace(place).is_some()
         {
-            return Err(section.invalid("quantity", "has a column for this sensor already"));
+            return Err(section.invalid("quantity", "already has a column for this sensor"));
         }
         Ok(())
     }

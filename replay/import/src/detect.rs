@@ -10,7 +10,7 @@ pub fn looks_like(front: &[u8]) -> Option<&'static str> {
     const MAGICS: [(&[u8], &str); 16] = [
         (
             b"\x89MCAP",
-            "an MCAP file; `headrace replay` reads those of raw bytes as they are, --format mcap imports those of ROS",
+            "an MCAP file; if it has raw device bytes, replay it with `headrace replay`; if it has ROS messages, import it with --format mcap",
         ),
         (b"#ROSBAG V", "a ROS bag; as `.bag`, or with --format rosbag, it can be imported"),
         (b"\x1F\x8B", "compressed by gzip; unpack it first"),

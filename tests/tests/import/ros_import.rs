@@ -215,7 +215,7 @@ fn wrong_mappings_are_refused() {
         (table("/cable", "tether", "time = \"header\""), "have no header"),
         (table("/imu/data", "imu", "unit = \"Pa\""), "unit"),
         (table("/pressure", "depth", "unit = \"psi\""), "must be one of Pa, hPa, mbar, kPa, bar"),
-        (format!("{imu}{imu}"), "has a topic already"),
+        (format!("{imu}{imu}"), "already has a topic, /imu/data"),
         (format!("{imu}{}", table("/imu/data", "imu", "")), "imu"),
         (format!("{imu}[other]\n"), "other"),
     ] {
@@ -425,7 +425,7 @@ fn missing_and_odd_values_are_reported() {
         "note: /imu/data: 3 messages without orientation",
         "note: /imu/data: 1 messages without specific force",
         "note: /imu/data: 1 messages have another frame than the first, \"abc\"",
-        "so that z is down; `angles_deg` of imu must say so",
+        "so the sensor's z axis points down; set `angles_deg` of imu accordingly",
         "lost: /imu/data: 1 messages whose orientation isn't a unit quaternion",
         "note: /pressure: no pressure is above 150.0 Pa",
         "lost: /pressure: 1 messages whose value isn't a number",

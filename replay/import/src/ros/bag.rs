@@ -358,13 +358,16 @@ impl Bag {
                 // A chunk within a chunk is not allowed.
                 let taken = fields.u8(b"op") != Some(5) && self.accept(fields, data, out).is_some();
                 if !taken {
-                    *self.lost.entry("records in chunks that no chunk may contain").or_default() += 1;
+                    *self
+                        .lost
+                        .entry("records of a kind or form that is not allowed in chunks")
+                        .or_default() += 1;
                 }
                 chunk.at += len;
             }
             Err(Stop::More(_)) if chunk.step == Step::More => return Step::More,
             Err(_) => {
-                *self.lost.entry("chunks that end in bytes that aren't a record").or_default() += 1;
+                *self.lost.entry("chunks with invalid bytes at their end").or_default() += 1;
                 return chunk.step;
             }
         }

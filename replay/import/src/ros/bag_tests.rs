@@ -97,11 +97,9 @@ fn damaged_chunk_loses_only_itself_and_is_reported() {
     assert!(losses[1].contains("states 1 chunks; it has 2"), "{losses:?}");
     let wild = [chunk(&[vec![9; 20]]), chunk(&[chunk(&[])]), chunk(&[message(7, 1)])];
     let said = read(&bag(&wild, &[])).1.join("; ");
-    for words in [
-        "bytes that aren't a record",
-        "records in chunks that no chunk may contain",
-        "without an earlier definition",
-    ] {
+    for words in
+        ["chunks with invalid bytes at their end", "not allowed in chunks", "without an earlier definition"]
+    {
         assert!(said.contains(words), "{words}: {said}");
     }
 }

@@ -221,13 +221,13 @@ impl Feed {
             let (count, first) = (self.other_frames, self.frame_id.as_deref().unwrap_or_default());
             let first = String::from_utf8_lossy(first);
             remark(format!(
-                "{count} messages have another frame than the first, {first:?}; the vehicle file has one mount for all"
+                "{count} messages have another frame than the first, {first:?}; the one mount in the vehicle file is used for all"
             ));
         }
         let upward_mps2 = self.upward_mps2 / self.taken.max(1) as f64;
         if upward_mps2 < -4.0 {
             remark(format!(
-                "specific force along z is {upward_mps2:.1} m/s^2 on average, so that z is down; `angles_deg` of {} must say so",
+                "specific force along z is {upward_mps2:.1} m/s^2 on average, so the sensor's z axis points down; set `angles_deg` of {} accordingly",
                 self.sensor_id()
             ));
         }

@@ -99,16 +99,19 @@ impl Feeds {
         let mut feeds = Self::default();
         let sections = mapping.sections("topics")?;
         if sections.is_empty() {
-            return Err(mapping.invalid("topics", "is missing; it assigns topics to sensors").into());
+            let problem = "is missing; at least one table headed [[topics]] must assign a topic to a sensor";
+            return Err(mapping.invalid("topics", problem).into());
         }
         for section in sections {
             let (topic, feed) = feed(&section, vehicle, topics)?;
-            if let Some(other) = feeds.by_topic.values().find(|other| other.sensor_id() == feed.sensor_id()) {
-                let problem = format!("has a topic already: {}", other.sensor_id());
+            let same_sensor = |other: &Feed| other.sensor_id() == feed.sensor_id();
+            if let Some((earlier, _)) = feeds.by_topic.iter().find(|(_, other)| same_sensor(other)) {
+                let problem = format!("already has a topic, {earlier}; assign one topic to each sensor");
                 return Err(section.invalid("sensor", &problem).into());
             }
             if feeds.by_topic.insert(topic, feed).is_some() {
-                return Err(section.invalid("topic", "is named twice").into());
+                let problem = "is named twice; assign each topic to one sensor";
+                return Err(section.invalid("topic", problem).into());
             }
             section.finish()?;
         }
