@@ -113,7 +113,7 @@ impl<'a> Section<'a> {
     pub fn named_file(&self, key: &'static str) -> Result<Option<NamedFile>, ConfigError> {
         let Some(name) = self.text(key)? else { return Ok(None) };
         let Files(load) = self.files;
-        let load = load.ok_or_else(|| self.invalid(key, "names a file, but no file can be read here"))?;
+        let load = load.ok_or_else(|| self.invalid(key, "names a file, but files are not allowed here"))?;
         match load(&name) {
             Ok(text) => Ok(Some(NamedFile { name, text })),
             Err(problem) => self.wrong(key, self.table.get(key), problem),

@@ -38,7 +38,7 @@ fn file_referenced_by_a_key_is_read() {
     let text = "file = \"a.dbc\"\n[inner]\nfile = \"a.dbc\"\nother = \"b.dbc\"\n";
     let root = Document::new("v.toml", text).root().unwrap();
     let error = root.named_file("file").unwrap_err().to_string();
-    assert_eq!(error, "v.toml:1: file = \"a.dbc\": names a file, but no file can be read here");
+    assert_eq!(error, "v.toml:1: file = \"a.dbc\": names a file, but files are not allowed here");
     let root = root.with_files(&files);
     let expected = NamedFile { name: "a.dbc".to_owned(), text: "text".to_owned() };
     let inner = root.section("inner").unwrap().unwrap();

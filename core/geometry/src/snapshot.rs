@@ -135,7 +135,7 @@ impl<'a> Restorer<'a> {
     pub fn part(&mut self, name: &'static str) -> Result<(), SnapshotError> {
         self.part = name;
         let found: &str = self.take()?;
-        if found == name { Ok(()) } else { Err(self.unfit(format!("part {found:?} is in its place"))) }
+        if found == name { Ok(()) } else { Err(self.unfit(format!("found part {found:?} instead"))) }
     }
 
     /// Reads a value.

@@ -244,7 +244,9 @@ fn usb(rest: &str) -> Result<UsbIdentity, String> {
     let (vendor, product) = (number("vendor")?, number("product")?);
     let serial = parts.next().map(str::to_owned);
     if serial.as_ref().is_some_and(String::is_empty) {
-        return Err("the serial number is empty; leave its colon out for any".to_owned());
+        return Err(
+            "the serial number is empty; to accept any serial number, remove the last colon".to_owned()
+        );
     }
     Ok(UsbIdentity { vendor, product, serial })
 }
@@ -257,7 +259,7 @@ fn udp_listen(rest: &str) -> Result<Connect, String> {
         .strip_prefix("from=")
         .ok_or_else(|| format!("unknown option {option:?}; allowed is from=HOST"))?;
     if from.is_empty() {
-        return Err("from= names no host; leave it out for the first valid sender".to_owned());
+        return Err("from= is empty; to accept the first valid sender, remove ?from=".to_owned());
     }
     // An IPv6 address without a port has several colons.
     if from.matches(':').count() == 1 {
@@ -345,7 +347,7 @@ mod tests {
             ("udp:host:0", "port \"0\"", "udp:192.168.2.2:9090"),
             ("udp:host:70000", "port \"70000\"", "udp:192.168.2.2:9090"),
             ("udp-listen:0.0.0.0:14550?to=a", "unknown option \"to=a\"", "?from=192.168.2.2"),
-            ("udp-listen:0.0.0.0:14550?from=", "names no host", "?from=192.168.2.2"),
+            ("udp-listen:0.0.0.0:14550?from=", "from= is empty", "?from=192.168.2.2"),
             ("udp-listen:0.0.0.0:14550?from=a:b", "port \"b\"", "?from=192.168.2.2"),
             ("udp-listen:0.0.0.0?from=a", "no port", "?from=192.168.2.2"),
             ("can:", "\"\" is not an interface name", "can:can0"),

@@ -83,9 +83,13 @@ impl CoverageConfig {
         }
         let target = Target::new(target_m.unwrap_or(f64::INFINITY));
         let places = |opening: &Opening| opening.places(perimeter_m, target);
-        if config.openings.iter().map(places).sum::<i64>() > MAX_PLACES {
-            let problem = "take more than 2500 square metres together; leave them out of the tunnel";
-            root.part::<()>(|| Err(root.invalid("openings", problem)))?;
+        let count = config.openings.iter().map(places).sum::<i64>();
+        if count > MAX_PLACES {
+            let problem = format!(
+                "need {count} samples to fill them, and at most {MAX_PLACES} are allowed; make the openings smaller, or shorten \
+                 the tunnel"
+            );
+            root.part::<()>(|| Err(root.invalid("openings", &problem)))?;
         }
         Ok((config, confidence_sd))
     }
@@ -116,8 +120,8 @@ fn parse_opening(section: &Section<'_>, profile: Option<&Profile>) -> Result<Ope
             let (from_m, to_m) = (arc_at_hour_m(profile, from), arc_at_hour_m(profile, to));
             (from_m, math::wrap(to_m - from_m, profile.perimeter_m()))
         }),
-        (Some(_), None) => return Err(section.invalid("clock_from", "needs clock_to beside it")),
-        (None, Some(_)) => return Err(section.invalid("clock_to", "needs clock_from beside it")),
+        (Some(_), None) => return Err(section.invalid("clock_from", "needs the key clock_to as well")),
+        (None, Some(_)) => return Err(section.invalid("clock_to", "needs the key clock_from as well")),
     };
     Ok(Opening { name, from_m, to_m, arc_m })
 }

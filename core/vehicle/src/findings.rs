@@ -131,7 +131,7 @@ impl VehicleConfig {
         let end = same_end(of_a, of_b)?;
         if of_a != of_b {
             let problem = format!(
-                "is the {end} of sensor {:?} with other settings; only one sensor can open it",
+                "is also the {end} of sensor {:?}, but with other settings; only one sensor can open it",
                 other.id
             );
             return Some((Grade::Error, problem));
@@ -140,7 +140,7 @@ impl VehicleConfig {
             // Frames on CAN have identifiers, so different devices can share the bus.
             let shared = matches!(of_a, Connect::Can { .. });
             let problem = format!(
-                "is the {end} of sensor {:?}, a {}; each gets the other's bytes, too, and skips them",
+                "is also the {end} of sensor {:?}, a {}; each device receives the other's bytes and skips them",
                 other.id, other.plugin
             );
             return (!shared).then_some((Grade::Warning, problem));
@@ -150,7 +150,7 @@ impl VehicleConfig {
             return None;
         }
         let problem = format!(
-            "is the {end} of sensor {:?}, and the bytes of two {} cannot be separated there; give each its own",
+            "is also the {end} of sensor {:?}, and the bytes of two {} cannot be separated there; give each its own",
             other.id, own.plugin
         );
         Some((Grade::Error, problem))
@@ -194,8 +194,8 @@ impl VehicleConfig {
         let farthest_m = walls.iter().map(|wall| wall.range_m).fold(0.0, f64::max);
         let places = if out.len() == walls.len() { "all around".to_owned() } else { clocks(&out, profile) };
         let problem = format!(
-            "reaches {:.0} % of the wall around this head: it is {nearest_m:.2} to {farthest_m:.2} m away, and the setting \
-             covers {least_m:.2} to {most_m:.2} m; out of reach: {places}",
+            "reaches {:.0} % of the wall around this head: the wall is {nearest_m:.2} to {farthest_m:.2} m away, and the \
+             setting covers {least_m:.2} to {most_m:.2} m; out of reach: {places}",
             (share * 100.0).floor()
         );
         let grade = if share < LEAST_SHARE { Grade::Error } else { Grade::Warning };
@@ -215,9 +215,9 @@ impl VehicleConfig {
         let short: Vec<(f64, f64)> = whole.filter(|(_, length_m)| *length_m < FINEST_M).collect();
         let (first_m, length_m) = *short.first()?;
         let problem = format!(
-            "is finer than a sonar resolves: {} of {edges} edges are shorter than {} mm, the finest step of a range here, the first of \
-             {:.3} mm at {first_m:.3} m round the wall ({}); the direction of such short edges is survey noise, and points every \
-             {} mm are enough",
+            "has {} of {edges} edges shorter than {} mm, the finest range step of a sonar; the first is {:.3} mm long, at \
+             {first_m:.3} m round the wall ({}); the direction of such short edges is survey noise, and points every {} mm \
+             are enough",
             short.len(),
             FINEST_M * 1e3,
             length_m * 1e3,
@@ -232,7 +232,7 @@ impl VehicleConfig {
         let heads = self.heads();
         let mut found = Vec::new();
         if let Err(why) = self.programs() {
-            found.push(error("heads".to_owned(), format!("has no program for these heads: {why}")));
+            found.push(error("heads".to_owned(), format!("no program is possible for these heads: {why}")));
         }
         let turns = || heads.iter().map(|head| TAU / head.step_rad * head.ping_period_s);
         let (shortest_s, longest_s) =
@@ -240,7 +240,7 @@ impl VehicleConfig {
         if heads.len() > 1 && longest_s > shortest_s * (1.0 + SAME_TURN) {
             let list: Vec<String> = turns().map(|turn_s| format!("{turn_s:.2} s")).collect();
             let problem = format!(
-                "can't interleave: the heads' turns take {}; give them one mode and one range_m",
+                "can't interleave: the heads' turns take {}; give all heads the same mode and range_m",
                 list.join(", ")
             );
             found.push(warning("heads".to_owned(), problem));

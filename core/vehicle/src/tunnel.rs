@@ -72,7 +72,7 @@ fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profil
             let radius = dimension("arch_radius_m")?;
             let (width, height) = (width?, height?);
             if radius < width / 2.0 || radius - math::sqrt(radius * radius - width * width / 4.0) > height {
-                let problem = "must be at least width_m / 2, and the arc no higher than height_m";
+                let problem = "must be at least width_m / 2; the arc must also not be higher than height_m";
                 return Err(section.invalid("arch_radius_m", problem));
             }
             shapes::arch(width, height, radius)
@@ -130,7 +130,7 @@ fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
             _ if number == 0 => {}
             _ => {
                 let start: String = line.chars().take(60).collect();
-                return Err(format!("line {} is {start:?}; expected y_m,z_m", number + 1));
+                return Err(format!("line {} is {start:?}; expected two numbers: y_m,z_m", number + 1));
             }
         }
     }
@@ -149,6 +149,9 @@ mod tests {
         let words = parse_points(&"1,2\n".repeat(MOST_POINTS + 1)).unwrap_err();
         assert!(words.starts_with("has more than 100000 points"), "{words}");
         assert!(parse_points(&format!("1,2\n{}", "3".repeat(1 << 20))).unwrap_err().len() < 200);
-        assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 is \"3;4\"; expected y_m,z_m");
+        assert_eq!(
+            parse_points("1,2\n3;4\n").unwrap_err(),
+            "line 2 is \"3;4\"; expected two numbers: y_m,z_m"
+        );
     }
 }

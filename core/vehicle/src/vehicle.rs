@@ -259,12 +259,18 @@ fn check_fineness(
     target_m: f64,
     section_m: f64,
 ) -> Result<(), ConfigError> {
-    if tunnel.length_m / section_m <= MAX_SECTIONS && wall_cells(tunnel, target_m) <= MAX_CELLS {
+    let key = if tunnel.length_m / section_m > MAX_SECTIONS {
+        "section_m"
+    } else if wall_cells(tunnel, target_m) > MAX_CELLS {
+        "target_m"
+    } else {
         return Ok(());
-    }
-    let problem =
-        "is too fine for so long a tunnel; make tunnel.length_m smaller, or this and section_m larger";
-    Err(root.invalid("target_m", problem))
+    };
+    let problem = format!(
+        "is too small for a tunnel of {} m; increase {key}, or reduce tunnel.length_m",
+        tunnel.length_m
+    );
+    Err(root.invalid(key, &problem))
 }
 
 fn parse_water(section: &Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option<String>), ConfigError> {
@@ -332,8 +338,7 @@ fn check_sound(
     if told_by.is_some_and(|(_, sensor)| sensor.sense() == Sense::Depth) {
         return Ok(());
     }
-    let problem =
-        format!("sound_speed_from = {id:?} names no depth sensor of this file; it must be the id of one");
+    let problem = format!("sound_speed_from = {id:?} is not the id of a depth sensor in this file");
     Err(root.invalid("water", &problem))
 }
 

@@ -198,9 +198,9 @@ fn wrong_polyline_is_refused_with_its_line_or_vertex() {
     two points
         headrace: vehicle.toml:6: tunnel.file = "profile.csv": a profile needs at least 3 distinct points; this one has 2
     no number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2,zero"; expected y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2,zero"; expected two numbers: y_m,z_m
     one number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2"; expected y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2"; expected two numbers: y_m,z_m
     not finite
         headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3: vertex 2 has a coordinate that is not a number within 1000 m
     not star-shaped

@@ -130,23 +130,23 @@ fn port_that_two_sensors_cannot_share_is_an_error() {
     ];
     insta::assert_snapshot!(findings(&cases), @r#"
     two Pings on one serial port: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
+    headrace: vehicle.toml:37: sensors[3].connect: is also the serial port of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     one serial port at two rates: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left" with other settings; only one sensor can open it
+    headrace: vehicle.toml:37: sensors[3].connect: is also the serial port of sensor "ping_left", but with other settings; only one sensor can open it
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on one UDP address: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the UDP address of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
+    headrace: vehicle.toml:37: sensors[3].connect: is also the UDP address of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on two: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two heads on one TCP address: 2
-    headrace: vehicle.toml:25: sensors[1].connect: is the TCP address of sensor "sonar_0", and the bytes of two imagenex881 cannot be separated there; give each its own
+    headrace: vehicle.toml:25: sensors[1].connect: is also the TCP address of sensor "sonar_0", and the bytes of two imagenex881 cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two heads of two ids there: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two units of one id on CAN: 2
-    headrace: vehicle.toml:63: sensors[8].connect: is the CAN interface of sensor "imu", and the bytes of two imu_can cannot be separated there; give each its own
+    headrace: vehicle.toml:63: sensors[8].connect: is also the CAN interface of sensor "imu", and the bytes of two imu_can cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     two units of two ids there: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
@@ -191,21 +191,21 @@ fn walls_out_of_range_and_heads_out_of_phase_are_reported() {
     as it is: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 3 m in a tunnel of 6 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: the wall is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: the wall is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 2 m there: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: the wall is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: the wall is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a tunnel of 14 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: the wall is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: the wall is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a small tunnel: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     heads in two modes: 0
-    headrace: warning: vehicle.toml:12: heads: can't interleave: the heads' turns take 3.80 s, 13.60 s; give them one mode and one range_m
+    headrace: warning: vehicle.toml:12: heads: can't interleave: the heads' turns take 3.80 s, 13.60 s; give all heads the same mode and range_m
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     negative counts: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
@@ -309,7 +309,7 @@ fn profile_finer_than_the_sonar_resolution_is_reported() {
     }
     insta::assert_snapshot!(said, @"
     600 points: nothing
-    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar resolves: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); the direction of such short edges is survey noise, and points every 10 mm are enough
+    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: has 19999 of 20000 edges shorter than 2 mm, the finest range step of a sonar; the first is 0.943 mm long, at 0.000 m round the wall (6:00); the direction of such short edges is survey noise, and points every 10 mm are enough
     ");
 }
 

@@ -67,12 +67,13 @@ pub enum ProfileError {
         reference: Yz,
     },
     /// All of the polygon lies on one side of y = 0.
-    #[error(
-        "the profile lies beside y = 0, where arc length begins at the floor; it must have points on either side"
-    )]
+    #[error("all points are on one side of y = 0; the profile needs points on both sides")]
     BesideMiddle,
     /// The curve does not wind about its reference point exactly once.
-    #[error("the profile winds {turns} times about ({y}, {z}); it must do so once", y = .reference[0], z = .reference[1])]
+    #[error(
+        "the profile goes {turns} times round the reference point ({y}, {z}); it must go round once",
+        y = .reference[0], z = .reference[1]
+    )]
     Winding {
         /// Number of turns of the curve about the reference point.
         turns: i64,
