@@ -23,7 +23,7 @@ pub enum SamplingError {
         value: f64,
     },
     /// The angular step of a head does not divide a turn.
-    #[error("a step of {step_deg} degrees doesn't divide a turn: 360 degrees are {steps} of them")]
+    #[error("a step of {step_deg} degrees doesn't divide a turn of 360 degrees: it would take {steps} steps")]
     StepDoesNotDivide {
         /// The angular step, degrees.
         step_deg: f64,
@@ -45,7 +45,7 @@ pub enum SamplingError {
         angle_deg: f64,
     },
     /// The scan plane of a head lies along the tunnel.
-    #[error("a head's axis lies across the tunnel, so its beams run along it")]
+    #[error("a head's axis lies across the tunnel, so its beams run along the tunnel")]
     HeadAskew,
     /// A head outside the tunnel's profile.
     #[error("a head at y = {y_m:.3} m, z = {z_m:.3} m is outside the tunnel's profile")]
@@ -68,14 +68,14 @@ pub enum SamplingError {
         heads: usize,
     },
     /// The heads have no common mode.
-    #[error("the heads have no mode in common, or none at all")]
+    #[error("the heads have no common mode")]
     NoCommonMode,
     /// A planning question has no target, speed or time.
-    #[error("no question: give a target, a speed or a time")]
+    #[error("nothing to plan: give a target, a speed or a time")]
     NothingAsked,
     /// Heads that are apart along the hull cannot be phased for a stationary vehicle.
     #[error(
-        "heads {apart_m} m apart along the hull have no phase at {speed_mps} m/s; it takes a speed above zero"
+        "heads {apart_m} m apart along the hull cannot be started in phase at {speed_mps} m/s; the speed must be above zero"
     )]
     NoPhaseAtRest {
         /// Distance between the heads along the hull, m.
@@ -96,14 +96,16 @@ pub enum SamplingError {
         arc_m: f64,
     },
     /// The vehicle's heading is too far off the axis, or the vehicle swings too fast.
-    #[error("no speed meets a target of {target_m} m: at this heading or swing, passes are farther apart")]
+    #[error(
+        "no speed meets a target of {target_m} m: because of the heading or swing, passes are farther apart than that"
+    )]
     OffAxis {
         /// The target T, m.
         target_m: f64,
     },
     /// Neighbouring samples of one turn are as far apart as the target.
     #[error(
-        "no speed meets a target of {target_m} m: neighbours of one turn are {t_y_m:.3} m apart, whatever the speed"
+        "no speed meets a target of {target_m} m: neighbouring samples of one turn are {t_y_m:.3} m apart at every speed"
     )]
     AngularStep {
         /// The target T, m.

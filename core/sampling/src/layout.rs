@@ -137,7 +137,7 @@ pub fn in_step(
     let sweep_s = turn_s / sector.of as f64;
     let delay_s = if speed_mps > 0.0 { sector.behind_m / speed_mps } else { 0.0 };
     not_negative(
-        "what is left of the first head's sector in radians",
+        "the remaining part of the first head's sector in radians",
         size_rad - lead.angle_rad + ROUNDING_RAD,
     )?;
     // Unfolded position in the sweep: 0 to 1 on the way out, 1 to 2 on the way back.

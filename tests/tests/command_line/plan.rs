@@ -66,7 +66,7 @@ fn plan_with_drift_yaw_and_deadline_is_printed_as_text() {
     * faster    1.2 ~ 10.60     1.17  0.065  0.120  0.414   0.065  0.687     0.687   0.706   0.71     1.41   0.054    35.7
       fastest   2.4 ~  6.80     0.58  0.130  0.239  0.782   0.065  0.441     0.441   0.830   0.83     1.66    none
 
-    fastest: no speed meets a target of 0.6 m: neighbours of one turn are 0.782 m apart, whatever the speed
+    fastest: no speed meets a target of 0.6 m: neighbouring samples of one turn are 0.782 m apart at every speed
     * finest at this speed: faster; it doesn't meet the target
     faster: 0.055 m/s from the geometry alone
     ~ extrapolated from another range setting; measure the turn period and add it to the vehicle file
@@ -210,7 +210,7 @@ fn impossible_plans_are_refused_with_the_reason() {
     --vehicle sensors.toml
         headrace: plan: sensors.toml has no profiling head
     --tunnel ceran
-        headrace: planning: no question: give a target, a speed or a time
+        headrace: planning: nothing to plan: give a target, a speed or a time
     --tunnel egg --target 0.5
         headrace: --tunnel:1: profile = "egg": must be one of ceran, ceran-blueprint, rectangle, circle, arch, trimmed_circle, polyline
     --tunnel circle,radius_m=-3 --target 0.5
