@@ -149,11 +149,12 @@ impl EffectKind for BeamConeKind {
             let width_deg = table.number("width_deg", 0.1..=60.0)?;
             let frequency_khz = table.number("frequency_khz", 600.0..=1000.0)?;
             if frequency_khz.is_some() && width_deg.is_some() {
-                return Err(table.invalid("frequency_khz", "and width_deg both say how wide the beam is"));
+                let problem = "cannot be combined with width_deg; give one of them";
+                return Err(table.invalid("frequency_khz", problem));
             }
             let bin_m = table.number("bin_m", 0.001..=1.0)?;
             if bin_m.is_some() && form != Form::Bilinear {
-                return Err(table.invalid("bin_m", "is for form = \"bilinear\" only"));
+                return Err(table.invalid("bin_m", "applies to form = \"bilinear\" only"));
             }
             Ok(Parameters { rays: rays.unwrap_or(usual), width_deg, frequency_khz, form, bin_m })
         })?))

@@ -43,8 +43,10 @@ impl EffectKind for ClockDriftKind {
             match (table.number("ppm", -1000.0..=1000.0)?, table.number("sd_ppm", 0.0..=1000.0)?) {
                 (Some(ppm), None) => Ok(Drift::Given { ppm }),
                 (None, Some(sd_ppm)) => Ok(Drift::Drawn { sd_ppm }),
-                (None, None) => Err(table.invalid("ppm", "or sd_ppm is needed")),
-                (Some(_), Some(_)) => Err(table.invalid("ppm", "and sd_ppm exclude each other")),
+                (None, None) => Err(table.invalid("ppm", "is missing; give ppm or sd_ppm")),
+                (Some(_), Some(_)) => {
+                    Err(table.invalid("ppm", "cannot be combined with sd_ppm; give one of them"))
+                }
             }
         })?))
     }
@@ -109,7 +111,7 @@ mod tests {
         let why = |keys: &str| refusal(&format!("[effects.clock_drift]\n{keys}"));
         assert!(why("ppm = 1\nsensors = [\"head_a\"]").contains("can act on: depth, imu, tether"));
         assert!(why("ppm = 1\nsensors = [\"ping\"]").contains("can act on: depth, imu, tether"));
-        assert!(why("").contains("or sd_ppm is needed"));
-        assert!(why("ppm = 1\nsd_ppm = 1").contains("exclude each other"));
+        assert!(why("").contains("is missing; give ppm or sd_ppm"));
+        assert!(why("ppm = 1\nsd_ppm = 1").contains("cannot be combined with sd_ppm"));
     }
 }

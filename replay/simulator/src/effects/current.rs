@@ -204,13 +204,16 @@ mod tests {
         let strong = why(LEGS, "speed_mps = -0.3");
         assert!(strong.starts_with("simulating current: it carries the vehicle off: leg 0"), "{strong}");
         let strong = why(PILOT, "speed_mps = -0.5");
-        assert!(strong.contains("current: it carries the vehicle off: it has not reached 40 m"), "{strong}");
+        assert!(
+            strong.contains("current: it carries the vehicle off: the vehicle has not reached 40 m"),
+            "{strong}"
+        );
         let ground = why(WAYPOINTS, "speed_mps = 0.1");
         assert!(
             ground.contains("effects.current: changes nothing: the trajectory is given over ground"),
             "{ground}"
         );
-        assert!(why(LEGS, "").contains("or gust_sd_mps must not be zero"));
+        assert!(why(LEGS, "").contains("gust_sd_mps must not be zero"));
         let out = why(LEGS, "gust_sd_mps = 1\ngust_s = 3600");
         assert!(out.contains("out of the tunnel") || out.is_empty(), "{out}");
     }

@@ -181,6 +181,6 @@ mod tests {
         let errors = errors_pa("[effects.depth_noise]\noffset_sd_pa = 1000\n");
         assert!(errors[0] != 0.0 && errors.iter().all(|error| (error - errors[0]).abs() < 1e-6));
         same_in_any_slices(&Bench::turning("[effects.depth_noise]\nnoise_pa = 300\ndrift_pa = 100\n"));
-        assert!(refusal("[effects.depth_noise]\n").contains("or offset_sd_pa or drift_pa must not be zero"));
+        assert!(refusal("[effects.depth_noise]\n").contains("offset_sd_pa, drift_pa must not be zero"));
     }
 }

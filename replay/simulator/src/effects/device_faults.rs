@@ -91,7 +91,7 @@ impl EffectKind for DeviceFaultsKind {
             let size = table.number("size", -1000.0..=1000.0)?;
             let fault = match kind {
                 Kind::Jump => Fault::Jump { size: table.required("size", size)? },
-                _ if size.is_some() => return Err(table.invalid("size", "is for kind = \"jump\" only")),
+                _ if size.is_some() => return Err(table.invalid("size", "applies to kind = \"jump\" only")),
                 Kind::Stick => Fault::Stick,
                 Kind::Die => Fault::Die,
                 Kind::Babble => Fault::Babble,

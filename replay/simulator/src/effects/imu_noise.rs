@@ -169,6 +169,6 @@ mod tests {
     #[test]
     fn time_slice_length_does_not_change_results_and_zero_noise_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
-        assert!(refusal("[effects.imu_noise]\n").contains("or accel_mps2_rthz or attitude_deg must not be"));
+        assert!(refusal("[effects.imu_noise]\n").contains("accel_mps2_rthz, attitude_deg must not be"));
     }
 }

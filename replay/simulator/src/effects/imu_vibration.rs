@@ -160,7 +160,7 @@ mod tests {
         same_in_any_slices(&Bench::turning("[effects.imu_vibration]\nfrequency_hz = 25\ngyro_degps = 1\n"));
         assert!(refusal("[effects.imu_vibration]\naccel_mps2 = 1\n").contains("frequency_hz: is missing"));
         assert!(
-            refusal("[effects.imu_vibration]\nfrequency_hz = 9\n").contains("or gyro_degps must not be zero")
+            refusal("[effects.imu_vibration]\nfrequency_hz = 9\n").contains("gyro_degps must not be zero")
         );
     }
 }

@@ -52,8 +52,9 @@ pub(super) fn some_not_zero(table: &Section<'_>, values: &[(&'static str, f64)])
     match keys.as_slice() {
         [] => Ok(()),
         [only] => Err(table.invalid(only, "must not be zero: the effect would change nothing")),
-        [first, others @ ..] => {
-            Err(table.invalid(first, &format!("or {} must not be zero", others.join(" or "))))
+        [first, ..] => {
+            let problem = format!("at least one of {} must not be zero", keys.join(", "));
+            Err(table.invalid(first, &problem))
         }
     }
 }

@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn disturbances_with_missing_or_incomplete_places_are_refused() {
         let why = |keys: &str| refusal(&format!("[effects.magnetic_disturbance]\n{keys}"));
-        assert!(why("up_to_deg = 5").contains("or places must not be zero"));
+        assert!(why("up_to_deg = 5").contains("places must not be zero"));
         assert!(why("places = [{ chainage_m = 3, deg = 2 }]").contains("places[0].length_m: is missing"));
     }
 }

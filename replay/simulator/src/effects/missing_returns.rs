@@ -85,7 +85,7 @@ impl EffectKind for MissingReturnsKind {
                 far: ramp(table, ["far_from_m", "far_to_m"], 200.0)?,
             };
             if parameters == (Parameters { runs: None, grazing: None, far: None }) {
-                let problem = "must be above zero, or grazing_from_deg or far_from_m must be given";
+                let problem = "at least one is needed: a share above zero, grazing_from_deg or far_from_m";
                 return Err(table.invalid("share", problem));
             }
             Ok(parameters)
@@ -101,8 +101,8 @@ fn ramp(table: &Section<'_>, keys: [&'static str; 2], most: f64) -> Result<Optio
             Err(table.invalid(keys[1], &format!("must not be below {}, which is {from}", keys[0])))
         }
         (Some(from), Some(to)) => Ok(Some(Ramp { from, to })),
-        (None, Some(_)) => Err(table.invalid(keys[0], &format!("is needed with {}", keys[1]))),
-        (Some(_), None) => Err(table.invalid(keys[1], &format!("is needed with {}", keys[0]))),
+        (None, Some(_)) => Err(table.invalid(keys[0], &format!("is missing; it is needed with {}", keys[1]))),
+        (Some(_), None) => Err(table.invalid(keys[1], &format!("is missing; it is needed with {}", keys[0]))),
     }
 }
 
@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn impossible_parameters_of_lost_returns_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.missing_returns]\n{keys}"));
-        assert!(refusal("").contains("must be above zero, or"));
+        assert!(refusal("").contains("a share above zero, grazing_from_deg or far_from_m"));
         assert!(refusal("share = 0.99").contains("from 0 to 0.95"));
         assert!(refusal("share = 0.9\nmean_run = 2").contains("must be at least 9.00"));
         assert!(refusal("mean_run = 2").contains("only with a share"));

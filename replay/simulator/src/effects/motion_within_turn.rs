@@ -24,7 +24,7 @@ impl EffectKind for MotionWithinTurnKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the vehicle moves while a head turns; without this effect, all pings of a turn are sent from where it began"
+        "the vehicle moves while a head turns; without this effect, all pings of a turn are sent from the pose at its start"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

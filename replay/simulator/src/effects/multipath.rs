@@ -71,7 +71,8 @@ impl EffectKind for MultipathKind {
             let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.1);
             let square_share = table.number("square_share", 0.0..=1.0)?.unwrap_or(0.0);
             if share == 0.0 && square_share == 0.0 {
-                return Err(table.invalid("share", "or square_share must be above zero"));
+                let problem = "at least one of share and square_share must be above zero";
+                return Err(table.invalid("share", problem));
             }
             let mean_run = table.number("mean_run", 1.0..=100.0)?;
             Ok(Parameters { share, square_share, mean_run })

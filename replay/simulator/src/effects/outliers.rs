@@ -85,7 +85,9 @@ impl Effect for PerSensor<Places<Parameters>> {
             let far_m = |parameters: &Parameters| parameters.far_m.unwrap_or(usual_m);
             if let Some(none) = places.all().find(|parameters| far_m(parameters) <= parameters.near_m) {
                 let (near_m, far_m) = (none.near_m, far_m(none));
-                let problem = format!("has near_m = {near_m}, beyond the farthest range of {far_m} m");
+                let problem = format!(
+                    "has near_m = {near_m}, which must be below the sensor's farthest range, {far_m} m"
+                );
                 return Err(SceneError::Effect { effect: OutliersKind.name(), problem });
             }
             let places = places.map(|it| Strays { share: it.share, between_m: [it.near_m, far_m(it)] });
@@ -161,6 +163,6 @@ mod tests {
         assert!(refusal("share = 1.5").contains("from 0 to 1"));
         assert!(refusal("share = 0").contains("above zero"));
         assert!(refusal("near_m = 5\nfar_m = 4").contains("must be above near_m"));
-        assert!(refusal("near_m = 40").contains("beyond the farthest range of 30 m"));
+        assert!(refusal("near_m = 40").contains("below the sensor's farthest range, 30 m"));
     }
 }

@@ -47,7 +47,7 @@ impl EffectKind for RangeNoiseKind {
             let sd_m = table.number("sd_m", 0.0..=1.0)?.unwrap_or(0.0);
             let sd_share = table.number("sd_share", 0.0..=0.5)?.unwrap_or(0.0);
             if sd_m == 0.0 && sd_share == 0.0 {
-                return Err(table.invalid("sd_m", "or sd_share must be above zero"));
+                return Err(table.invalid("sd_m", "at least one of sd_m and sd_share must be above zero"));
             }
             Ok(Parameters { sd_m, sd_share })
         })?))

@@ -52,13 +52,15 @@ impl EffectKind for RangeQuantisationKind {
             match (quantum_m, points) {
                 (Some(quantum_m), None) => return Ok(Step::QuantumM(quantum_m)),
                 (Some(_), Some(_)) => {
-                    return Err(table.invalid("points", "and quantum_m both set the step; give one of them"));
+                    let problem = "cannot be combined with quantum_m; give one of them";
+                    return Err(table.invalid("points", problem));
                 }
                 _ => {}
             }
             let heads = targets(table, facts, &senses)?;
             if heads.iter().any(|source| facts.sensors.get(*source).is_none_or(|s| s.head.is_none())) {
-                let problem = "is needed for echosounders, which have no range setting to divide into points";
+                let problem =
+                    "is missing; echosounders need it, as they have no range setting to divide into points";
                 return Err(table.invalid("quantum_m", problem));
             }
             Ok(Step::Points(points.unwrap_or(500.0)))
@@ -146,7 +148,10 @@ mod tests {
             |dive: &Dive, keys: &str| dive.refusal(&format!("[effects.range_quantisation]\n{keys}"));
         assert!(refusal(&Dive::with_sounder(), "").contains("no range setting"));
         assert!(refusal(&Dive::with_sounder(), "points = 200").contains("no range setting"));
-        assert!(refusal(&Dive::with_head(), "points = 200\nquantum_m = 0.1").contains("both set the step"));
+        assert!(
+            refusal(&Dive::with_head(), "points = 200\nquantum_m = 0.1")
+                .contains("cannot be combined with quantum_m")
+        );
         assert!(refusal(&Dive::with_head(), "quantum_m = 0").contains("from 0.0005 to 1"));
     }
 }

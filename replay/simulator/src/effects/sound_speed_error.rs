@@ -46,7 +46,7 @@ impl EffectKind for SoundSpeedErrorKind {
             let scale = match (true_mps, share) {
                 (Some(true_mps), None) => facts.sound_speed_mps / true_mps,
                 (None, Some(share)) => 1.0 / (1.0 + share),
-                _ => return Err(table.invalid("true_mps", "or share is needed, and not both")),
+                _ => return Err(table.invalid("true_mps", "give exactly one of true_mps and share")),
             };
             Ok(Parameters { scale })
         })?))

@@ -57,7 +57,7 @@ impl EffectKind for SoundSpeedProfileKind {
             let floor_mps = table.number("floor_mps", 1300.0..=1700.0)?;
             let per_metre_mps = table.number("per_metre_mps", -50.0..=50.0)?;
             if floor_mps.is_none() && per_metre_mps.is_none() {
-                return Err(table.invalid("floor_mps", "or per_metre_mps is needed"));
+                return Err(table.invalid("floor_mps", "is missing; give floor_mps, per_metre_mps or both"));
             }
             Ok(Parameters {
                 floor_mps: floor_mps.unwrap_or(facts.sound_speed_mps),
@@ -153,6 +153,6 @@ mod tests {
     fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
-        assert!(refusal.contains("or per_metre_mps is needed"), "{refusal}");
+        assert!(refusal.contains("is missing; give floor_mps, per_metre_mps or both"), "{refusal}");
     }
 }

@@ -59,7 +59,10 @@ fn offset(table: &Section<'_>, facts: &Facts) -> Result<Offset, ConfigError> {
             }
             Ok(Offset::Given(heads.into_iter().zip(given.into_iter().map(f64::to_radians)).collect()))
         }
-        _ => Err(table.invalid_itself("has more than one of max_deg, sd_deg and offsets_deg")),
+        _ => {
+            let problem = "has more than one of max_deg, sd_deg and offsets_deg; give one of them";
+            Err(table.invalid_itself(problem))
+        }
     }
 }
 

@@ -81,7 +81,8 @@ pub(super) fn targets(
         }
     }
     if sources.is_empty() {
-        return Err(table.invalid("sensors", "names none; leave it out to mean all"));
+        let problem = "is empty; remove it to name all sensors that the effect can act on";
+        return Err(table.invalid("sensors", problem));
     }
     Ok(sources)
 }

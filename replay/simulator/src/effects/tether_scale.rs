@@ -143,7 +143,10 @@ mod tests {
     #[test]
     fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_scale]\nshare = -0.01\nstiffness_n = 5e4\n"));
-        assert!(refusal("[effects.tether_scale]\n").contains("share: or stiffness_n must not be zero"));
+        assert!(
+            refusal("[effects.tether_scale]\n")
+                .contains("share: at least one of share, stiffness_n must not be zero")
+        );
         assert!(refusal("[effects.tether_scale]\ndrag_npm = 1\n").contains("only with stiffness_n"));
         assert!(refusal("[effects.tether_scale]\nshare = 0.2\n").contains("from -0.1 to 0.1"));
     }

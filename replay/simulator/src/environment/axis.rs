@@ -254,12 +254,12 @@ fn parse_piece(section: &Section<'_>, half_width_m: f64) -> Result<(f64, f64), C
     let turn_deg = section.number("turn_deg", -180.0..=180.0)?;
     let Some(radius_m) = radius_m else {
         if turn_deg.is_some() {
-            return Err(section.invalid("turn_deg", "is for an arc; give radius_m with it"));
+            return Err(section.invalid("turn_deg", "needs radius_m: only an arc has a turn"));
         }
         return Ok((section.required("length_m", length_m)?, 0.0));
     };
     if length_m.is_some() {
-        let problem = "excludes radius_m; an arc's length follows from its radius and turn";
+        let problem = "cannot be combined with radius_m; an arc's length follows from radius_m and turn_deg";
         return Err(section.invalid("length_m", problem));
     }
     let turn_deg = section.required("turn_deg", turn_deg)?;

@@ -43,7 +43,7 @@ pub(super) fn parse(tables: &[Section<'_>], site: &Site<'_>) -> Result<(Vec<Bulg
     let (mut bulges, mut heaps) = (Vec::new(), Vec::new());
     for (number, table) in tables.iter().enumerate() {
         let feature = u16::try_from(number)
-            .map_err(|_| table.invalid("kind", "is one feature too many; at most 65536"))?;
+            .map_err(|_| table.invalid("kind", "exceeds the limit of 65536 features"))?;
         table.part(|| {
             match keys::kind(table)? {
                 Kind::Bulge => add(&mut bulges, parse_bulge(table, site, feature)?, table, site)?,
@@ -141,8 +141,8 @@ fn add(
     let (length_m, width_m) = (2.0 * bulge.half_length_m, 2.0 * bulge.half_width_m);
     if depth_m > DEEPEST_ASPECT * length_m.min(width_m) {
         return refuse(format!(
-            "makes a patch of {depth_m:.3} m that is {length_m:.3} m long and {width_m:.3} m wide; it must be at least \
-             as long and as wide as deep"
+            "makes a patch {depth_m:.3} m deep, {length_m:.3} m long and {width_m:.3} m wide; it must be at least as long \
+             and as wide as it is deep"
         ));
     }
     let perimeter_m = site.profile.perimeter_m();
@@ -152,8 +152,8 @@ fn add(
         let least_m = DEEPEST_SHARE * nearest_wall_m(&bulge, site);
         if inwards_m > least_m {
             return refuse(format!(
-                "moves the wall by {inwards_m:.3} m, with the patches that overlap it; at most {least_m:.3} m there, or \
-                 it would come too near to the profile's reference point"
+                "moves the wall by {inwards_m:.3} m, together with the patches that overlap it; at most {least_m:.3} m is \
+                 allowed, so that the wall keeps away from the profile's reference point"
             ));
         }
     } else {
@@ -163,7 +163,7 @@ fn add(
         if reach_m * LEAST_RADIUS_HALF_WIDTHS * curvature_pm > 1.0 {
             let radius_m = 1.0 / curvature_pm;
             return refuse(format!(
-                "lets the tunnel reach {reach_m:.3} m to the side; with a bend of radius {radius_m:.3} m, at most half that"
+                "lets the tunnel reach {reach_m:.3} m to the side; the tightest bend has a radius of {radius_m:.3} m, and at most half of that is allowed"
             ));
         }
     }

@@ -98,13 +98,14 @@ fn parse_wall(
 ) -> Result<MeshWall, ConfigError> {
     let Place { chainage_m, across_m } = Place::parse(table, site)?;
     if table.keys().contains(&"yaw_deg") {
-        return Err(table.invalid("yaw_deg", "is for a body; a wall follows the axis"));
+        return Err(table.invalid("yaw_deg", "applies to a body only; a wall follows the axis"));
     }
     let mesh = read(table, Role::Wall, load)?;
     let x_m = mesh.closed_m();
     let (from_m, to_m) = (chainage_m + x_m.0, chainage_m + x_m.1);
     if to_m - from_m < SHORTEST_M {
-        let problem = format!("has {:.3} m of wall along x; at least {SHORTEST_M} m", to_m - from_m);
+        let problem =
+            format!("has {:.3} m of wall along x; at least {SHORTEST_M} m is needed", to_m - from_m);
         return Err(table.invalid("file", &problem));
     }
     // The origin may lie beyond a bend of the axis. The x-axis of the mesh continues straight.
@@ -146,10 +147,14 @@ fn check(
     let mut stations = site.scales.breaks();
     let is_within = |at_m: f64| (wall.from_m..=wall.to_m).contains(&at_m);
     if let Some(at_m) = stations.find(|at_m| is_within(*at_m)) {
-        return refuse(&format!("holds the station at {at_m} m; let the profile keep its size there"));
+        return refuse(&format!(
+            "contains the station at {at_m} m; the profile must have a constant scale there"
+        ));
     }
     if site.scales.slope_pm(wall.from_m, wall.to_m) != 0.0 {
-        return refuse("lies between stations of different scale; let the profile keep its size there");
+        return refuse(
+            "lies between stations of different scale; the profile must have a constant scale there",
+        );
     }
     if let Some(bulge) = bulges.iter().find(|bulge| overlaps(bulge.begin_m(), bulge.end_m())) {
         return refuse(&format!("overlaps tunnel.features[{}], which displaces the wall", bulge.feature));

@@ -38,7 +38,7 @@ pub(super) fn rock_trap(
     let floor_m = ground.tube.scaled(chainage_m, profile.point_at(0.0))[1];
     let half_width_m = width_m / 2.0;
     let top_m = edge_m(ground, chainage_m, half_width_m).ok_or_else(|| {
-        table.invalid("width_m", "is more than the tunnel has at its reference point's height")
+        table.invalid("width_m", "is more than the tunnel's width at the height of its reference point")
     })?;
     let bottom_m = floor_m - depth_m;
     let frame = ground.frame(chainage_m, [0.0, f64::midpoint(top_m, bottom_m)]);

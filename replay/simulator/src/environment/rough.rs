@@ -42,7 +42,8 @@ impl Roughness {
         for table in tables {
             let stretch = Stretch::read(&table, tunnel_m)?;
             if all.iter().any(|(other, _)| other.meets(&stretch)) {
-                return Err(table.invalid("from_m", "and to_m reach into an earlier rough stretch"));
+                let problem = "begins a stretch that overlaps an earlier rough stretch";
+                return Err(table.invalid("from_m", problem));
             }
             let sd_m = table.required("sd_m", table.number("sd_m", 0.001..=0.3)?)?;
             let length_m = table.number("length_m", 0.02..=5.0)?.unwrap_or(0.3);

@@ -30,13 +30,13 @@ impl Scales {
             let scale = section.required("scale", section.number("scale", 0.2..=5.0)?)?;
             if let Some((before_m, before)) = stations.last() {
                 if chainage_m <= *before_m {
-                    let problem = format!("must be more than the station's before, {before_m} m");
+                    let problem = format!("must be above the previous station's chainage, {before_m} m");
                     return Err(section.invalid("chainage_m", &problem));
                 }
                 let least_m = (scale - before).abs() * farthest_m / STEEPEST;
                 if chainage_m - before_m < least_m {
                     let problem = format!(
-                        "moves the wall by {least_m:.3} m within {:.3} m of tunnel; at most {STEEPEST} m a metre",
+                        "moves the wall by {least_m:.3} m within {:.3} m of tunnel; at most {STEEPEST} m a metre is allowed",
                         chainage_m - before_m
                     );
                     return Err(section.invalid("scale", &problem));

@@ -140,7 +140,7 @@ impl Described {
         self.temperature_degc = water.number("temperature_degc", 0.0..=40.0)?;
         self.per_metre_degc = water.number("warmer_per_metre_degc", -5.0..=5.0)?;
         if self.per_metre_degc.is_some() && self.temperature_degc.is_none() {
-            let problem = "needs temperature_degc, that of the water at the floor";
+            let problem = "needs temperature_degc, the temperature of the water at the floor";
             return Err(water.invalid("warmer_per_metre_degc", problem));
         }
         for table in water.sections("murk")? {

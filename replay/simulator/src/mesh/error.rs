@@ -10,13 +10,13 @@ pub enum MeshError {
     #[error("reading PLY: {0}")]
     File(String),
     /// No triangle is left in the mesh after triangles with two coinciding corners are dropped.
-    #[error("the mesh has no face ({given} given; those with two corners in one place don't count)")]
+    #[error("the mesh has no face ({given} given; triangles with two equal corners are ignored)")]
     NoFaces {
         /// Number of triangles in the input. Each has two coinciding corners.
         given: usize,
     },
     /// The mesh has more elements than 32 bits can number.
-    #[error("the mesh has {given} {what}; at most {} can be numbered", u32::MAX)]
+    #[error("the mesh has {given} {what}; at most {} are allowed", u32::MAX)]
     TooMany {
         /// Kind of element: vertices or faces.
         what: &'static str,
@@ -24,7 +24,7 @@ pub enum MeshError {
         given: usize,
     },
     /// A triangle refers to a vertex that does not exist.
-    #[error("face {face} has vertex {vertex} as a corner, of {vertices} vertices (both counted from 0)")]
+    #[error("face {face} refers to vertex {vertex}, but there are {vertices} vertices (both counted from 0)")]
     NoSuchVertex {
         /// Number of the face that refers to a missing vertex.
         face: usize,

@@ -47,7 +47,7 @@ pub fn read(bytes: &[u8]) -> Result<Triangles, MeshError> {
                     let [first, second, third, ..] = corners.as_slice() else {
                         let found = corners.len();
                         let why = format!(
-                            "face {number} (counted from 0) has {found} corners; at least 3 make one"
+                            "face {number} (counted from 0) has {found} corners; a face needs at least 3"
                         );
                         return Err(MeshError::File(why));
                     };

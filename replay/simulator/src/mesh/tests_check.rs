@@ -14,7 +14,7 @@ fn corner_numbers_and_coordinates_out_of_range_are_refused() {
     t.faces[5][1] = 8;
     assert_eq!(
         refused(&t, Role::Body),
-        "face 5 has vertex 8 as a corner, of 8 vertices (both counted from 0)"
+        "face 5 refers to vertex 8, but there are 8 vertices (both counted from 0)"
     );
     for (value, shown) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (1e6, "1000000.000")] {
         let mut t = cube.clone();
@@ -28,7 +28,7 @@ fn corner_numbers_and_coordinates_out_of_range_are_refused() {
 
 #[test]
 fn degenerate_triangles_are_dropped() {
-    let none = "the mesh has no face (0 given; those with two corners in one place don't count)";
+    let none = "the mesh has no face (0 given; triangles with two equal corners are ignored)";
     assert_eq!(refused(&Triangles::default(), Role::Wall), none);
     let mut t = cuboid([1.0; 3]);
     let point = Triangles { vertices: vec![[7.0; 3]; 3], faces: vec![[0, 1, 2]] };

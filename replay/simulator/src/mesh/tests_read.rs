@@ -118,8 +118,8 @@ fn faults_in_text_ply_files_are_described() {
         ("3 0 1 2\n", "", "Line 13: "),
         ("3 0 1 2", "3 0 1 0.5", "Line 13: "),
         ("3 0 1 2", "3 0 1 -1", "Line 13: "),
-        ("3 0 1 2", "2 0 1", "face 0 (counted from 0) has 2 corners; at least 3 make one"),
-        ("3 0 1 2", "0", "face 0 (counted from 0) has 0 corners; at least 3 make one"),
+        ("3 0 1 2", "2 0 1", "face 0 (counted from 0) has 2 corners; a face needs at least 3"),
+        ("3 0 1 2", "0", "face 0 (counted from 0) has 0 corners; a face needs at least 3"),
         ("3 0 1 2", "3 0 1 2\n3 0 1 2", "7 more bytes after the last element"),
     ] {
         let words = refused(good.replacen(from, to, 1).as_bytes());
@@ -130,7 +130,7 @@ fn faults_in_text_ply_files_are_described() {
         "reading PLY: Line 13: Couldn't read element line. String: '3 0 1 ' Error: Expected 3 list elements, but found only 2."
     );
     let words = refused(good.replace("3 0 1 2", "3 0 1 3").as_bytes());
-    assert_eq!(words, "face 0 has vertex 3 as a corner, of 3 vertices (both counted from 0)");
+    assert_eq!(words, "face 0 refers to vertex 3, but there are 3 vertices (both counted from 0)");
     // An error quotes only the start of a long line.
     let words = refused(good.replace("1 0 0", &"x".repeat(100_000)).as_bytes());
     assert!(words.len() < 400, "{words}");
@@ -147,7 +147,7 @@ fn faults_in_binary_ply_files_are_described() {
     let words = refused(&wrong);
     assert!(words.contains("'vertex_indices'") && words.contains("unsupported"), "{words}");
     wrong[faces + 1] = 0x7F;
-    assert!(refused(&wrong).starts_with("face 0 has vertex 2147483647 as a corner, of 42 vertices"));
+    assert!(refused(&wrong).starts_with("face 0 refers to vertex 2147483647, but there are 42 vertices"));
     let mut wrong = binary;
     // Offset of the x of the first vertex, after the header, two cameras and the vertex's colour.
     let x = faces - 42 * 31 + 1;

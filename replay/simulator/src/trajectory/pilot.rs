@@ -68,7 +68,8 @@ impl Pilot {
                 break;
             }
             if step > most {
-                return Err(format!("has not reached {} m after {most} half seconds", self.to_m));
+                let after_s = most as f64 * STEP_S;
+                return Err(format!("the vehicle has not reached {} m after {after_s} s", self.to_m));
             }
             doing = self.decide(doing, stick, step as u64);
             if (x_m - self.from_m) * towards <= 0.0 && matches!(doing, Doing::Back { .. }) {
@@ -133,7 +134,7 @@ impl Piloted {
 
     /// Recomputes the pilot's trajectory for a current.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
-        self.go(flow).map_err(|why| format!("carries the vehicle off: it {why}"))
+        self.go(flow).map_err(|why| format!("carries the vehicle off: {why}"))
     }
 
     fn go(&mut self, flow: &Flow) -> Result<(), String> {

@@ -121,7 +121,7 @@ fn time_slice_length_does_not_change_results() {
 fn impossible_beams_are_refused() {
     let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.beam_cone]\n{keys}"));
     assert!(refusal("rays = 1025").contains("must be a whole number from 1 to 1024"));
-    assert!(refusal("width_deg = 2\nfrequency_khz = 700").contains("both say how wide"));
+    assert!(refusal("width_deg = 2\nfrequency_khz = 700").contains("cannot be combined with width_deg"));
     assert!(refusal("bin_m = 0.02").contains("bilinear"));
     assert!(refusal("form = \"last\"").contains("must be one of first, mean, bilinear"));
     assert!(refusal("rings = 3").contains("is not a key here"));

@@ -26,7 +26,7 @@ fn too_tight_or_reversing_axes_are_refused() {
     refused(
         "[[tunnel.axis]]\nradius_m = 60\nlength_m = 3\nturn_deg = 30",
         "length_m = 3",
-        "excludes radius_m",
+        "cannot be combined with radius_m",
     );
     refused("[[tunnel.axis]]\nlength_m = 60\nturn_deg = 30", "turn_deg = 30", "give radius_m");
     refused("[[tunnel.axis]]\nlength_m = 0", "length_m = 0", "0.01");
