@@ -117,7 +117,9 @@ fn text(difference: &Difference, sources: &[SourceInfo]) -> String {
             format!("{place}: {kind}{of}: {field} live {live}, replayed {replayed}")
         }
         What::Kind { live, replayed } => {
-            format!("{place}: live {live}, replayed {replayed}, or with other fields")
+            format!(
+                "{place}: the results differ in kind or number of fields: live {live:?}, replayed {replayed:?}"
+            )
         }
         What::Missing => format!("{place}: missing in the replay"),
         What::Added => format!("{place}: only in the replay"),

@@ -71,7 +71,7 @@ pub enum DriveError {
     /// The loops differ in more than their sections, so they can't share one navigation.
     #[error(
         "driving several loops with one navigation: loop {number}, counted from 0, has other sensors, another tunnel or layout than \
-         loop 0, or systems of its own that place pings"
+         loop 0, or adds its own processing of pings"
     )]
     Unlike {
         /// Index of the loop that differs from loop 0.

@@ -39,7 +39,7 @@ pub enum EffectInfluenceError {
     #[error(transparent)]
     Drive(#[from] DriveError),
     /// There are too few seeds for a confidence interval.
-    #[error("measuring worth: {0} seeds; an interval needs at least 2")]
+    #[error("measuring the effects: {0} seeds; a confidence interval needs at least 2")]
     Seeds(usize),
 }
 

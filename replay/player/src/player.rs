@@ -157,7 +157,7 @@ impl Player {
         let clock = self.clock.iter().flat_map(|clock| self.astray.iter().map(move |found| (clock, found)));
         for (clock, (id, (count, first))) in clock {
             all.push(format!(
-                "{count} messages of source {id:?} left out: they are stamped by another clock, {} that of most messages",
+                "{count} messages of source {id:?} left out: their timestamps are {} those of most messages",
                 clock.distance(*first)
             ));
         }

@@ -390,7 +390,7 @@ fn file_that_is_no_log_is_refused_with_the_reason() {
     headrace: empty.mcap is not an MCAP file: it begins with []; expected [89 4d 43 41 50 30 0d 0a]
     headrace: text.mcap is not an MCAP file: it begins with [6e 61 6d 65 20 3d 20 22]; expected [89 4d 43 41 50 30 0d 0a]
     headrace: could not open missing.mcap: No such file or directory (os error 2)
-    headrace: ./dive.mcap is not a part of a recording, and only the parts of one are read as one log; name a single log, or the parts alone
+    headrace: ./dive.mcap is not a part of a recording; name one log, or only the parts of one recording
     ");
 }
 

@@ -32,7 +32,7 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     write_log(&folder.path("mixed.mcap"), WriteOptions::new(), None, &messages);
     let answer = replay(&folder, "mixed.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: they are stamped by another clock, 56.8 years after that of most messages"#);
+    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years after those of most messages"#);
 
     // The result is the same if the messages of the other clock come first, because the majority decides.
     for message in &mut messages {
@@ -44,7 +44,7 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     write_log(&folder.path("mixed.mcap"), WriteOptions::new(), None, &messages);
     let answer = replay(&folder, "mixed.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: they are stamped by another clock, 56.8 years before that of most messages"#);
+    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years before those of most messages"#);
 }
 
 #[test]

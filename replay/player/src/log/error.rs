@@ -77,7 +77,7 @@ pub enum LogError {
     },
     /// There are several logs, and one of them isn't part of a recording.
     #[error(
-        "{} is not a part of a recording, and only the parts of one are read as one log; name a single log, or the parts alone",
+        "{} is not a part of a recording; name one log, or only the parts of one recording",
         path.display()
     )]
     NotAPart {
@@ -86,7 +86,7 @@ pub enum LogError {
     },
     /// The files are parts of different recordings.
     #[error(
-        "{} and {} are parts of different recordings ({one_dive} and {other_dive}); name the parts of one",
+        "{} and {} are parts of different recordings ({one_dive} and {other_dive}); name only the parts of one recording",
         one.display(), other.display()
     )]
     OtherDive {
@@ -116,13 +116,13 @@ pub enum LogError {
         topic: String,
     },
     /// The header declares no channel for a message.
-    #[error("a message for {channel}, which the log's header does not announce")]
+    #[error("could not write a message of {channel}: the log's header does not define this channel")]
     NoChannel {
         /// Kind and number of the undeclared channel.
         channel: String,
     },
     /// A tick has more packets than a tick message can count.
-    #[error("a tick of {packets} packets can't be written; a message holds up to {}", u32::MAX)]
+    #[error("could not write a tick of {packets} packets: a tick message can count at most {}", u32::MAX)]
     TickTooLong {
         /// Number of packets in the tick.
         packets: usize,
@@ -135,7 +135,7 @@ pub enum LogError {
     },
     /// At the end of a recording, the medium neither accepts data nor fails.
     #[error(
-        "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; how much of the log is on it isn't known"
+        "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; the log's end may be missing"
     )]
     Stuck {
         /// Time that the program has waited for the medium, s.

@@ -215,12 +215,12 @@ impl fmt::Display for LossKind {
                 write!(out, "{messages} messages are out of order: they follow messages with higher numbers")
             }
             Self::Misplaced => out.write_str(
-                "a chunk with a record that no chunk may contain, such as another chunk: that record is not read",
+                "a chunk with a record that is not allowed in chunks, such as another chunk: the record is not read",
             ),
             Self::Attachment(name) => write!(out, "attachment {name:?} is damaged"),
             Self::Metadata(name) => write!(out, "metadata {name:?} is damaged"),
             Self::UnknownChannel { channel, messages } => {
-                write!(out, "{messages} messages of channel {channel}, which is defined nowhere")
+                write!(out, "{messages} messages of channel {channel}, which the log doesn't define")
             }
             Self::Conflict { channel } => write!(out, "channel {channel} is defined twice, differently"),
             Self::Displaced => out.write_str(
@@ -253,14 +253,14 @@ impl LossKind {
             }
             Self::PartUnlike { part, messages, wanted } => write!(
                 out,
-                "part {part} is not the one that was recorded: it states {messages} messages so far, and the next part \
-                 {wanted}"
+                "part {part} is not the one that was recorded: it states {messages} messages so far, but the next part \
+                 states {wanted}"
             ),
             Self::PartUnreadable { part, why } => {
                 write!(out, "the file that is named like part {part} can't be read: {why}")
             }
             Self::PartByName { part } => {
-                write!(out, "part {part} doesn't state its number, which was taken from its name")
+                write!(out, "part {part}: its number is unreadable and was taken from the file name")
             }
             _ => Ok(()),
         }

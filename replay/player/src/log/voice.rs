@@ -36,7 +36,7 @@ pub enum NotKept {
 #[non_exhaustive]
 pub enum VoiceMessageError {
     /// The message is shorter than the fields at its beginning.
-    #[error("a voice message of {0} bytes is cut off in its head")]
+    #[error("a voice message of {0} bytes is too short for its header")]
     Short(usize),
     /// The recording in the message is invalid.
     #[error(transparent)]

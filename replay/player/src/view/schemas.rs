@@ -203,16 +203,16 @@ fn log() -> Value {
 fn vehicle() -> Value {
     let properties = json!({
         "timestamp": time(),
-        "position": text("\"known\", or what it lacks."),
+        "position": text("\"known\", or the reason why the position is unknown."),
         "chainage_m": number("Chainage, metres."),
-        "left_m": number("Place left of the axis, metres."),
-        "up_m": number("Place above the floor's centre, metres."),
+        "left_m": number("Position left of the axis, metres."),
+        "up_m": number("Position above the floor's centre, metres."),
         "roll_deg": number("Roll, degrees."),
         "pitch_deg": number("Pitch, degrees."),
         "yaw_deg": number("Yaw against the tunnel, degrees."),
         "speed_mps": number("Speed along the tunnel, metres a second, positive inwards."),
         "chainage_sd_m": number("Standard deviation of the chainage, metres."),
-        "place_sd_m": number("Standard deviation of the place in the section, in the worse direction, metres."),
+        "place_sd_m": number("Standard deviation of the position in the cross-section, in the worse direction, metres."),
         "tilt_sd_deg": number("Standard deviation of roll or pitch, degrees."),
         "yaw_sd_deg": number("Standard deviation of yaw, degrees."),
     });
@@ -228,13 +228,13 @@ fn section() -> Value {
         "end_m": number("Chainage at which it ends, metres."),
         "verdict": text("pass, fail, cannot_say or open."),
         "hole_m": number("Diameter of its largest hole, metres."),
-        "hole_sd_m": number("Standard deviation of that, metres."),
+        "hole_sd_m": number("Standard deviation of the hole's diameter, metres."),
         "hole_x_m": number("Chainage of the hole's centre, metres."),
-        "hole_clock": text("Its place on a clock seen looking along the tunnel."),
+        "hole_clock": text("Clock position of the hole's centre, looking along the tunnel."),
         "target_m": number("The target, metres."),
-        "flagged": described("boolean", "Going on won't mend it."),
-        "cause": text("Why it fails; empty where it doesn't."),
-        "words": text("The same for people."),
+        "flagged": described("boolean", "Driving on can't fill the hole."),
+        "cause": text("Reason why the section fails; empty if it doesn't fail."),
+        "words": text("Text about the section, for people."),
     });
     object(&properties, &[])
 }
@@ -244,11 +244,11 @@ fn missed() -> Value {
         "from_m": number("Chainage at which it begins, metres."),
         "to_m": number("Chainage at which it ends, metres."),
         "hole_m": number("Diameter of its largest hole, metres."),
-        "cause": text("Why it was missed."),
+        "cause": text("Reason why the stretch was missed."),
     });
     let properties = json!({
         "timestamp": time(),
-        "missed_m": number("Length of tunnel that is flagged in all, metres."),
+        "missed_m": number("Total length of the flagged sections, metres."),
         "stretches": list(&object(&stretch, &[])),
     });
     object(&properties, &[])
@@ -257,11 +257,11 @@ fn missed() -> Value {
 fn advice() -> Value {
     let properties = json!({
         "timestamp": time(),
-        "v_max_mps": number("The largest speed at which the target is met, metres a second; 0 where none is."),
-        "speed_mps": number("Speed then, metres a second."),
+        "v_max_mps": number("The largest speed at which the target is met, metres a second; 0 if no speed meets it."),
+        "speed_mps": number("Speed at that time, metres a second."),
         "will_exceed": described("boolean", "The present turn will exceed the target."),
-        "reason": text("What decides."),
-        "words": text("The same for people."),
+        "reason": text("Factor that limits the speed."),
+        "words": text("Text of the advice, for people."),
     });
     object(&properties, &["speed_mps"])
 }
