@@ -355,7 +355,7 @@ pub(super) fn observation_text(kind: ObservedKind, head: &str, occurrence: Occur
             format!("ch {x}  returns of {head} differ by {:.2} m: noise; they are ignored", off_m.abs())
         }
         ObservedKind::HeadConstant => format!(
-            "ch {x}  {head} measures {off_m:.2} m at every angle: its own frame or a bubble; its returns are ignored"
+            "ch {x}  {head} measures {off_m:.2} m at every angle, perhaps its own frame or a bubble; its returns are ignored"
         ),
         ObservedKind::HeadOutvoted => format!(
             "ch {x}  {head} measures the wall {off_m:+.2} m away from that of the other heads; its returns are ignored"

@@ -242,7 +242,7 @@ fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<Meas
             .iter()
             .any(|known: &MeasuredTurn| known.step_counts == step_counts && known.range_m == range_m)
         {
-            return Err(table.invalid("range_m", "has its period in this mode already"));
+            return Err(table.invalid("range_m", "already has a turn period in this mode"));
         }
         measured.push(MeasuredTurn { step_counts, range_m, period: DurNs::from_secs_f64(turn_s) });
         table.finish()?;

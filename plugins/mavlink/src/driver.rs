@@ -134,7 +134,7 @@ impl Driver for MavlinkDriver {
                 Some(format!("no messages from system {id}; check system_id"))
             }
             Some(_) => Some(
-                "the autopilot sends other messages, but not this one; check message and its stream rates"
+                "the autopilot sends other messages, but not the one of this sensor; check the key message and the autopilot's stream rates"
                     .to_owned(),
             ),
         };

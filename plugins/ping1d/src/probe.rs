@@ -42,8 +42,8 @@ impl Probe for PingProbe {
         } = device;
         let kind = match device_type {
             1 => "Ping echosounder (Ping1D, Ping2)".to_owned(),
-            2 => "Ping360, no echosounder".to_owned(),
-            other => format!("Ping device of type {other}, no echosounder"),
+            2 => "Ping360, not an echosounder".to_owned(),
+            other => format!("Ping device of type {other}, not an echosounder"),
         };
         let version = self
             .protocol
@@ -98,6 +98,6 @@ mod tests {
         let answer = Addressed { source: 2, destination: 0, message }.encode().unwrap();
         let mut probe = PingProbe::default();
         probe.heard(answer.as_slice());
-        assert!(probe.identity().unwrap().starts_with("Ping360, no echosounder, device_id = 2"));
+        assert!(probe.identity().unwrap().starts_with("Ping360, not an echosounder, device_id = 2"));
     }
 }

@@ -103,11 +103,11 @@ impl ListedAlert {
                 min => format!("{min:.0} min of the dive left"),
             },
             (_, Figures::Stalled(seconds @ ..60)) => {
-                format!("computer stalled for {seconds} s: data came late, or were lost")
+                format!("computer stalled for {seconds} s: data arrived late or were lost")
             }
             (_, Figures::Stalled(seconds)) => {
                 format!(
-                    "computer stalled or off for {} min: data of this time are missing",
+                    "computer stalled or off for {} min: there are no data from this time",
                     seconds.div_ceil(60)
                 )
             }

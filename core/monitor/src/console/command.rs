@@ -234,7 +234,7 @@ impl Values {
             };
         }
         if id.is_some() || seconds.is_some() {
-            return Err("\"id\" and \"seconds\" with voice, voiced and stalled alone");
+            return Err("\"id\" and \"seconds\" only with voice, voiced or stalled");
         }
         Ok(match (what.as_str(), alert, by, text, fails, battery_pct) {
             ("acknowledge", Some(alert), Some(by), None, None, None) => Command::Acknowledge { alert, by },
@@ -356,7 +356,9 @@ impl Scan<'_> {
 
     fn alert(&mut self) -> Result<u32, CommandError> {
         let at = self.at;
-        self.number().parse().map_err(|_| CommandError { at, expected: "a number of an alert, or 0 for all" })
+        self.number()
+            .parse()
+            .map_err(|_| CommandError { at, expected: "the number of an alert, or 0 for all" })
     }
 
     /// A whole number from 1 to `most` in a JSON text.

@@ -70,7 +70,10 @@ async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
         )
     } else if changes && !shared.access.is_origin(headers) {
         Shared::count(&shared.counts.foreign, 1);
-        plain(StatusCode::FORBIDDEN, "from another page; allow it with --page-origin\n")
+        plain(
+            StatusCode::FORBIDDEN,
+            "this request came from another page; allow that page with --page-origin\n",
+        )
     } else {
         next.run(request).await
     };

@@ -49,7 +49,7 @@ pub(super) fn metrics(shared: &Shared) -> String {
     put(
         "page_dropped_lines_total",
         "counter",
-        "Lines dropped because the queue was full.",
+        "Events dropped because the queue was full.",
         model.dropped().told as f64,
     );
     put("page_sections", "gauge", "Sections in the page's memory.", model.sections() as f64);
