@@ -55,7 +55,7 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     assert_eq!(within.count(), 0, "{unsure:?}");
     let states = of(&lines, "state");
     let unsure_m = |state: &&&Value| figure(&state["metres"], "cannot_say_m");
-    assert!(states.iter().map(|state| unsure_m(&state)).fold(0.0, f64::max) > 1.0, "the test sees nothing");
+    assert!(states.iter().map(|state| unsure_m(&state)).fold(0.0, f64::max) > 1.0, "no section was unsure");
     let end = &of(&lines, "end")[0];
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }

@@ -1,7 +1,7 @@
 //! Checks the flags of two hundred short dives against their definition.
 //!
-//! A flag is raised when further forward motion can no longer undo a fail, and cleared when a later pass fills the
-//! hole. The oracle has the poses and all samples, but not the order in which the loop judges sections.
+//! A flag is raised when driving on can no longer undo a fail, and cleared when a later pass fills the hole. The oracle
+//! has the poses and all samples, but not the order in which the loop judges sections.
 
 use headrace_coverage::Verdict;
 use std::sync::LazyLock;
@@ -118,7 +118,7 @@ fn flag_is_raised_within_25_cm_of_the_point_of_no_return() {
             late.extend(is_late.filter(|is| *is).map(|_| format!("seed {}: {flag:?}", judged.seeded.seed)));
         }
     }
-    assert!(on_time > 60 && late.is_empty(), "{on_time} on time, not {late:#?}");
+    assert!(on_time > 60 && late.is_empty(), "{on_time} flags on time; late: {late:#?}");
 }
 
 #[test]

@@ -118,7 +118,7 @@ fn full_disk_leaves_a_truncated_log() {
 }
 
 #[test]
-fn failure_of_one_recording_keeps_the_other() {
+fn failure_of_one_recording_does_not_affect_the_other() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
