@@ -37,7 +37,7 @@ fn print(name: &str, figures: &Figures) {
 
 /// No section far over the target passes. At most one in forty of all sections over the target passes.
 #[test]
-fn at_most_one_in_forty_sections_over_the_target_passes() {
+fn no_section_far_over_the_target_passes_in_field_dives() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     for condition in [Condition::Clean, Condition::DataSheet, Condition::Lively] {
         for start_m in [16.0, 6900.0] {

@@ -83,7 +83,7 @@ fn every_permanent_fail_is_flagged() {
 #[test]
 fn no_flag_is_raised_while_the_hole_can_still_be_filled() {
     every_flag(forward, |judged, due, _| {
-        is_early(judged, due).then_some("raised though going on could have undone it")
+        is_early(judged, due).then_some("raised although driving on could have undone it")
     });
 }
 
@@ -162,7 +162,7 @@ fn filled_hole_has_no_flag() {
     every_flag(reversing, |judged, due, _| {
         let section = judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
         let stands = due.raised_s.is_some() && due.cleared_s.is_none();
-        (stands && section.verdict == Verdict::Pass).then_some("passes, and keeps its flag")
+        (stands && section.verdict == Verdict::Pass).then_some("passes but keeps its flag")
     });
 }
 
@@ -190,7 +190,7 @@ fn no_flag_is_raised_while_the_fail_can_still_be_undone() {
     // raised.
     every_flag(
         |judged| forward(judged) && direct(judged),
-        |judged, _, due| is_early(judged, due).then_some("raised though going on could have undone it"),
+        |judged, _, due| is_early(judged, due).then_some("raised although driving on could have undone it"),
     );
 }
 

@@ -174,7 +174,7 @@ fn millimetre_range_errors_under_a_round_vault_are_not_reported_as_rotation() {
 }
 
 #[test]
-fn local_wall_deviations_are_not_reported_as_settings() {
+fn local_wall_deviations_are_not_reported_as_wrong_settings() {
     for name in ["collapse", "boulders", "steel", "vita1-field"] {
         let path = headrace_tests::root().join(format!("deploy/scenes/{name}.toml"));
         let text = std::fs::read_to_string(path).unwrap().replace("../vehicles/", "");

@@ -207,7 +207,7 @@ fn heads_without_faults_are_accepted_in_a_wider_pipe_and_on_a_swaying_vehicle() 
 }
 
 #[test]
-fn sections_passed_in_murky_water_have_true_holes_within_the_target() {
+fn no_section_far_over_the_target_passes_in_murky_water() {
     let heads = "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]";
     let near =
         format!("outliers = {{ share = 0.05, near_m = 0.1, far_m = 0.8, {heads} }}\nmultipath = {{}}\n");

@@ -240,7 +240,7 @@ impl Fault for Short {
 }
 
 #[test]
-fn reports_shorter_than_configured_are_reported() {
+fn hid_reports_shorter_than_configured_are_flagged_as_wrong() {
     let folder = Folder::new();
     let end = End::udp();
     folder.write("vehicle.toml", vehicle(&[("counter", COUNTER, &end.connect().to_string())]));

@@ -6,7 +6,7 @@ use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::Outing;
 
 /// With ten degrees of yaw, successive passes are farther apart than the target at any speed, but the passes of several
-/// swings fill the gaps. The advised speed passes, and 2.5 times that speed doesn't.
+/// swings fill the gaps. Sections pass at the advised speed, but not at 2.5 times that speed.
 #[test]
 fn advised_speed_of_a_swinging_vehicle_is_positive_and_passes() {
     for target_m in [0.5, 1.0] {
