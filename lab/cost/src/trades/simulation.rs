@@ -22,7 +22,8 @@ const RAYS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Default number of rays per beam.
 const USUAL_RAYS: u32 = 16;
 const MANY_RAYS: u32 = 1024;
-/// Number of rays of a second reference. It is as good as [`MANY_RAYS`], with rays at other directions within the beam.
+/// Number of rays of a second reference, which is as good as [`MANY_RAYS`]. Its rays have other directions within the
+/// beam.
 const OTHER_RAYS: u32 = 769;
 /// Change of D that can change a decision, m: a tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;

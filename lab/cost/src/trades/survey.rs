@@ -40,7 +40,8 @@ const STRETCH_M: f64 = 0.25;
 const STRETCHES: u32 = 4;
 /// Smallest error claimed for the oracle, m. Both references are computed to this accuracy.
 const LEAST_M: f64 = 1e-9;
-/// Names of the compared vehicles, with their files. Modes, layouts and drifts are compared for the last vehicle.
+/// Names of the compared vehicles, with their files. Modes, layouts and drifts are compared for the last one in the
+/// list.
 const VEHICLES: [(&str, &str); 4] = [
     ("VITA 1, one head", "vita1.toml"),
     ("VITA 2, two heads", "vita2-2.toml"),
