@@ -431,8 +431,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let mut left_out = vec![
         LeftOut {
             what: "step lengths of a ray".to_owned(),
-            why: "in a bent or narrowing tunnel, the bound on the wall's slope decides each step, and the ray ends within 1e-11 m of the wall \
-                  (`LEAST_STEP_M` and `ROOT_M` of the tube): shorter steps would change no result, and longer steps would miss walls"
+            why: "shorter steps would change no result, because a ray already ends within 1e-11 m of the wall; longer steps would miss walls"
                 .to_owned(),
         },
         LeftOut {
