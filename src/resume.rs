@@ -30,6 +30,8 @@ pub(crate) struct Resuming {
     pub(crate) recordings: Vec<Interrupted>,
     /// Time without data.
     pub(crate) gap: DurNs,
+    /// Paths at which the dive isn't recorded any more, because their folder is gone.
+    gone: Vec<PathBuf>,
 }
 
 impl Resuming {
@@ -48,29 +50,29 @@ impl Resuming {
             return Self::continuing(vec![named_recording(args, named)?], vehicle).map(Some);
         }
         let found = logs.iter().map(|log| unfinished(log)).collect::<Result<Vec<_>, _>>()?;
-        let found: Vec<PathBuf> = found.into_iter().flatten().collect();
-        let Some(first) = found.first().map(|first| first.display()) else { return Ok(None) };
+        let Some(first) = found.iter().flatten().next().map(|first| first.display()) else { return Ok(None) };
         if args.resume.is_none() {
             return Err(Failure::Usage(format!(
                 "run: the last dive, {first}, did not end in order; --resume continues it in a further part, --new begins \
                  another dive"
             )));
         }
-        if found.len() < logs.len() {
-            return Err(Failure::Usage(format!(
-                "run --resume: {first} can be continued, but one of the other recordings can't; give --record only for those \
-                 that can, or --new"
-            )));
-        }
-        let recordings = found.iter().map(|found| Unfinished::read(found)).collect::<Result<Vec<_>, _>>()?;
-        let recordings: Vec<Unfinished> = recordings.into_iter().flatten().collect();
-        if recordings.len() < logs.len() {
+        let read = |found: &PathBuf| Unfinished::read(found);
+        let mut recordings = found.iter().flatten().map(read).collect::<Result<Vec<_>, _>>()?;
+        if recordings.iter().any(Option::is_none) {
             // Two paths led to the same recording, or another program has just continued one.
             return Err(Failure::Usage(format!(
                 "run --resume: {first} can be continued only once at a time; give --record once, or the paths of the recordings"
             )));
         }
-        Self::continuing(recordings, vehicle).map(Some)
+        // Another medium of the dive may have been replaced, or may be gone.
+        let missing =
+            logs.iter().zip(&found).filter(|(_, found)| found.is_none()).map(|(log, _)| log.clone());
+        let (present, gone): (Vec<PathBuf>, Vec<PathBuf>) = missing.partition(|log| folder_of(log).is_dir());
+        let moved = recordings.first().cloned().flatten();
+        recordings.extend(present.iter().map(|log| Some(moved.as_ref()?.at(log))));
+        let resuming = Self::continuing(recordings.into_iter().flatten().collect(), vehicle)?;
+        Ok(Some(Self { gone, ..resuming }))
     }
 
     fn continuing(
@@ -99,16 +101,23 @@ impl Resuming {
         }
         let gap = set_clock(longest);
         let to = longest.last + gap;
+        let last_part = longest.last_part().display().to_string();
         let stated = |recording: Unfinished| {
-            let words = format!(
-                "the program was stopped while it recorded {}; its last second may be missing, and {:.0} s until it \
-                 recorded again",
-                recording.last_part().display(),
-                to.since(recording.last).as_secs_f64(),
-            );
+            let seconds = to.since(recording.last).as_secs_f64();
+            let words = match recording.files.last() {
+                Some(last) => format!(
+                    "the program was stopped while it recorded {}; its last second may be missing, and {seconds:.0} s until \
+                     it recorded again",
+                    last.display(),
+                ),
+                None => format!(
+                    "the recording begins within a dive whose earlier parts are elsewhere, the last in {last_part}; {seconds:.0} s \
+                     of the dive were not recorded"
+                ),
+            };
             Interrupted { recording, to, words }
         };
-        Ok(Self { gap, recordings: recordings.into_iter().map(stated).collect() })
+        Ok(Self { gap, recordings: recordings.into_iter().map(stated).collect(), gone: Vec::new() })
     }
 
     /// Data about the interruption for the dive that goes on.
@@ -117,8 +126,14 @@ impl Resuming {
             gap: self.gap,
             span: self.recordings.first().and_then(|first| first.recording.span),
             words: self.words(),
-            losses: self.recordings.iter().map(|interrupted| interrupted.loss().to_string()).collect(),
+            losses: self.losses(),
         }
+    }
+
+    /// Losses that the interruption caused, as text.
+    fn losses(&self) -> Vec<String> {
+        let interruptions = self.recordings.iter().map(|interrupted| interrupted.loss().to_string());
+        interruptions.chain(self.gone.iter().map(|log| gone_text(log))).collect()
     }
 
     /// Text about the dive that is continued.
@@ -127,7 +142,8 @@ impl Resuming {
         let pair = |of: &Interrupted| {
             format!("{} in {}", of.recording.recording.display(), of.recording.next_path().display())
         };
-        let all: Vec<String> = recordings.map(pair).collect();
+        let all: Vec<String> =
+            recordings.map(pair).chain(self.gone.iter().map(|log| gone_text(log))).collect();
         format!(
             "the dive is continued after {:.0} s without data: {}",
             self.gap.as_secs_f64(),
@@ -173,9 +189,19 @@ fn named_recording(args: &Run, named: &Path) -> Result<Unfinished, Failure> {
     })
 }
 
+/// Text about a recording that isn't continued, because its medium is gone.
+fn gone_text(log: &Path) -> String {
+    format!("{} is NOT CONTINUED: its folder is gone", log.display())
+}
+
+/// The folder of a log.
+fn folder_of(log: &Path) -> &Path {
+    log.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// The recording that a dive recorded to `log` would continue: `log` itself, or the last one in its folder.
 fn unfinished(log: &Path) -> Result<Option<PathBuf>, Failure> {
-    let folder = log.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(log);
     if !folder.is_dir() {
         return Ok(None);
     }
@@ -231,7 +257,7 @@ fn set_clock(dive: &Unfinished) -> DurNs {
     let gap = if is_same_boot {
         DurNs(host.0.cast_signed() + ahead - dive.last.0.cast_signed())
     } else {
-        // The interruption includes the time since the reboot. A UTC that was set back is no evidence against that.
+        // The gap is at least the time since the reboot, also if UTC was set back meanwhile.
         by_utc.filter(is_plausible).map_or(since_boot, |gap| DurNs(gap.0.max(since_boot.0)))
     };
     let gap = DurNs(gap.0.max(SHORTEST.0));

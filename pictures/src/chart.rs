@@ -45,7 +45,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis with at most `most_ticks` steps between ticks.
+    /// A linear axis. Its ticks divide it into at most `most_ticks` steps.
     pub fn new(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let (ticks, digits) = ticks(from, to, most_ticks);
         let ticks = ticks.into_iter().map(|tick| (tick, format!("{tick:.digits$}"))).collect();
@@ -55,8 +55,8 @@ impl Axis {
 
     /// A logarithmic axis with at most `most_ticks` ticks; both ends must be above zero.
     ///
-    /// Ticks are powers of ten. If they fit, 2 and 5 times each power, or only 3 times each power, are ticks too. A
-    /// short axis gets linear ticks instead.
+    /// Ticks are powers of ten and, if they fit, also 2 and 5 times or 3 times each power. A short axis gets linear
+    /// ticks instead.
     pub fn logarithmic(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let scale = Scale { from, to, logarithmic: true };
         if to / from < SHORT {
@@ -101,8 +101,10 @@ fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     ((0..=most).map(tick).filter(|tick| *tick <= to + 1e-9 * step).collect(), digits)
 }
 
-/// Returns powers of ten within a range. If they fit into `most` ticks, also returns 2 and 5 times each power, or only
-/// 3 times each power. If the powers alone don't fit, returns only some of them.
+/// Returns at most `most` ticks within a range, for a logarithmic axis. The first of these sets that fits is used:
+/// - 1, 2 and 5 times each power of ten;
+/// - 1 and 3 times each power of ten;
+/// - every n-th power of ten, with the smallest n that fits.
 fn log_ticks(from: f64, to: f64, most: u32) -> Vec<f64> {
     let within = |factors: &[f64]| -> Vec<f64> {
         let decades =

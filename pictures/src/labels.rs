@@ -34,7 +34,7 @@ impl Label {
     }
 }
 
-/// Draws labels to the right of a frame, each as near to the end of its curve as the other labels allow.
+/// Draws labels to the right of a frame, beside the ends of their curves. Overlapping labels are moved apart.
 pub fn at_right(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[1].total_cmp(&b.place[1]));
@@ -63,9 +63,10 @@ pub fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     }
 }
 
-/// Moves overlapping intervals apart, as little as possible, and returns their middles.
+/// Moves overlapping intervals apart until they touch, and returns the middles of all intervals.
 ///
-/// The intervals keep their order, and lie within the bounds if they fit.
+/// `wanted` has the middle and the length of each interval. The intervals keep their order, and lie between `from` and
+/// `to` if they fit.
 fn moved_apart(wanted: &[(f64, f64)], from: f64, to: f64) -> Vec<f64> {
     let mut middles: Vec<f64> = Vec::with_capacity(wanted.len());
     let mut free = from;
@@ -87,7 +88,7 @@ mod tests {
     use super::moved_apart;
 
     #[test]
-    fn labels_move_only_as_far_as_needed() {
+    fn overlapping_labels_move_until_they_touch() {
         assert_eq!(moved_apart(&[(10.0, 4.0), (20.0, 4.0)], 0.0, 30.0), [10.0, 20.0]);
         assert_eq!(moved_apart(&[(10.0, 4.0), (11.0, 4.0), (12.0, 4.0)], 0.0, 30.0), [10.0, 14.0, 18.0]);
         assert_eq!(moved_apart(&[(28.0, 4.0), (30.0, 4.0)], 0.0, 30.0), [24.0, 28.0]);

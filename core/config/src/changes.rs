@@ -20,7 +20,7 @@ const ID: &str = "id";
 /// - `sensors.all.key` changes the key in every table of the array that has it.
 /// - An array that is missing from `text`, such as `openings = [{ .. }]`, is added at the start.
 ///
-/// Errors: `text` is not TOML, or any other key in `changes` is missing from it.
+/// Errors: `text` is not TOML, or another key in `changes` does not exist in `text`.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
     let mut changed = String::new();

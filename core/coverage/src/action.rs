@@ -1,10 +1,10 @@
-//! Recommended action for a failed stretch.
+//! Recommended action for a missed stretch.
 
 use serde::{Serialize, Serializer};
 
 use super::cause::Cause;
 
-/// Change to make when the vehicle passes a failed stretch again.
+/// Change to make when the vehicle passes a missed stretch again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// Drive slower.
@@ -15,7 +15,7 @@ pub enum Action {
     LongerRange,
     /// Roll the vehicle so that it occludes another part of the wall.
     ///
-    /// To turn the vehicle round would not help: it would occlude the same part.
+    /// Turning the vehicle round does not help: the vehicle then occludes the same part.
     OtherSide,
     /// Stay centred in the tunnel, with a steady heading.
     Middle,

@@ -1,21 +1,21 @@
-//! Speed for passing a missed stretch again, and whether speed helps.
+//! Speed for passing a missed stretch again, and whether a lower speed helps.
 
 use serde::{Deserialize, Serialize};
 
 use super::cause::{Cause, Causes};
 
-/// Speed for passing a missed stretch again, and whether speed helps at all.
+/// Speed for passing a missed stretch again, and whether a lower speed helps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Again {
-    /// Largest speed that meets the target in all sections where any speed can meet it, m/s.
+    /// Largest speed that meets the target in every section, except in sections where no speed meets it, m/s.
     ///
-    /// Zero if most sections have no such speed.
+    /// Zero if more than half of the sections have no speed that meets the target.
     pub at_most_mps: f64,
     /// Whether at least a tenth of the sections lose so many returns that no speed makes up for them.
     pub is_beyond_speed: bool,
 }
 
-/// A remedy is advised for a run if at least one in `NAMED_OF` of its failed sections needs the remedy.
+/// A remedy is advised for a missed stretch if at least one in `NAMED_OF` of its failed sections needs the remedy.
 pub(super) const NAMED_OF: u32 = 10;
 
 /// Causes and required speed of a failed section.
@@ -30,7 +30,7 @@ pub struct Failing {
 /// Counts of failed sections by remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
-    /// Number of sections in which a speed meets the target, and the lowest of these speeds, m/s.
+    /// Number of sections in which some speed meets the target, and the lowest of their speeds, m/s.
     mended: u32,
     least_mps: f64,
     /// Number of sections that lose so many returns that no speed makes up for the losses.
@@ -79,7 +79,7 @@ impl Tally {
         section.is_mended() && section.again_mps <= self.least_mps
     }
 
-    /// Whether these counts are possible for a run with `failed` failed sections.
+    /// Whether these counts are possible for a missed stretch with `failed` failed sections.
     pub(super) fn is_of(&self, failed: u32) -> bool {
         self.mended.checked_add(self.beyond).is_some_and(|counted| counted <= failed)
     }

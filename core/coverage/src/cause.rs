@@ -16,7 +16,8 @@ pub enum Cause {
     OutOfRange,
     /// The vehicle was off-centre, or it turned and its beams swung along the tunnel.
     OffAxis,
-    /// The heads' passes were unevenly spread. At the scheduled angles, they would have met the target.
+    /// The heads' passes were unevenly spread in time. With all heads at their scheduled angles, the section would
+    /// have passed.
     Phase,
     /// The hole extends beyond the stretch that all live heads have swept.
     NotPassed,
@@ -26,7 +27,7 @@ pub enum Cause {
     HeadStalled,
     /// Returns came without a valid position.
     PositionLost,
-    /// No returns although the wall was within range.
+    /// No returns came although the wall was within range.
     MissingReturns,
     /// The vehicle occluded the beams.
     Occluded,
@@ -35,7 +36,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All causes, beginning with those that the pilot can change.
+    /// All causes. Causes that the pilot can change come first.
     ///
     /// If two causes explain a hole equally well, the first in this order is named.
     pub const ALL: [Self; 12] = [
@@ -109,7 +110,7 @@ impl Causes {
         Self(self.0 & !other.0)
     }
 
-    /// The causes in either of two sets.
+    /// Returns this set with the causes of another set added.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -140,12 +141,12 @@ impl Causes {
         Cause::ALL.into_iter().filter(move |cause| self.has(*cause))
     }
 
-    /// The set as a number: bit k is set for the cause numbered k.
+    /// The set as a number: bit k is 1 if the set contains the cause with number k.
     pub fn bits(self) -> u16 {
         self.0
     }
 
-    /// Set of the causes whose bits are set. Unknown bits are ignored.
+    /// Set of the causes whose bits are 1. Unknown bits are ignored.
     pub fn from_bits(bits: u16) -> Self {
         Cause::ALL.into_iter().filter(|cause| bits & (1 << *cause as u16) != 0).collect()
     }

@@ -10,15 +10,15 @@ pub struct Deviation {
     samples: u32,
     /// Number of samples that deviate by more than the contradiction limit.
     contradicting: u32,
-    /// Number of those samples that confirm the wall found by another head.
+    /// Number of contradicting samples at which another head has found the same wall.
     confirming: u32,
     sum_m: f64,
     /// Largest inward deviation, m; never above zero.
     inmost_m: f64,
     /// Largest outward deviation, m; never below zero.
     outmost_m: f64,
-    /// Area between the reference point and the samples of the sweeps, and the design's area over the same
-    /// angles, m2.
+    /// Area between the reference point and the wall as sampled, m2, and the area of the design profile over the
+    /// same angles, m2.
     swept_m2: f64,
     design_m2: f64,
 }
@@ -52,7 +52,7 @@ impl Deviation {
         }
     }
 
-    /// Adds the samples of another stretch.
+    /// Adds the deviations of another section's samples.
     pub fn merge(&mut self, other: &Self) {
         self.samples += other.samples;
         self.contradicting += other.contradicting;
@@ -79,11 +79,11 @@ impl Deviation {
         (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
     }
 
-    /// Whether most samples deviate from the design by more than the contradiction limit, without another head that
-    /// found the same wall.
+    /// Whether most samples deviate from the design by more than the contradiction limit, and no other head has found
+    /// the same wall.
     ///
-    /// In that case, the profile, the position or the head may be wrong. A confirming sample vouches for two: itself, and
-    /// the earlier one that it confirms.
+    /// In that case, the profile, the position or the head may be wrong. A confirming sample counts for two samples:
+    /// for itself, and for the earlier sample that it confirms.
     pub fn contradicts(&self) -> bool {
         2 * self.contradicting.saturating_sub(2 * self.confirming) > self.samples
     }
@@ -151,7 +151,7 @@ mod tests {
         assert!((rock.extremes_m().unwrap()[0] + 1.0).abs() < 1e-9);
     }
 
-    /// A wall 0.6 m outside the design: only samples after the first `alone` find it confirmed by another head.
+    /// The wall lies 0.6 m outside the design. Another head confirms all samples except the first `alone` samples.
     #[test]
     fn wall_that_another_head_confirms_does_not_contradict_the_profile() {
         let profile = shapes::circle(3.0).unwrap();

@@ -20,8 +20,8 @@ pub struct Evidence {
     pub speed_mps: f64,
     /// Largest speed that would have met the target from the tunnel's centre, m/s.
     ///
-    /// All heads are assumed to turn as scheduled. The value is the planned speed if this speed meets the target, and
-    /// zero if no speed does.
+    /// All heads are assumed to turn as scheduled. The value is the planned speed if the planned speed meets the
+    /// target, and zero if no speed does.
     pub fits_mps: f64,
     /// Largest speed that would have met the target despite lost returns, m/s; never above `fits_mps`.
     ///
@@ -29,9 +29,9 @@ pub struct Evidence {
     pub with_losses_mps: f64,
     /// Longest time between passes of heads over the same wall, seconds.
     pub pass_gap_s: f64,
-    /// Longest time between passes if the passes had been evenly spread, seconds.
+    /// Longest time between passes over the same wall if the passes had been evenly spread in time, seconds.
     pub even_pass_gap_s: f64,
-    /// Longest time between evenly spread passes if all heads had been turning, seconds.
+    /// Longest time between passes over the same wall if all heads had been turning and evenly spread, seconds.
     pub all_pass_gap_s: f64,
     /// Share of pings without a return, including pings whose wall was out of range.
     pub missing_share: f64,
@@ -39,11 +39,11 @@ pub struct Evidence {
     pub occluded_share: f64,
     /// Share of pings that a stalled head made.
     pub standing_share: f64,
-    /// Number of samples missing in the hole for any reason: the ping was lost, or was not made.
+    /// Number of samples missing in the hole, for any reason: a ping gave no sample, or no ping was made.
     pub lost_in_hole: u32,
     /// Largest step along the perimeter between neighbouring samples of one turn of a head, m.
     pub t_y_m: f64,
-    /// Largest step predicted for a level vehicle in the centre of the tunnel, m.
+    /// Largest step along the perimeter predicted for a level vehicle in the centre of the tunnel, m.
     pub middle_t_y_m: f64,
     /// Distance by which the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
@@ -62,7 +62,7 @@ impl Evidence {
             && (0.0..=self.fits_mps).contains(&self.with_losses_mps)
     }
 
-    /// Causes and required speed of the section, as its run counts them.
+    /// Causes and required speed of the failed section, for the counts of its missed stretch.
     pub fn failing(&self) -> Failing {
         Failing { causes: self.causes, again_mps: self.with_losses_mps }
     }

@@ -1,8 +1,8 @@
 //! Explains a fail by the smallest set of factors without which the hole would have met the target.
 //!
 //! The geometry shows how large the hole would be without a factor. Samples that are missing because of the factor
-//! are put back. For other factors, the wall is compressed by the ratio by which passes or steps would have been
-//! closer together. `docs/why/coverage.md` states the order of the factors and the reasons for it.
+//! are put back. If the factor moved passes or steps apart, the wall is compressed by the same ratio.
+//! `docs/why/coverage.md` states the order of the factors and the reasons for it.
 
 mod case;
 mod trial;
@@ -23,10 +23,10 @@ use trial::Trial;
 pub use case::Case;
 use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 
-/// Speed counts as a factor if the spacing T exceeds this multiple of the target, even at the planned speed.
+/// Speed counts as a factor if the spacing T exceeds this multiple of the target, even if the vehicle kept to the
+/// planned speed.
 ///
-/// T is the spacing at the driven speed with all heads as scheduled. It is an upper bound of the hole's
-/// diameter D.
+/// T is the spacing at the driven speed with all heads as scheduled. D would then be at most T.
 const WELL_OVER: f64 = 1.2;
 /// Ratio of the speed to the planned speed above which the vehicle did not follow the plan.
 const OVER_PLAN: f64 = 1.15;
@@ -34,15 +34,15 @@ const OVER_PLAN: f64 = 1.15;
 ///
 /// The speed is then known from the inertial unit alone.
 const OVER_LOST: f64 = 1.4;
-/// Speed counts as a factor if it exceeds the planned speed, and the largest speed that meets the target, by
-/// this ratio.
+/// Speed counts as a factor if it exceeds both the planned speed and the largest speed that meets the target by this
+/// ratio.
 ///
 /// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;
-/// Swing of the beams counts as a factor if, without it, the distance between passes shrinks below this
-/// share.
+/// Swing of the beams counts as a factor if, without swing, the distance between passes is below this share of the
+/// actual distance.
 ///
-/// Even a steady vehicle sways.
+/// The share is below 1 because even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
 /// A coarse angular step counts as a factor if the step along the wall, seen from the tunnel's centre,
 /// exceeds this share of the target.

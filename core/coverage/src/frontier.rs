@@ -23,11 +23,11 @@ pub struct Reach {
 /// covered so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
-    /// Receive time of the head's last ping, with or without a fix; `None` before the first.
+    /// Receive time of the head's latest ping, with or without a fix; `None` before the first ping.
     heard: Option<MonoNs>,
-    /// Reach at the head's last ping with a fix.
+    /// Reach at the head's latest ping with a fix.
     ///
-    /// For a silent head, this is the reach at the last advice update with a fix.
+    /// For a silent head, this is the reach at the latest advice update with a fix.
     latest: Reach,
     /// Chainages that the head's reach has covered; `None` before the first ping with a fix.
     swept: Option<Reach>,
@@ -52,7 +52,7 @@ impl HeadReach {
 
     /// Records a ping without a fix.
     ///
-    /// The head is alive, and its reach is unchanged since the last fix.
+    /// The head is alive, and its reach is unchanged since the latest fix.
     pub fn heard(&mut self, now: MonoNs) {
         self.heard = Some(now);
     }
@@ -86,11 +86,13 @@ pub struct Frontier {
     ///
     /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
     through: Option<Reach>,
-    /// Zone: index range of the sections within reach of the heads that sections wait for, plus a margin.
+    /// Zone: index range of the sections within reach of the awaited heads, plus a margin.
+    ///
+    /// A head is awaited if its samples may still land.
     zone: Option<Range<i64>>,
-    /// Time at which the zone of sections within reach last changed.
+    /// Time of the latest change of the zone.
     zone_moved: Option<MonoNs>,
-    /// Time of the last ping of any head.
+    /// Time of the latest ping of any head.
     heard: Option<MonoNs>,
     /// Time of the latest ping that ended a silence of all heads, or of the first ping.
     ///
@@ -104,7 +106,7 @@ pub struct Frontier {
 /// Direction of travel along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Course {
-    /// Farthest centre of the heads' combined reach on this course, as chainage, m.
+    /// Farthest chainage that the centre of the heads' combined reach has had on this course, m.
     farthest_m: f64,
     astern: bool,
     /// Number of heads that make up the combined reach.
@@ -117,7 +119,7 @@ const TURNED_M: f64 = 0.25;
 impl Course {
     /// Updates the course with the centre of the combined reach of `heads` heads.
     ///
-    /// If the number of heads changes, the centre moves without any movement of the vehicle.
+    /// If the number of heads changes, the centre moves although the vehicle does not. The direction is then kept.
     fn to(self, middle_m: f64, heads: usize) -> Self {
         if heads != self.heads {
             return Self { farthest_m: middle_m, heads, ..self };
@@ -138,19 +140,19 @@ pub struct Outlook {
     pub at: MonoNs,
     /// Coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
-    /// Stretch covered by every head that sections wait for and that has pinged; `None` if empty.
+    /// Stretch that every awaited head has covered, except heads that never pinged; `None` if empty.
     pub swept_by_all: Option<Reach>,
-    /// Whether no head is alive: none has pinged for a while.
+    /// Whether no head is alive: no head has pinged for longer than [`SILENT_AFTER`].
     pub none_alive: bool,
     /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Stretch behind the place where the vehicle began or turned back, where not all heads have been.
+    /// Stretch behind the place where the vehicle began or turned back. Some heads have not been in this stretch.
     ///
-    /// On the present course, the remaining heads will not reach it.
+    /// On the present course, these heads will not reach the stretch.
     pub not_passed: Option<Reach>,
     /// Stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub through: Option<Reach>,
-    /// Zone of sections in reach if it has been unchanged for longer than [`SILENT_AFTER`].
+    /// The zone, if it has been unchanged for longer than [`SILENT_AFTER`].
     ///
     /// The vehicle is then nearly stationary.
     pub still_zone: Option<Range<i64>>,
@@ -159,10 +161,9 @@ pub struct Outlook {
 /// Change of the frontier by one ping or one advice update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections that have just left the zone within reach of the heads, behind the vehicle.
+    /// Sections behind the vehicle that have just left the zone.
     pub left_behind: Range<i64>,
-    /// Sections that have just left the zone within reach of the heads, ahead of the vehicle, because it
-    /// moves backwards.
+    /// Sections ahead of the vehicle that have just left the zone, because the vehicle moves backwards.
     pub left_ahead: Range<i64>,
     /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
@@ -210,8 +211,7 @@ impl Frontier {
         self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
     }
 
-    /// Whether a head has been silent for so long that sections do not wait for its samples while others
-    /// ping.
+    /// Whether a head has been silent for so long that no section waits for its samples while other heads ping.
     pub fn is_silent(&self, head: Option<&HeadReach>, now: MonoNs) -> bool {
         match head.and_then(|head| head.heard) {
             Some(heard) => !is_within_silence(heard, now),
@@ -285,8 +285,8 @@ impl Frontier {
 
     /// Updates the frontier for a ping at `now` with reach `pinged`.
     ///
-    /// `heads` are the reaches of all heads, including the pinging one. A section leaves the zone once it is farther
-    /// than `margin_m` from the reach of every awaited head.
+    /// `heads` are the reaches of all heads, including the head that pinged. A section leaves the zone once it is
+    /// farther than `margin_m` from the reach of every awaited head.
     pub fn advance(
         &mut self,
         pinged: Reach,
@@ -334,7 +334,7 @@ impl Frontier {
         Moved { way_grown, ..moved }
     }
 
-    /// Whether the stretch within reach of the heads is part of the coverage extent.
+    /// Whether the chainages that the heads' reaches have covered are part of the coverage extent.
     fn has_been_where_it_swept(&self) -> bool {
         self.swept.zip(self.way).is_some_and(|(swept, way)| swept.is_ordered() && way.with(swept) == way)
     }
@@ -377,8 +377,8 @@ impl Moved {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }
 
-    /// Whether nothing has changed since the last ping or update: no section left the zone or joined the
-    /// coverage extent.
+    /// Whether nothing has changed since the previous ping or update: no section left the zone or joined the coverage
+    /// extent.
     ///
     /// Also true if no head's place is known.
     pub fn is_nothing(&self) -> bool {
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn section_leaves_the_zone_once_the_last_head_is_past_it_by_the_margin() {
+    fn section_leaves_the_zone_when_the_rear_head_is_a_margin_past_the_section() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -467,7 +467,7 @@ mod tests {
         frontier.advance(0, MonoNs(0), 1.7, 0.25, 0.25);
         assert_eq!([1.0, 1.7, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [false, false, true]);
         let silent = clear_of(frontier.to_come(MonoNs(3_000_000_000)), 2.5);
-        assert!(silent > 0.5, "with no head alive, all are awaited at their last place");
+        assert!(silent > 0.5, "if no head is alive, all heads are awaited at their latest places");
     }
 
     #[test]
@@ -481,9 +481,9 @@ mod tests {
     }
 
     impl Fixture {
-        /// Updates the test frontier at `now_s`, seconds.
+        /// Updates the test frontier at the time `now_s`, seconds.
         ///
-        /// The heads, alive or not, are half a metre before and behind the vehicle.
+        /// One head is half a metre in front of the vehicle, the other half a metre behind, whether they ping or not.
         fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {
             let now = MonoNs(now_s * 1_000_000_000);
             let places = [x_m + 0.5, x_m - 0.5].map(|x_m| Reach { from_m: x_m, to_m: x_m });
@@ -502,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_motion_only_extends_the_coverage_extent_while_a_head_is_alive() {
+    fn vehicle_motion_extends_the_coverage_extent_but_only_pings_of_live_heads_move_the_zone() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 10, 3.5);
         frontier.ping(1, 10, 2.5);
@@ -527,8 +527,8 @@ mod tests {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
-        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "their silence isn't known yet");
-        // The rear head would be at 6 m, a quarter of a metre beyond [5.5, 5.75).
+        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "the heads' silence isn't known yet");
+        // The rear head, if it pinged, would be at 6 m: a quarter of a metre past section [5.5, 5.75).
         assert_eq!(frontier.beat(3, 6.5).left_behind, 9..23);
         let to_come = frontier.to_come(MonoNs(3_000_000_000));
         assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));
@@ -536,7 +536,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_where_all_heads_have_been_runs_from_front_head_start_to_rear_head_end() {
+    fn stretch_that_all_heads_passed_begins_where_the_front_head_began_and_ends_at_the_rear_head() {
         let mut frontier = Frontier::default();
         let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
         assert_eq!((frontier.through(), frontier.not_passed()), (None, None));
@@ -563,6 +563,6 @@ mod tests {
         frontier.ping(0, 7, 4.5);
         frontier.ping(0, 8, 4.5);
         let moved = frontier.ping(0, 9, 4.5);
-        assert_eq!(moved.left_behind, 13..17, "the other one stays silent and is no longer awaited");
+        assert_eq!(moved.left_behind, 13..17, "head 1 stays silent and is no longer awaited");
     }
 }

@@ -1,7 +1,8 @@
 //! Coverage: samples on the unrolled wall, the holes between them, and the verdict on each section.
 //!
 //! [`SampleStore`] keeps samples, [`HoleFinder`] finds the largest empty circle of a section, [`Sections`] turns holes
-//! into verdicts and flags, [`explain`] finds why a section failed, [`Runs`] joins flagged sections.
+//! into verdicts and flags, [`explain`] finds why a section failed, [`Runs`] joins flagged sections into missed
+//! stretches.
 //!
 //! ```
 //! use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
@@ -13,7 +14,7 @@
 //!     let (x_m, arc_m) = (0.5 * f64::from(number / 20), 0.5 * f64::from(number % 20));
 //!     store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 })?;
 //! }
-//! // The diameter of the largest empty circle between them equals the diagonal.
+//! // The largest empty circle is as wide as the diagonal of the square between four samples.
 //! let hole = HoleFinder::default().largest(&store, 1.0, 1.5);
 //! assert!(hole.bounded && (hole.diameter_m - 0.5 * 2.0_f64.sqrt()).abs() < 1e-6);
 //! # Ok::<(), headrace_coverage::StoreError>(())

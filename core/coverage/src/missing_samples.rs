@@ -1,7 +1,7 @@
 //! Missing samples: places where a ping would have left a sample, and the causes of each loss.
 //!
-//! If the samples missing because of a factor are put back, the hole becomes the hole without this factor. Only the
-//! latest missing samples are kept, because fails are explained soon after the vehicle has left their place.
+//! If the samples that a factor has cost are put back, the hole is as it would have been without this factor. Only the
+//! most recent missing samples are kept, because fails are explained soon after the vehicle has left their place.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use headrace_geometry::snapshot::stateful;
 const ROOM: usize = 1 << 16;
 /// Number of missing samples per block. Each block has one extent along the tunnel.
 ///
-/// A search over a few metres skips the other blocks. The number divides the capacity.
+/// A search over a few metres skips the blocks whose extent lies elsewhere. The capacity is a multiple of this number.
 const BLOCK: usize = 1 << 8;
 
 /// A missing sample: a place where a ping would have left a sample.
@@ -24,7 +24,7 @@ pub struct MissingSample {
     pub arc_m: f64,
     /// Number of the head that would have made the sample.
     pub head: u8,
-    /// Causes of the missing sample. It would exist only if all of them had been absent.
+    /// Causes of the missing sample. The sample would exist only if all these causes had been absent.
     pub why: Causes,
     /// Whether there was a doubtful return, which may be wall.
     pub may_be_wall: bool,
@@ -50,7 +50,7 @@ impl Default for MissingSamples {
 }
 
 impl MissingSamples {
-    /// Adds a missing sample to the list, where it replaces the oldest one if there is no room.
+    /// Adds a missing sample to the list. If the list is full, the new sample replaces the oldest one.
     ///
     /// Allocates: never.
     pub fn add(&mut self, lack: MissingSample) {
@@ -71,7 +71,7 @@ impl MissingSamples {
 
     /// Extends a block's extent by the entry at this position of the ring buffer.
     ///
-    /// Once all entries of a block are new, the extent is that of these entries alone.
+    /// Once all entries of a block have been overwritten, only the new entries determine the extent.
     fn extend(&mut self, at: usize, x_m: f64) {
         let block = at / BLOCK;
         let wider_m = |[from_m, to_m]: [f64; 2], x_m: f64| [from_m.min(x_m), to_m.max(x_m)];
@@ -153,7 +153,7 @@ mod tests {
             });
         }
         let last = (ROOM + 99) as f64;
-        // Head 1 should have made five of ten samples in a row. The last of them is occluded.
+        // Every second missing sample is of head 1. Every fifth of these is occluded, including the very last.
         assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
         let revised = |lack: &&MissingSample| lack.why == Causes::of(silent);
         let revised: Vec<MissingSample> =
@@ -162,9 +162,9 @@ mod tests {
         assert_eq!(lacks.revise(2, 8, [missing, silent]), None);
     }
 
-    /// A search by blocks finds the same as a full search, while the ring fills and while it is overwritten.
+    /// A search by blocks finds the same samples as a full search, while the ring fills and while it is overwritten.
     ///
-    /// The drive goes there and back.
+    /// The vehicle drives to and fro over 90 m.
     #[test]
     fn block_search_finds_every_missing_sample() {
         let mut lacks = MissingSamples::default();

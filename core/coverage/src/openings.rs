@@ -1,6 +1,6 @@
 //! Declared openings of the wall, such as side tunnels and gates.
 //!
-//! Openings are excluded from holes and listed in the report.
+//! Openings do not count as holes. The report lists them.
 
 use super::store::{SampleStore, StoreError, WallSample};
 use headrace_geometry::math;
@@ -46,7 +46,7 @@ impl Opening {
         (along + 1) * (around + 1)
     }
 
-    /// Fills the opening with samples, so that a hole extends into it by at most half of their spacing.
+    /// Fills the opening with samples, so that a hole extends into the opening by at most half the samples' spacing.
     ///
     /// Errors: the store is full, or the opening lies outside the store's extent.
     pub fn fill(&self, store: &mut SampleStore, target: Target) -> Result<(), StoreError> {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn opening_share_of_a_section_is_a_share_of_its_area() {
+    fn opening_covers_a_share_of_the_wall_area_of_a_section() {
         let profile = shapes::circle(3.0).unwrap();
         let share = |from_m: f64| gate().share_of(from_m, from_m + 0.25, &profile);
         assert!((share(5.0) - 4.0 / profile.perimeter_m()).abs() < 1e-12);

@@ -1,14 +1,15 @@
-//! Origin of a run of returns that does not continue known wall: a feature of the wall, or something else.
+//! Origin of a run of neighbouring returns that does not continue known wall: a feature of the wall, an object in the
+//! water (a fish, bubbles, silt), or an echo by a second path.
 //!
-//! Something else is an object in the water (a fish, bubbles, silt) or an echo by a second path. A feature of the wall
-//! is about as high or deep as it is wide. An object hangs at any distance from the wall, and is small. Each run
-//! therefore has odds of being wall, and these odds grow when a later pass meets the same thing at the same place.
+//! A feature of the wall is about as high or deep as it is wide. An object is small, and at any distance from the wall.
+//! The size of a run therefore gives the odds that the run is wall. The odds grow when a later pass meets the same
+//! thing at the same place.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Size of a run of agreeing returns.
+/// Size of a run: neighbouring returns of a head that agree with each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extent {
     /// Width of the run across the beams, m.
@@ -21,7 +22,8 @@ pub(super) struct Extent {
     pub(super) slopes: u8,
 }
 
-// The figures below are assumptions about tunnels and water, not fits. Their effect: docs/decisions/0004-verdicts-and-causes.md.
+// The figures below are assumptions about tunnels and water. They are not fitted to data.
+// docs/decisions/0004-verdicts-and-causes.md describes their effect.
 
 /// Mean width of objects in the water and of echoes by a second path, m; in narrow tunnels at most this share of the
 /// equivalent radius.
@@ -32,33 +34,35 @@ const OBJECT_WIDTH_SHARE: f64 = 0.1;
 /// A half-buried boulder has half its width as height, and a niche is about as deep as wide.
 const HEIGHT_SHARE: f64 = 0.7;
 const HEIGHT_LN_SD: f64 = 0.7;
-/// Share of wall features that have any height or depth, such as posts, ladders and boreholes.
+/// Share of wall features whose height or depth does not depend on their width: posts, ladders and boreholes.
 const SLENDER_SHARE: f64 = 0.01;
-/// Range of the logarithm of widths of wall features: a factor of thirty, all widths equally likely.
+/// Natural logarithm of the ratio of the largest to the smallest width of wall features, which is thirty.
+///
+/// All logarithms of the width are equally likely.
 const WIDTHS_LN: f64 = 3.4;
 /// Growth of the log odds when another pass confirms a run.
 ///
-/// Wall is met again in nearly every pass. Something else is taken to be met at the same place in 3 % of passes.
+/// Nearly every pass meets wall again. For objects and second echoes, 3 % of passes are assumed to meet them again.
 const CONFIRMS: f64 = 3.5;
 /// Growth of the log odds when an end of a run slopes to the wall.
 ///
-/// Half of the ends of wall features are taken to slope, and 7 % of the ends of something else.
+/// Half of the ends of wall features are assumed to slope, and 7 % of the ends of objects and second echoes.
 const SLOPES: f64 = 2.0;
 
-/// Runs of this dive that were wall, and runs that were something else, as expected from their odds.
+/// Expected numbers of runs in this dive that were wall, and that were something else, computed from the runs' odds.
 ///
-/// These numbers give the odds of the next run before its size is known. In murk, few runs are wall.
+/// These numbers give the odds of the next run before its size is known. In murky water, few runs are wall.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Experience {
     wall: f64,
     other: f64,
 }
 
-/// Number of runs after which an observation counts a third.
+/// Number of later runs after which a run counts only a third (1/e) of its first weight.
 const REMEMBERED_RUNS: f64 = 50.0;
-/// Runs that are added to those of the dive: clear water, in which five of six runs are wall.
+/// Runs that are added to the runs of the dive. They stand for clear water, in which five of six runs are wall.
 ///
-/// They bound the odds, so that no number of runs of one kind makes the next one certain.
+/// They limit the odds: however many runs of one kind there were, the kind of the next run is not certain.
 const PRIOR: Experience = Experience { wall: 2.5, other: 0.5 };
 
 impl Experience {
@@ -69,7 +73,7 @@ impl Experience {
             width_m > 0.0 && off_m > 0.0 && radius_m > 0.0,
             "a run has a size: {run:?}, {radius_m} m"
         );
-        // Low features, such as a lining that bulges, are as likely as those of median height.
+        // Low features, such as a lining that bulges, are as likely as features of median height.
         let excess = math::ln(off_m / (HEIGHT_SHARE * width_m)).max(0.0) / HEIGHT_LN_SD;
         let usual = math::exp(-excess * excess / 2.0) / (off_m * HEIGHT_LN_SD * math::sqrt(math::TAU));
         let height = math::ln((1.0 - SLENDER_SHARE) * usual + SLENDER_SHARE / radius_m);
@@ -108,8 +112,8 @@ mod tests {
         Experience::default().log_odds(&Extent { width_m, off_m, confirmed, slopes: 0 }, RADIUS_M)
     }
 
-    /// Probability that a run is wall in clear water. A boulder is as wide as high, a side tunnel is wider than deep. Fish
-    /// and second echoes are small and far from the wall.
+    /// Checks the probability that a run is wall in clear water. A boulder is as high as it is wide, and a side tunnel
+    /// is wider than deep. Fish and second echoes are small and far from the wall.
     #[test]
     fn wide_runs_near_the_wall_are_wall_and_small_runs_far_from_it_are_not() {
         for (width_m, off_m, confirmed, least, most) in [
@@ -129,7 +133,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn run_is_wall_more_likely_if_it_is_lower_confirmed_or_in_clearer_water(
+        fn odds_of_wall_are_higher_for_low_runs_for_confirmed_runs_and_in_clear_water(
             width_m in 0.01f64..5.0,
             off_m in 0.05f64..5.0,
             confirmed in 0.0f64..3.0,
@@ -144,10 +148,11 @@ mod tests {
             prop_assert!(murk.log_odds(&extent, RADIUS_M) < here);
         }
 
-        /// Experience is forgotten, so clear water follows murk. It never decides alone, not even after a long dive: a slender
-        /// run remains doubtful in the clearest water, and wall seen in two passes is wall in the densest murk.
+        /// Experience fades, so the odds recover in clear water after murky water. Experience never decides alone, not
+        /// even after a long dive: a slender run remains doubtful in the clearest water, and a run that two earlier
+        /// passes have met is wall in the murkiest water.
         #[test]
-        fn experience_of_any_length_is_forgotten_and_decides_nothing_alone(runs in 0usize..100_000) {
+        fn experience_fades_and_never_decides_alone(runs in 0usize..100_000) {
             let slender = Extent { width_m: 0.2, off_m: 3.0, confirmed: 0.0, slopes: 0 };
             let boulder = Extent { width_m: 0.6, off_m: 0.4, confirmed: 0.0, slopes: 0 };
             let mut experience = Experience::default();

@@ -1,4 +1,4 @@
-//! Verdicts on the holes found in a dive for another target than the dive's own.
+//! Verdicts on the holes of a dive for a target that differs from the dive's own target.
 
 use super::frontier::{Outlook, clear_of};
 use super::hole::Hole;
@@ -23,10 +23,10 @@ impl Measured {
 }
 
 impl Sections {
-    /// Returns verdicts for another target of all sections with a measured hole, by index.
+    /// Returns the index of each section with a measured hole, and its verdict for another target.
     ///
-    /// The counted visits and the settled sections are still those for the dive's own target. A replay with the other
-    /// target gives the verdicts that the dive would have reported.
+    /// The counted visits and the settled sections are still those for the dive's own target. Only a replay with the
+    /// other target gives the verdicts that the dive would have reported.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
         let target = Target { max_hole_m: target_m, ..self.target() };
         self.sections_of(outlook.way).filter_map(move |index| {
@@ -103,7 +103,7 @@ mod tests {
 
     /// The largest circle between 5 m and 5.6 m measures 0.63 m.
     ///
-    /// With its centre within a quarter of a metre of 5 m, the largest circle measures 0.54 m.
+    /// If its centre lies between 5 m and 5.25 m, the largest circle measures 0.54 m.
     #[test]
     fn verdicts_for_another_target_use_the_measured_holes() {
         let seen = Seen::new();
@@ -115,7 +115,7 @@ mod tests {
         }
     }
 
-    /// The position error allowed for is two standard deviations of 0.05 m each.
+    /// The allowance for the position error is two standard deviations of 0.05 m each.
     #[test]
     fn verdict_for_another_target_respects_position_error_and_doubtful_samples() {
         let mut seen = Seen::new();

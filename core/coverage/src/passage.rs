@@ -58,15 +58,13 @@ pub struct Drive {
     pub planned_gap_s: f64,
     /// Longest time between two passes if all configured heads were turning and evenly spread, seconds.
     pub all_gap_s: f64,
-    /// Longest time between two passes at the planned speed, or at the driven speed if none is planned,
-    /// seconds.
+    /// Longest time between two passes at the planned speed, or at the driven speed if no speed is planned, seconds.
     pub gap_at_plan_s: f64,
     /// Longest time between two passes at the planned speed if all heads were turning, seconds.
     pub healthy_at_plan_s: f64,
-    /// Longest time between two passes at the planned speed of the heads that turn and never stalled,
-    /// seconds.
+    /// Longest time between two passes of the heads that turn and never stalled, seconds.
     ///
-    /// Their angles are as scheduled.
+    /// The value is for the planned speed, with these heads at their scheduled angles.
     pub left_at_plan_s: f64,
     /// Longest time between two pings of a head, seconds.
     pub ping_period_s: f64,
@@ -78,8 +76,8 @@ pub struct Drive {
     pub middle_t_y_m: f64,
     /// Largest speed that meets the target from the tunnel's centre, m/s.
     ///
-    /// All heads are assumed to turn as scheduled. The value is the planned speed if this speed meets the target, and
-    /// zero if no speed does.
+    /// All heads are assumed to turn as scheduled. The value is the planned speed if the planned speed meets the
+    /// target, and zero if no speed does.
     pub fits_mps: f64,
     /// Largest distance between passes along the tunnel with which the target is met, m.
     pub fits_along_m: f64,
@@ -104,14 +102,14 @@ pub struct Drive {
 pub struct OtherSettings {
     /// Step of the alternative finer mode, divided by the present step.
     ///
-    /// The finer mode is the mode with a finer step that allows the highest speed, or the finest one if none
-    /// meets the target.
+    /// The finer mode is the mode with a finer step that allows the highest speed, or the finest mode if no mode meets
+    /// the target.
     pub finer_step: f64,
     /// Turn period of the alternative finer mode, divided by the present turn period.
     pub finer_turn: f64,
     /// Turn period with a longer range setting, divided by the present turn period.
     ///
-    /// The longer setting is the shortest one that reaches all wall from the tunnel's centre.
+    /// The longer setting is the shortest setting that reaches all wall from the tunnel's centre.
     pub longer_turn: f64,
 }
 
@@ -122,12 +120,11 @@ impl Default for OtherSettings {
     }
 }
 
-/// Ratio to the planned speed below which the vehicle counts as slower than planned.
+/// Ratio of the driven to the planned speed below which the vehicle counts as slower than planned.
 const SLOWER: f64 = 0.97;
 
 impl Drive {
-    /// Distance along the tunnel between passes, including swing, as if no head had been silent or stalled,
-    /// m.
+    /// Distance along the tunnel between passes, including swing, as if no head had been silent or stalled, m.
     pub fn along_m(&self) -> f64 {
         self.speed_mps * self.healthy_gap_s + self.swing_m + self.advance_m()
     }
@@ -146,15 +143,15 @@ impl Drive {
     ///
     /// True if passes are farther apart, by a factor above `over`, than at the planned speed with the heads
     /// at their scheduled angles. Heads at different places along the hull are in phase only near the planned
-    /// speed. The planned speed must also meet the target, because no speed helps heads that were started
-    /// with wrong phases.
+    /// speed. The planned speed must also meet the target. Heads that were started with wrong phases do not count,
+    /// because no speed helps them.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;
         is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
-    /// Returns the worse of two drives, which is the one with the larger distance between passes.
+    /// Returns the worse of two movements: the movement with the larger distance between passes.
     #[must_use]
     pub fn or_worse(self, other: Self) -> Self {
         if other.along_m() > self.along_m() { other } else { self }
@@ -177,17 +174,16 @@ impl Loss {
     pub const ALL: [Self; 3] = [Self::Missing, Self::OutOfRange, Self::Occluded];
 }
 
-/// Ratio of the position error that affects a section's largest hole to that of a single distance between
-/// passes.
+/// Ratio of the error of a section's largest hole to the error of a single distance between passes.
 ///
-/// The largest hole is often one that errors have enlarged. The ratio is measured over the field dives of
-/// `tests/tests/navigation/fusion.rs`.
+/// The ratio exceeds 1 because the largest hole is often a hole that errors have enlarged. It is measured over the
+/// field dives of `tests/tests/navigation/fusion.rs`.
 const LARGEST_OF_MANY: f64 = 1.2;
 
 /// Error along the tunnel of the samples of one pass relative to the previous pass.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassError {
-    /// Covariance of the position and attitude errors of one pass relative to the previous one.
+    /// Covariance of the position and attitude errors of one pass relative to the previous pass.
     pub relative: Relative,
     /// Position of the vehicle in the cross-section, [y, z], m.
     pub from_m: [f64; 2],
@@ -261,7 +257,7 @@ mod tests {
         assert!(is_slow(slow));
         assert!(!is_slow(Drive { planned_gap_s: 2.5, ..slow }), "the heads were started wrongly");
         assert!(!is_slow(Drive { planned_gap_s: 3.2, ..slow }), "passes are no farther apart when slower");
-        assert!(!is_slow(Drive { speed_mps: 0.1, ..slow }), "as planned");
+        assert!(!is_slow(Drive { speed_mps: 0.1, ..slow }), "the vehicle is as fast as planned");
         assert!(!is_slow(Drive { fits_mps: 0.06, ..slow }), "the planned speed must meet the target");
         assert!(!is_slow(Drive { planned_mps: 0.0, ..slow }), "no speed is planned");
     }
@@ -278,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn drive_with_the_larger_distance_between_passes_is_the_worse_one() {
+    fn movement_with_the_larger_distance_between_passes_counts_as_worse() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));

@@ -1,7 +1,7 @@
-//! Relief: places where heads recently found wall that deviates from the design. It also counts votes of the heads on
-//! each other.
+//! Relief: places where heads recently found wall that deviates from the design. This module also counts votes of the
+//! heads on each other.
 //!
-//! A vote compares two heads that have seen the same bin of the wall. A head that contradicts the design there is
+//! A vote compares the returns of two heads in the same bin of the wall. A head that contradicts the design there is
 //! outvoted if another head agrees with the design.
 
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ const BINS: i64 = 128;
 /// In a tunnel of 6 m radius, all bins together are 9 m long, which exceeds the distance between heads.
 const SLABS: i64 = 32;
 
-/// The head that met something, and the angle by which it had turned by then since the start of the dive, rad.
+/// A pass that met something: the head, and the angle that it had turned since the start of the dive, rad.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Pass {
     pub(super) head: u8,
@@ -26,19 +26,19 @@ pub(super) struct Pass {
 }
 
 impl Pass {
-    /// Whether two passes differ: by the head, or by half a turn of it.
+    /// Whether two passes differ: they are by different heads, or more than half a turn of one head apart.
     fn is_other(&self, other: &Self) -> bool {
         self.head != other.head || (self.turned_rad - other.turned_rad).abs() > math::TAU / 2.0
     }
 }
 
-/// A return that deviates from the design, as support for later passes.
+/// A return that deviates from the design, stored as support for later passes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Found {
     placed: PlacedReturn,
     /// Whether the return was classified as wall.
     is_wall: bool,
-    /// Number of passes that met the same thing here, with this one.
+    /// Number of passes that met the same thing here, including this pass.
     passes: u8,
     pass: Pass,
 }
@@ -64,7 +64,7 @@ struct Cell {
     contradicting: u8,
 }
 
-/// Votes on a head, counted in bins of the wall that other heads have also seen.
+/// Votes of the other heads on one head. Each vote comes from a bin of the wall that both heads have seen.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ballot {
     /// Number of bins in which the head agrees with the design, as other heads do.
@@ -76,7 +76,7 @@ pub struct Ballot {
     between_m: Option<[f64; 2]>,
 }
 
-/// Number of votes needed to decide whether a head is outvoted: about one per bin of a turn.
+/// Number of votes needed to decide whether a head is outvoted: about one vote for each bin of a turn.
 const FULL_BALLOT: u32 = 128;
 
 impl Ballot {
@@ -150,12 +150,12 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 }
 
 impl Relief {
-    /// Whether wall found near this return has the same deviation from the design.
+    /// Whether wall with the same deviation from the design was found near this return.
     pub(super) fn is_wall(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         self.near(placed, limits, 1.0).any(|found| found.is_wall)
     }
 
-    /// Whether another head found wall near this return with the same deviation from the design.
+    /// Whether another head found wall with the same deviation from the design near this return.
     pub(super) fn is_wall_of_another(&self, placed: &PlacedReturn, head: u8, limits: &WallLimits) -> bool {
         self.near(placed, limits, 1.0).any(|found| found.is_wall && found.pass.head != head)
     }
@@ -268,7 +268,7 @@ impl Relief {
 
     /// Whether the range of another head varies when the range to the design varies.
     ///
-    /// If so, no error of the estimated position explains a constant range of this head.
+    /// If so, an error of the estimated position does not explain a constant range of `head`.
     pub(super) fn others_change(&self, head: usize) -> bool {
         self.changing & !bit(head) != 0
     }
@@ -301,7 +301,7 @@ fn index(slab: i64, bin: i64) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// A head that fails late is outvoted within one or two turns, but not by a few bins.
+    /// A head that fails late is outvoted after two turns with wrong returns, but not yet after one turn.
     #[test]
     fn head_that_fails_late_is_outvoted_within_two_turns() {
         let wrong = PlacedReturn { x_m: 7.0, arc_m: 0.0, off_m: -0.5 };

@@ -1,4 +1,4 @@
-//! Runs: neighbouring failed sections, reported as one event with a stable number.
+//! Runs (missed stretches): neighbouring failed sections, reported as one event with a permanent number.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,48 +8,48 @@ use super::hole::Hole;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 
-/// Maximum gap between neighbouring failed sections of one run, m.
+/// Maximum gap between neighbouring failed sections of one missed stretch, m.
 ///
 /// Across a wider gap, the speed that one section needs is no evidence for the next section.
 const JOIN_M: f64 = 0.5;
 
-/// Number of a run of failed sections. It is never used for another run.
+/// Number of a missed stretch. It is never used for another missed stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
-/// A run of neighbouring failed sections.
+/// A missed stretch: neighbouring failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Most frequent cause among the run's sections.
+    /// Most frequent cause among the stretch's sections.
     ///
     /// A tie leaves the current cause unchanged.
     pub cause: Cause,
-    /// Number of the run's sections with each cause, in the order of [`Cause::ALL`].
+    /// Number of the stretch's sections with each cause, in the order of [`Cause::ALL`].
     counts: [u32; Cause::ALL.len()],
-    /// Counts that decide the advice on passing the run again.
+    /// Counts that decide the advice on passing the stretch again.
     tally: Tally,
-    /// Index of the run's first section.
+    /// Index of the stretch's first section.
     pub from: i64,
-    /// Index after the run's last section.
+    /// Index after the stretch's last section.
     pub to: i64,
-    /// Number of the run's sections that fail.
+    /// Number of the stretch's sections that fail.
     pub failed: u32,
     /// Section with the largest hole, and this hole.
     ///
-    /// In a cleared run, both are those from before the run was cleared.
+    /// In a cleared missed stretch, both are from the time before the stretch was cleared.
     pub worst: (i64, Hole),
-    /// Time at which the run was first flagged.
+    /// Time at which the stretch was first flagged.
     pub raised: MonoNs,
-    /// Time of the run's last change.
+    /// Time of the stretch's latest change.
     pub changed: MonoNs,
-    /// Time since which none of the run's sections fails.
+    /// Time since which none of the stretch's sections fails.
     pub cleared: Option<MonoNs>,
-    /// Run into which this run was merged.
+    /// Stretch into which this stretch was merged.
     pub merged_into: Option<RunId>,
 }
 
 impl Run {
-    /// Whether the figures of a run that isn't cleared agree: its ends, the counts of its sections, and its
+    /// Whether the figures of a missed stretch that isn't cleared agree: its ends, the counts of its sections, and its
     /// largest hole.
     fn is_consistent(&self) -> bool {
         let Self { from, to, failed, .. } = *self;
@@ -59,12 +59,12 @@ impl Run {
         is_counted && is_open && is_within
     }
 
-    /// Whether any section of the run still fails.
+    /// Whether any section of the stretch still fails.
     pub fn is_open(&self) -> bool {
         self.failed > 0
     }
 
-    /// Number of the run's sections with a cause.
+    /// Number of the stretch's sections with a cause.
     pub fn count(&self, cause: Cause) -> u32 {
         self.counts.get(cause as usize).copied().unwrap_or(0)
     }
@@ -78,9 +78,9 @@ impl Run {
         next.map_or(Causes::of(self.cause), |next| Causes::of(self.cause).with(next))
     }
 
-    /// All causes of the run's sections: the main cause first, then the others by frequency.
+    /// All causes of the stretch's sections: the main cause first, then the others by frequency.
     ///
-    /// Allocates: for outlets.
+    /// Allocates: the list. Only outlets call this function.
     pub fn causes(&self) -> Vec<Cause> {
         let mut causes: Vec<Cause> =
             Cause::ALL.into_iter().filter(|cause| *cause == self.cause || self.count(*cause) > 0).collect();
@@ -88,12 +88,12 @@ impl Run {
         causes
     }
 
-    /// Advice for passing the run again.
+    /// Advice for passing the stretch again.
     pub fn again(&self) -> Again {
         self.tally.again(self.failed)
     }
 
-    /// Adds a section to the run's counts.
+    /// Adds a section to the stretch's counts.
     fn count_in(&mut self, section: &Failing) {
         self.tally.add(section);
         for cause in section.causes.iter() {
@@ -103,7 +103,7 @@ impl Run {
         }
     }
 
-    /// Removes a section from the run's counts; returns true if the lowest speed must be found again.
+    /// Removes a section from the stretch's counts; returns true if the lowest speed must be found again.
     fn count_out(&mut self, section: &Failing) -> bool {
         for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
@@ -114,58 +114,58 @@ impl Run {
         self.tally.remove(section)
     }
 
-    /// Resets the run's counts to zero.
+    /// Resets the stretch's counts to zero.
     fn count_none(&mut self) {
         self.counts.fill(0);
         self.tally = Tally::default();
     }
 
-    /// Makes the most frequent cause the run's main cause.
+    /// Makes the most frequent cause the stretch's main cause.
     fn choose(&mut self) {
         let most = Cause::ALL.into_iter().rev().max_by_key(|cause| self.count(*cause));
         self.cause = most.filter(|most| self.count(*most) > self.count(self.cause)).unwrap_or(self.cause);
     }
 }
 
-/// Kind of change of a run of failed sections.
+/// Kind of change of a missed stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunChange {
-    /// The run of failed sections is new.
+    /// The missed stretch is new.
     Raised,
-    /// The ends, the causes or the largest hole of the run have changed.
+    /// The ends, the causes or the largest hole of the stretch have changed.
     Changed,
-    /// No section of the run fails any more, because a later pass filled the holes.
+    /// No section of the stretch fails any more, because a later pass filled the holes.
     Cleared,
-    /// The run was merged into another run.
+    /// The stretch was merged into another missed stretch.
     Merged,
 }
 
-/// All runs of failed sections in a dive.
+/// All missed stretches of a dive.
 #[derive(Debug, Clone)]
 pub struct Runs {
     first: i64,
     join: i64,
     runs: Vec<Run>,
-    /// For each section: number of its run plus one, or zero.
+    /// For each section: number of its stretch plus one, or zero.
     member: Vec<u32>,
-    /// Causes of the fail, and required speed, of each section that belongs to a run.
+    /// Causes of the fail, and required speed, of each section that belongs to a missed stretch.
     failing: Vec<Failing>,
 }
 
 stateful!(Runs { lists: runs; slots: member, failing; fixed: first, join; });
 
-/// Context for updating runs, with the callback for changed runs.
+/// Context for updating missed stretches, with the callback for changed missed stretches.
 pub struct Telling<'a> {
     /// Time of the change.
     pub at: MonoNs,
     /// Function that returns the hole of any section.
     pub hole: &'a dyn Fn(i64) -> Option<Hole>,
-    /// Function that is called for every run that changes.
+    /// Function that is called for every missed stretch that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
 impl Runs {
-    /// Creates an empty set of runs for `count` sections of length `section_m` from index `first`.
+    /// Creates an empty set of missed stretches for `count` sections of length `section_m` from index `first`.
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(first: i64, count: usize, section_m: f64) -> Self {
@@ -174,22 +174,22 @@ impl Runs {
         Self { first, join, runs: Vec::with_capacity(count), member, failing }
     }
 
-    /// Returns all runs of failed sections so far, by number.
+    /// Returns all missed stretches so far, by number.
     pub fn all(&self) -> &[Run] {
         &self.runs
     }
 
-    /// Returns the run of failed sections with this number.
+    /// Returns the missed stretch with this number.
     pub fn get(&self, id: RunId) -> Option<&Run> {
         self.runs.get(id.0 as usize)
     }
 
-    /// Returns the run to which a section belongs.
+    /// Returns the stretch to which a section belongs.
     pub fn of(&self, section: i64) -> Option<RunId> {
         self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
     }
 
-    /// Whether a section is too far from a run to belong to it.
+    /// Whether a section is too far from a missed stretch to belong to it.
     pub fn is_beyond(&self, run: &Run, section: i64) -> bool {
         section - run.to >= self.join || run.from - section > self.join
     }
@@ -216,7 +216,7 @@ impl Runs {
         }
     }
 
-    /// Whether a run is closed, or begins and ends with its own sections and is too far from other runs to be joined.
+    /// Whether a stretch is closed, or begins and ends with its own sections and is too far from others to be joined.
     fn is_consistent(&self, id: RunId) -> bool {
         let is_own = |section: i64| self.of(section) == Some(id);
         let is_apart = |section: i64| self.of(section).is_none_or(|of| of == id);
@@ -228,7 +228,7 @@ impl Runs {
         })
     }
 
-    /// Replaces a section's entry in the counts of its run.
+    /// Replaces a section's entry in the counts of its stretch.
     fn count_again(&mut self, id: RunId, [before, now]: [&Failing; 2]) {
         let Some(mut run) = self.get(id).copied() else {
             debug_assert!(false, "{id:?} of a section is one of {} runs", self.runs.len());
@@ -260,7 +260,7 @@ impl Runs {
         }
     }
 
-    /// Adds a failed section to the neighbouring runs and merges them, or starts a run.
+    /// Adds a failed section to the neighbouring missed stretches and merges them, or starts a missed stretch.
     fn join(&mut self, section: i64, failing: Failing, telling: &mut Telling<'_>) {
         let near = |side: i64| (1..=self.join).find_map(|step| self.of(section + side * step));
         let (kept, other) = match (near(-1), near(1)) {
@@ -283,7 +283,7 @@ impl Runs {
         (telling.tell)(kept, RunChange::Changed);
     }
 
-    /// Removes a section from its run, which shrinks, splits or is cleared.
+    /// Removes a section from its stretch, which shrinks, splits or is cleared.
     fn leave(&mut self, section: i64, id: RunId, telling: &mut Telling<'_>) {
         self.take_out(section);
         let Some(run) = self.get(id).copied() else {
@@ -312,7 +312,7 @@ impl Runs {
 
     fn begin(&mut self, section: i64, failing: Failing, telling: &Telling<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
-            // If there were more runs than sections, this section remains flagged without a run.
+            // All numbers of missed stretches are used up. The section remains flagged, but belongs to no stretch.
             return None;
         }
         let id = RunId(u32::try_from(self.runs.len()).ok()?);
@@ -361,7 +361,7 @@ impl Runs {
         }
     }
 
-    /// Updates a run's figures for a section that was just added to it.
+    /// Updates a stretch's figures for a section that was just added to it.
     fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let (hole, failing) = ((telling.hole)(section), self.failing_at(section));
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
@@ -373,7 +373,7 @@ impl Runs {
         }
     }
 
-    /// Updates a run for a section whose hole has changed.
+    /// Updates a missed stretch for a section whose hole has changed.
     fn measure_again(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (telling.hole)(section)) else {
             return;
@@ -386,7 +386,7 @@ impl Runs {
         }
     }
 
-    /// Recomputes a run's section count, causes, ends and largest hole.
+    /// Recomputes a stretch's section count, causes, ends and largest hole.
     fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
         let Some(run) = self.get(id).copied() else {
             debug_assert!(false, "{id:?} is one of {} runs", self.runs.len());
@@ -428,7 +428,7 @@ impl Runs {
     }
 }
 
-/// Returns the section with the larger hole; the first one if both holes are equal.
+/// Returns the section with the larger hole; the first section if both holes are equal.
 fn larger(a: (i64, Hole), b: (i64, Hole)) -> (i64, Hole) {
     if b.1.diameter_m > a.1.diameter_m { b } else { a }
 }

@@ -25,7 +25,7 @@ pub enum Verdict {
     Pass,
     /// Fail: D - k sd > T.
     Fail,
-    /// Can't say: neither condition holds within the error of D.
+    /// Can't say: neither a pass nor a fail, although no more samples will land.
     CannotSay,
 }
 
@@ -44,7 +44,7 @@ impl Verdict {
     }
 }
 
-/// Count, mean, deviation and extremes of a quantity.
+/// Count, mean, standard deviation and extremes of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Number of values in the statistics.
@@ -70,7 +70,7 @@ impl Spread {
         self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
     }
 
-    /// Merges another spread into this one.
+    /// Adds all values of another spread to this spread.
     ///
     /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean avoid the cancellation of plain sums of
     /// squares.
@@ -125,8 +125,8 @@ pub struct Section {
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
-    /// Whether the verdict is final on the present course: no further sample can change it, or the hole of a
-    /// fail.
+    /// Whether the verdict is final on the present course: no more samples can change the verdict, or the hole of a
+    /// failed section.
     pub settled: bool,
     /// Whether the section is open although no sample can change it without the vehicle turning back.
     ///
@@ -189,7 +189,7 @@ impl Section {
 
     /// Whether verdict, hole, flag and evidence of a section that was just judged agree.
     ///
-    /// A pass has a hole with D + k sd <= T. A fail has evidence and a flag. Only an open section is not inspected.
+    /// A pass has a hole with D + k sd <= T. A fail has evidence and a flag. Only open sections are `not_inspected`.
     pub(super) fn is_consistent(&self, target: Target) -> bool {
         let error_m = target.error_m(self.hole_sd_m);
         let is_judged = self.hole.is_some_and(|hole| hole.is_consistent()) && error_m >= 0.0;
@@ -276,7 +276,7 @@ impl Section {
 
     /// Records that the section holds samples of a distrusted head.
     ///
-    /// The section then can't pass, and is due for judging. Returns false if this was known of its newest visit.
+    /// The section then can't pass, and is due for judging. Returns false if this was known for its newest visit.
     pub fn suspect(&mut self) -> bool {
         let is_new = !self.suspect || self.suspected_in != self.visits.newest();
         if is_new {
@@ -309,13 +309,13 @@ pub struct Metres {
     pub pass_m: f64,
     /// Metres that have failed.
     pub fail_m: f64,
-    /// Metres undecided within the error of D.
+    /// Metres that neither pass nor fail, although no more samples will land.
     pub cannot_say_m: f64,
-    /// Metres still open: further driving may fill their holes.
+    /// Metres that are still open: driving on may fill their holes.
     pub open_m: f64,
     /// Metres at the ends of the coverage extent where some heads have not been.
     ///
-    /// Further driving on the present course does not change them.
+    /// Driving on does not change them.
     pub not_inspected_m: f64,
 }
 
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn flag_is_raised_by_fail_cleared_by_pass_and_raised_again() {
+    fn flag_is_raised_by_a_fail_cleared_by_a_pass_and_raised_by_the_next_fail() {
         let mut section = Section::default();
         for (at, verdict, expected, is_flagged) in [
             (1, Verdict::Open, Judgement::Updated, false),
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_is_accurate_far_from_zero_and_after_merging() {
+    fn mean_and_sd_are_accurate_far_from_zero_and_after_merging() {
         let values = [1e8 + 1.0, 1e8 + 2.0, 1e8 + 4.0, 1e8 + 9.0];
         let (mut whole, mut first, mut second) = (Spread::default(), Spread::default(), Spread::default());
         for (k, value) in values.into_iter().enumerate() {
@@ -394,7 +394,7 @@ mod tests {
 
     /// An open section is unsure only if it is at an end of the coverage extent.
     #[test]
-    fn undecided_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
+    fn open_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
         let unsure = |not_inspected| Section { not_inspected, ..Section::default() }.unsure();
         assert_eq!([unsure(true), unsure(false)], [Some(Unsure::NotInspected), None]);
     }

@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn grid_nodes_can_all_have_samples_despite_a_missed_strip() {
+    fn all_grid_nodes_can_have_samples_despite_a_missed_strip() {
         // Two passes run along the edges of each row of nodes. Every node has ten samples, but the strip of 0.4 m
         // between the passes has none.
         let passes = (0..20).flat_map(|k| [0.05, 0.45].map(|x_m| f64::from(k) * 0.5 + x_m));

@@ -43,7 +43,7 @@ pub(super) struct Others {
 pub(super) struct Disagreement {
     /// Difference from the previous return, m; `None` if both agree.
     pub(super) jump_m: Option<f64>,
-    /// Number of earlier, waiting returns that this return made doubtful.
+    /// Number of waiting returns that this return made doubtful.
     pub(super) doubtful: u32,
 }
 
@@ -64,7 +64,8 @@ struct HalfTurn {
     between_m: Option<[f64; 2]>,
     /// Number of returns within runs of constant range.
     ///
-    /// The next fields are the smallest and largest range of these returns, and of the design there, m.
+    /// The next fields are the smallest and largest range of these returns, m, and the smallest and largest range to
+    /// the design in the same directions, m.
     unchanged: u32,
     unchanged_m: Option<[f64; 2]>,
     design_m: Option<[f64; 2]>,
@@ -92,9 +93,7 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether the range is constant in more than one in `parts` returns.
-    ///
-    /// The range to the design must vary widely for these returns.
+    /// Whether the range is constant in more than one in `parts` returns, although the range to the design varies.
     fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
         let span_m = |of: Option<[f64; 2]>| of.map_or(0.0, |[least_m, most_m]| most_m - least_m);
         parts * self.unchanged > self.returns
@@ -102,10 +101,11 @@ impl HalfTurn {
             && span_m(self.design_m) > VARIES * limits.tolerance_m
     }
 
-    /// Whether the range follows a wall: it varies with the direction by more than from one return to the next.
+    /// Whether the range follows a wall: over all directions, it varies more than from one return to the next.
     ///
-    /// If a range is constant with independent noise, the ratio of both sums is about 2 for any noise (von Neumann 1941,
-    /// doi 10.1214/aoms/1177731677). A frozen head can't be told from one in the centre of a round pipe, and counts as frozen.
+    /// For a constant range with independent noise, the ratio of squared changes to squared deviations from the mean is
+    /// about 2, however strong the noise (von Neumann 1941, doi 10.1214/aoms/1177731677). A head in the centre of a
+    /// round pipe looks like a frozen head, and counts as frozen.
     fn follows_a_wall(&self) -> bool {
         let mean_m = self.range_sum_m / f64::from(self.returns.max(1));
         let variation_m2 = self.range_square_m2 - mean_m * self.range_sum_m;
@@ -121,10 +121,10 @@ impl HalfTurn {
 
 /// Least ratio of squared changes to squared deviations from the mean at which a range counts as noise.
 ///
-/// Independent noise has 2 +- 0.2 in the returns of half a turn. Range to a wall has much less, unless the vehicle is in the
-/// centre of a round tunnel.
+/// Over half a turn, independent noise has a ratio of 2 +- 0.2. The range to a wall has a much smaller ratio, unless
+/// the vehicle is in the centre of a round tunnel.
 const NOISE_RATIO: f64 = 1.0;
-/// Resolution of a profiling sonar's range, m. Changes below it show nothing.
+/// Resolution of a profiling sonar's range, m. Smaller changes show nothing.
 const RESOLUTION_M: f64 = 0.002;
 /// Minimum number of returns in half a turn for a decision on the head.
 const FEW: u32 = 20;
@@ -298,12 +298,12 @@ impl HeadTrust {
         self.one_range_rad += turned_rad;
     }
 
-    /// Whether the last turn's ranges show that the head isn't frozen, see [`HalfTurn::follows_a_wall`].
+    /// Whether the ranges of the latest turn show that the head isn't frozen, see [`HalfTurn::follows_a_wall`].
     pub(super) fn follows_a_wall(&self) -> bool {
         self.halves[0].with(&self.halves[1]).follows_a_wall()
     }
 
-    /// Whether the last returns have an exactly constant range although the range to the design varies.
+    /// Whether the latest returns have an exactly constant range although the range to the design varies.
     pub(super) fn is_stuck(&self, limits: &WallLimits) -> bool {
         self.one_range.is_stuck(RUN, STUCK_VARIES * limits.tolerance_m)
     }

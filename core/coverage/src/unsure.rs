@@ -15,9 +15,9 @@ pub enum Unsure {
     ///
     /// Some heads have not been in the section.
     NotInspected,
-    /// The hole is within its error of the target, because position errors are too large.
+    /// The hole's diameter differs from the target by less than its error, because position errors are too large.
     Position,
-    /// The section holds samples of several stretches of navigation.
+    /// The section holds samples of several navigation segments.
     SeveralStretches,
     /// More returns are doubtful than were accepted as wall.
     DoubtfulReturns,
@@ -68,15 +68,14 @@ pub struct Stretch {
     pub from: i64,
     /// Index after the stretch's last section.
     pub to: i64,
-    /// The stretch's sections without a verdict, in two groups.
+    /// The stretch's sections, in two groups.
     ///
-    /// In the first group, a section lacks a verdict mainly because of its hole's size. In the second
-    /// group, it lacks one mainly because of the hole's error.
+    /// Sections of the first group are unsure mainly because of the size of their hole. Sections of the second group
+    /// are unsure mainly because of the error of their hole.
     of: [Largest; 2],
 }
 
-/// Number of sections in a group that neither pass nor fail, and the figures of the one with the largest
-/// hole.
+/// A group of unsure sections: their number, and the figures of the section with the largest hole.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Largest {
     /// Number of sections in the group.
@@ -90,7 +89,7 @@ pub struct Largest {
 /// Speed at which a section was driven, and the largest speed that would meet the target there.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Driven {
-    /// Speed along the tunnel, m/s; zero if nothing passed.
+    /// Speed along the tunnel, m/s; zero if no head passed.
     pub speed_mps: f64,
     /// Largest speed that meets the target with all heads turning as scheduled, m/s; zero if no speed does.
     pub fits_mps: f64,
@@ -103,7 +102,7 @@ pub struct Driven {
     pub is_short: bool,
 }
 
-/// Passes are uneven if the time between them exceeds that of evenly spread passes by this ratio.
+/// Passes are uneven if the longest time between them exceeds the time between evenly spread passes by this ratio.
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
@@ -128,9 +127,9 @@ const MOSTLY_ERROR: f64 = 0.2;
 const JOIN_M: f64 = 2.0;
 
 impl Stretch {
-    /// Creates a stretch without a verdict from one section.
+    /// Creates an unsure stretch from one section.
     ///
-    /// The figures are its hole, the error of this hole, and the standard deviation of the hole, m.
+    /// The figures are the diameter of the section's hole, the error of this diameter, and its standard deviation, m.
     pub fn one(why: Unsure, index: i64, [hole_m, error_m, sd_m]: [f64; 3], driven: Driven) -> Self {
         let section = Largest { sections: 1, hole_m: [hole_m, sd_m], driven };
         let is_error = error_m > MOSTLY_ERROR * hole_m;
@@ -143,8 +142,7 @@ impl Stretch {
         self.of.iter().map(|of| of.sections).sum()
     }
 
-    /// Whether the error of the hole, rather than its size, prevents a verdict in most of the stretch's
-    /// sections.
+    /// Whether most of the stretch's sections are unsure because of the error of their hole, rather than its size.
     pub fn is_mostly_error(&self) -> bool {
         self.of[1].sections > self.of[0].sections
     }
@@ -156,14 +154,13 @@ impl Stretch {
         &self.of[usize::from(self.is_mostly_error())]
     }
 
-    /// Whether sections are too far away to belong to this stretch without a verdict.
+    /// Whether sections are too far away to belong to this unsure stretch.
     pub fn is_beyond(&self, sections: Range<i64>, section_m: f64) -> bool {
         let apart = (sections.start - self.to).max(self.from - sections.end);
         apart as f64 * section_m > JOIN_M + 1e-9
     }
 
-    /// Adds a section to the stretch; returns false if the section lacks a verdict for another reason, or is
-    /// too far away.
+    /// Adds a stretch to this stretch. Returns false if the added stretch has another reason, or is too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
         if self.why != other.why || self.is_beyond(other.from..other.to, section_m) {
@@ -204,9 +201,9 @@ mod tests {
         assert_eq!(*stretch.largest(), largest);
     }
 
-    /// A section with a large error does not represent the others, whatever the size of its hole.
+    /// A single section with a large error does not represent the stretch, however large its hole is.
     #[test]
-    fn unsure_stretch_is_represented_by_the_majority_of_its_sections() {
+    fn figures_of_an_unsure_stretch_come_from_its_larger_group_of_sections() {
         let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());
         let mut stretch = lost(0);
         assert!(stretch.is_mostly_error());

@@ -11,9 +11,9 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Limits for the age of a sample. Below the first limit, the error between successive passes applies.
+/// Limits for the time between two samples. Below the first limit, the error between successive passes applies.
 ///
-/// Above the second limit, the error relative to a much earlier visit applies.
+/// Above the second limit, the error relative to a much earlier visit applies. Between the limits, both are mixed.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 
@@ -22,7 +22,7 @@ const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 pub struct Visit {
     /// Number of the visit, from zero. The number never decreases.
     pub number: u32,
-    /// Number of the visit's stretch of uninterrupted navigation.
+    /// Number of the visit's navigation segment.
     pub tie: u32,
     /// Time at which the sample was measured.
     pub at: MonoNs,
@@ -43,9 +43,9 @@ impl Visit {
         }
     }
 
-    /// Largest standard deviation of the diameter of a hole between two visits, m.
+    /// Largest standard deviation of the diameter of a hole between samples of this visit and of an earlier visit, m.
     ///
-    /// The first visit is this one. The second visit has its last sample at the time `then`.
+    /// The latest sample of the earlier visit is from the time `then`.
     fn apart_sd_m(&self, then: MonoNs, profile: &Profile) -> f64 {
         let over = (self.at.since(then) + DurNs(-SAME_PASS.0)).as_secs_f64();
         let share = (over / (LONG_BEFORE.0 - SAME_PASS.0) as f64 * 1e9).clamp(0.0, 1.0);
@@ -55,10 +55,10 @@ impl Visit {
     }
 }
 
-/// The visits of a section: those with samples within the target T of it.
+/// The visits of a section: visits with samples within the target T of the section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Visits {
-    /// Number of the newest visit, its stretch of navigation, and the time of its last sample.
+    /// Number of the newest visit, its navigation segment, and the time of its latest sample.
     ///
     /// `None` before the first visit.
     newest: Option<(u32, u32, MonoNs)>,
@@ -66,7 +66,7 @@ pub struct Visits {
     first: u32,
     /// Whether samples of several visits count.
     several: bool,
-    /// Whether the visits belong to several stretches of navigation.
+    /// Whether the visits belong to several navigation segments.
     unrelated: bool,
     /// The largest standard deviation of a hole's diameter between samples of different visits, m.
     apart_sd_m: f64,
@@ -83,8 +83,9 @@ impl Visits {
         self.newest = Some((visit.number, visit.tie, visit.at));
     }
 
-    /// Records the error between the passes of an earlier visit, as the standard deviation of a hole's
-    /// diameter, m.
+    /// Records the error between the passes of an earlier visit.
+    ///
+    /// `sd_m` is the standard deviation that this error causes in a hole's diameter, m.
     pub(super) fn note_earlier(&mut self, sd_m: f64) {
         self.apart_sd_m = self.apart_sd_m.max(sd_m);
     }
@@ -106,17 +107,17 @@ impl Visits {
 
     /// Whether the relation between the visits is uncertain.
     ///
-    /// In that case, samples of one visit may only seem to fill the holes of another.
+    /// In that case, samples of one visit may only seem to fill the holes of another visit.
     pub(super) fn are_unrelated(&self) -> bool {
         self.unrelated
     }
 
-    /// Keeps only the newest visit, which shows the whole section by itself.
+    /// Keeps only the newest visit, which alone shows that the section passes.
     pub(super) fn keep_newest(&mut self) {
         (self.first, self.several, self.unrelated, self.apart_sd_m) = (self.newest(), false, false, 0.0);
     }
 
-    /// Returns the standard deviation of a hole among the samples of all visits, m.
+    /// Returns the standard deviation of the diameter of a hole among the samples of all visits, m.
     ///
     /// `pass_sd_m` is the standard deviation of the newest visit.
     pub(super) fn sd_m(&self, pass_sd_m: f64) -> f64 {
@@ -130,9 +131,9 @@ mod tests {
     use headrace_fusion::relative::Relative;
     use headrace_geometry::tunnel::shapes;
 
-    /// Creates a visit with this number and stretch of navigation.
+    /// Creates a visit with this number and navigation segment.
     ///
-    /// Its passes differ by a centimetre from each other, and by ten centimetres from those of a much earlier visit.
+    /// The error (1 sd) is 1 cm between the visit's passes, and 10 cm relative to a much earlier visit.
     fn visit(number: u32, tie: u32, at_s: u64) -> Visit {
         let error = |sd_m: f64| PassError { relative: Relative::along(sd_m), from_m: [0.0; 2] };
         Visit { number, tie, at: MonoNs(at_s * 1_000_000_000), errors: [error(0.01), error(0.1)] }
@@ -166,7 +167,7 @@ mod tests {
     #[test]
     fn error_between_visits_grows_with_the_time_between_them() {
         let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);
-        assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "equal to that of one pass");
+        assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "the error of one pass applies");
         assert!(
             sd_m(30) > 1.5 * sd_m(20) && sd_m(40) > 1.2 * sd_m(30),
             "{} {} {}",

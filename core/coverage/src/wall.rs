@@ -1,8 +1,8 @@
-//! Decides which returns are wall: those near the design profile, and those with which other returns agree.
+//! Decides which returns are wall: returns near the design profile, and returns that agree with other returns.
 //!
-//! A return within the tolerance of the design is wall. So is a return with the deviation of wall that an earlier pass
-//! found nearby. Other successive returns that agree with one another are a *run*, which has odds of being wall, see
-//! `origin`.
+//! A return within the tolerance of the design is wall. A return is also wall if an earlier pass found wall with the
+//! same deviation nearby. Other successive returns that agree with one another are a *run*, which has odds of being
+//! wall, see `origin`.
 //!
 //! A return waits for the head's next returns before it is decided, since a boulder begins with a single return.
 
@@ -56,9 +56,9 @@ struct Run {
     /// Largest distance of the run from the design, and its width, m.
     off_m: f64,
     width_m: f64,
-    /// Sum of the numbers of earlier passes that met the same thing at each return.
+    /// Number of earlier passes that met the same thing at a return, summed over all returns of the run.
     confirmed: u32,
-    /// These numbers for each waiting return.
+    /// Number of earlier passes that met the same thing, for each waiting return.
     confirmed_each: [u8; MOST_WAITING],
     /// Number of the run's ends that slope to the wall.
     slopes: u8,
@@ -72,7 +72,7 @@ impl Run {
         u32::from(self.waits)
     }
 
-    /// Returns the run's returns that wait for classification, with the number of earlier passes that met the same thing.
+    /// Returns the waiting returns of the run, each with the number of earlier passes that met the same thing.
     fn returns(&self) -> impl Iterator<Item = (&PlacedReturn, u8)> {
         self.waiting.iter().zip(self.confirmed_each).take(usize::from(self.waits))
     }
@@ -110,7 +110,7 @@ impl Run {
         usize::from(self.waits) == MOST_WAITING
     }
 
-    /// Removes all waiting returns except the last one.
+    /// Removes all waiting returns except the latest, which is `last`.
     fn give_up(&mut self, last: &PlacedReturn) {
         let confirmed =
             self.waits.checked_sub(1).and_then(|at| self.confirmed_each.get(usize::from(at)).copied());
@@ -118,16 +118,16 @@ impl Run {
     }
 }
 
-/// The last returns of a head, and the trust in this head.
+/// The latest returns of a head, and the trust in this head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeadWall {
-    /// The last two returns, latest first, and their classification.
+    /// The two latest returns, the newer one first, and their classification.
     last: [Option<(PlacedReturn, Taken)>; 2],
     /// The run of returns that wait for classification.
     run: Run,
     /// Experience with runs in front of the design profile, and with runs behind it.
     experience: [Experience; 2],
-    /// Angle of the last beam, and angle turned since the start of the dive, rad.
+    /// Angle of the latest beam, and angle turned since the start of the dive, rad.
     angle_rad: f64,
     turned_rad: f64,
     trust: HeadTrust,
@@ -195,7 +195,7 @@ impl HeadWall {
         Sorted { waiting, this, is_confirming, distrusted }
     }
 
-    /// Turns the head to the next beam; returns its pass.
+    /// Turns the head to the next beam; returns the head's pass.
     fn pass(&mut self, head: usize, beam: &Beam<'_>) -> Pass {
         self.turned_rad += math::wrap_signed(beam.angle_rad - self.angle_rad, math::TAU).abs();
         self.angle_rad = beam.angle_rad;
@@ -204,9 +204,10 @@ impl HeadWall {
 
     /// Classifies a head's new return and the returns that wait for it.
     ///
-    /// `confirmed` is the number of earlier passes that met the same thing. `agrees` means that the new return agrees with
-    /// the head's previous return, and `slopes` that it agrees with one of the last two, which is wall. Output: the run of
-    /// waiting returns, its classification (`None` if undecided), and the classification of the new return.
+    /// `confirmed` is the number of earlier passes that met the same thing. `agrees` means that the new return agrees
+    /// with the head's previous return. `slopes` means that it agrees with one of the two previous returns, and that
+    /// this one is wall. Output: the run of waiting returns, its classification (`None` if undecided), and the
+    /// classification of the new return.
     fn decide(
         &mut self,
         (placed, confirmed): (&PlacedReturn, u8),

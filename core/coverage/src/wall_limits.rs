@@ -18,10 +18,11 @@ pub struct WallLimits {
     pub radius_m: f64,
     /// Distance along the tunnel within which returns of an earlier pass count as neighbours.
     ///
-    /// The distance doesn't depend on the target T, so the samples don't depend on it either.
+    /// The distance doesn't depend on the target T, so the samples don't depend on T either.
     pub reach_m: f64,
-    /// Log odds at which a run of returns is certain to be wall, with the confidence of verdicts. With the opposite log
-    /// odds, it is certain to be something else.
+    /// Log odds at which a run of returns counts as wall, computed from the confidence of verdicts.
+    ///
+    /// At the opposite log odds, the run counts as something else.
     pub sure_log_odds: f64,
 }
 
@@ -31,7 +32,7 @@ const TOLERANCE_SHARE: f64 = 0.1;
 /// Minimum tolerance, m: three times the resolution and noise of profiling sonars.
 const LEAST_TOLERANCE_M: f64 = 0.03;
 
-/// Number of steps of a head in a turn, about, and least width of a step as a share of its width at the wall.
+/// Approximate number of steps of a head in a turn, and least width of a step as a share of its width at the wall.
 const STEPS: f64 = 128.0;
 const STEPS_SHARE: f64 = 0.05;
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// The limit is finer than a profiling sonar's resolution, so the noise of ranges to a real wall exceeds it.
 const SAME_M: f64 = 0.002;
 
-/// A run of returns with the same range, and the spread of the design range along the run.
+/// Successive returns with the same range, and how much the design range has varied meanwhile.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ConstantRange {
     returns: u32,
@@ -31,7 +31,7 @@ impl ConstantRange {
 
     /// Whether at least `fewest` returns have the same range while the design range varies by more than `varies_m`.
     ///
-    /// A real wall whose design range varies never keeps its range constant to within 2 mm.
+    /// If the design range varies, the ranges to a real wall vary as well, by more than 2 mm.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
@@ -41,7 +41,7 @@ impl ConstantRange {
         self.returns > 0
     }
 
-    /// Whether the last return began a new run of equal ranges.
+    /// Whether the last return began a new series of equal ranges.
     pub fn is_new(&self) -> bool {
         self.returns == 1
     }

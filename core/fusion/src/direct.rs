@@ -21,7 +21,7 @@ use headrace_sensor::reading::{EchoRange, Level, MAX_SOURCES, Reading, TetherLen
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
-/// Time window of tether readings from which the speed is computed, and the maximum number of these readings.
+/// Time window of the cable readings that give the speed, and the maximum number of these readings.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Standard deviation of an echosounder's range, m.
@@ -44,7 +44,7 @@ pub struct DirectNavigation {
 
 stateful!(DirectNavigation { state: attitude, tether, place, height_m, height_offset_m; slots: echoes; fixed: profile, site; });
 
-/// The last readings of the cable counter, as chainages.
+/// The latest readings of the cable counter, as chainages.
 #[derive(Debug, Clone)]
 struct TetherTrack {
     readings: [(MonoNs, f64); SPEED_READINGS],
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_updates_the_height_while_echoes_are_silent() {
+    fn depth_sensor_updates_the_height_while_echosounders_are_silent() {
         let profile = shapes::ceran().unwrap();
         let site = Site::default();
         let mut nav = DirectNavigation::new(profile, site);

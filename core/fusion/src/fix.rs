@@ -15,10 +15,10 @@ pub struct Fix {
     pub speed_mps: f64,
     /// Error covariance relative to the previous pass of the heads over this position.
     pub relative: Relative,
-    /// Error covariance relative to a much earlier visit to this position in the same stretch of navigation.
+    /// Error covariance relative to a much earlier visit to this position in the same navigation segment.
     pub revisit: Relative,
-    /// Number of the stretch of navigation, a time span in which the relative position of soundings is known. Between
-    /// two stretches, the relative position error is unknown.
+    /// Number of the navigation segment, a period within which the relative position of soundings is known. Between
+    /// two segments, the relative position error is unknown.
     pub tie: u32,
     /// Number of times the estimate has become much more certain while it settled.
     ///

@@ -40,7 +40,7 @@ pub trait Navigation: Stateful + Send + Sync {
         None
     }
 
-    /// Returns how much longer the vehicle should stand still for the gyro bias to become known, s.
+    /// Returns how much longer the vehicle should stand still, s, until the gyro bias is known.
     ///
     /// 0 once the bias is known, and for methods that learn nothing from a stationary vehicle.
     fn stand_s(&self) -> u32 {
@@ -54,7 +54,7 @@ pub trait Navigation: Stateful + Send + Sync {
         None
     }
 
-    /// Whether the pitch and yaw of several heads on their mounts are not verified yet.
+    /// Whether several heads have a pitch or yaw on their mounts that is not verified yet.
     ///
     /// False for methods that do not check mounts.
     fn has_unverified_mounts(&self) -> bool {

@@ -33,7 +33,7 @@ impl Relative {
 
     /// Standard deviation of pitch and yaw together, radians.
     ///
-    /// Per metre of the arm, [`Relative::sd_m`] changes by at most this much.
+    /// If the arm becomes a metre longer, [`Relative::sd_m`] changes by at most this number of metres.
     pub fn turn_sd_rad(&self) -> f64 {
         let [_, [_, pitch, _], [.., yaw]] = self.0;
         math::sqrt((pitch + yaw).max(0.0))

@@ -7,7 +7,7 @@ use headrace_geometry::tunnel::Profile;
 
 /// Minimum cosine of the angle of incidence. Echosounder beams at a more grazing angle are ignored.
 const LEAST_COSINE: f64 = 0.1;
-/// Minimum change of a range per metre of height, m/m, at which the beam determines the vehicle's height.
+/// A beam determines the vehicle's height if its range changes by more than this per metre of height, m/m.
 const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 

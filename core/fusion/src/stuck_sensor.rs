@@ -11,14 +11,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Minimum duration of identical readings before the inertial unit counts as stuck.
 const HANGS_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum probability that noise alone causes the repetition, as a natural logarithm: one in a billion.
+/// Natural logarithm of the largest probability that noise alone causes the repetition: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
-/// Weight of the latest difference between readings and of the latest run of identical readings in their running
-/// means.
+/// Weight of the newest value in the running means: of sign reversals on all three axes, and of run lengths.
 const LATEST: f64 = 1.0 / 64.0;
-/// Minimum share of differences between readings with a reversed sign at which the readings count as noisy.
+/// Readings count as noisy if more than this share of their successive differences reverses its sign.
 ///
-/// White noise reverses the sign of two thirds of the differences, and a motion reverses hardly any.
+/// White noise reverses the sign of two thirds of the differences. A motion reverses hardly any.
 const NOISY: f64 = 0.3;
 
 /// Statistics of repeated readings of one sensor; part of the loop's saved state.
@@ -29,10 +28,10 @@ pub struct StuckSensor {
     steps: [f64; 3],
     /// Share of differences whose sign is opposite to that of the previous difference, from 0 to 1.
     to_and_fro: f64,
-    /// Mean length of runs of identical readings, and length of the present run, both as numbers of readings.
+    /// Mean length of the series of identical readings, and length of the present series; both count readings.
     usual_run: f64,
     run: u32,
-    /// Start time of the present run of identical readings.
+    /// Start time of the present series of identical readings.
     since: MonoNs,
 }
 
@@ -67,7 +66,7 @@ impl StuckSensor {
 
     fn has_hung(&self, at: MonoNs) -> bool {
         let is_long = at.since(self.since).0 >= HANGS_AFTER.0;
-        // If each reading equals the one before with probability p, the mean run length is 1 / (1 - p).
+        // If each reading equals the one before with probability p, the mean length of a series is 1 / (1 - p).
         let repeats = 1.0 - 1.0 / self.usual_run.max(1.01);
         is_long && self.to_and_fro > NOISY && f64::from(self.run) * math::ln(repeats) < BY_CHANCE_LN
     }
@@ -126,8 +125,8 @@ mod tests {
     /// detection takes.
     #[test]
     fn coarsely_quantised_inertial_unit_at_rest_does_not_count_as_stuck() {
-        // About one reading in 200 differs from the others, which are equal. Runs of three to 2000 equal readings are
-        // therefore normal, and no evidence that the unit is stuck.
+        // About one reading in 200 differs from the others, which are equal. So series of three to 2000 equal readings
+        // are normal, and no evidence that the unit is stuck.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

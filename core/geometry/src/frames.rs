@@ -51,12 +51,12 @@ pub struct Rot<To, From>(pub UnitQuaternion<f64>, PhantomData<(To, From)>);
 macro_rules! components {
     ($type:ident) => {
         impl<F> $type<F> {
-            /// Creates a vector from components in metres.
+            /// Creates a vector or a point from its components, metres.
             pub fn new(x: f64, y: f64, z: f64) -> Self {
                 Self(Vector3::new(x, y, z), PhantomData)
             }
 
-            /// Creates a point from a vector in metres, in the same frame.
+            /// Creates a vector or a point from its three components in one `nalgebra` vector, metres.
             pub fn of(vector: Vector3<f64>) -> Self {
                 Self(vector, PhantomData)
             }

@@ -181,7 +181,7 @@ impl<'a> Restorer<'a> {
 
     /// Restores stateful elements in place; their number is a setting.
     ///
-    /// Errors: as for each element.
+    /// Errors: the first error of an element.
     pub fn each<'t, T: Stateful + ?Sized + 't>(
         &mut self,
         mut each: impl Iterator<Item = &'t mut T>,

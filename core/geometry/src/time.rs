@@ -62,7 +62,7 @@ impl MonoNs {
 impl Add<DurNs> for MonoNs {
     type Output = Self;
 
-    /// Overflow of the sum saturates at either end of the clock's range.
+    /// A sum beyond the clock's range saturates at the end of the range.
     fn add(self, span: DurNs) -> Self {
         Self(self.0.saturating_add_signed(span.0))
     }

@@ -26,8 +26,8 @@ pub struct AdviceEntry {
 /// Advice history: speed advice shown during the dive.
 ///
 /// An entry is added when the advice has changed significantly, or after ten seconds. When the history is
-/// full, every other entry is dropped and the minimum time between entries is doubled. A longer dive is thus
-/// logged more coarsely from beginning to end.
+/// full, every other entry is dropped and the minimum time between entries is doubled. The history of a long
+/// dive therefore still spans the whole dive, but with fewer entries per minute.
 #[derive(Debug, Clone, Resource)]
 pub struct AdviceLog {
     /// Entries of the advice history, in order of time.

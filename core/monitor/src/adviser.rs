@@ -22,8 +22,8 @@ use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
-/// Lowest speed, m/s, assumed when the time between the passes of heads at different places along the hull is
-/// computed. At a standstill this time would be infinite.
+/// Lowest speed for which the delay between two heads at different places along the hull is computed, m/s. At a
+/// standstill the delay would be infinite.
 const SLOWEST_MPS: f64 = 0.05;
 
 /// Part of the loop that computes the advice.
@@ -188,8 +188,8 @@ impl Advisor {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
-        // While the vehicle goes back, heads at different places along the hull are in phase at other speeds.
-        // Advice from before the vehicle reversed is no longer valid.
+        // Heads at different places along the hull are in phase at other speeds when the vehicle goes back than
+        // when it goes forward. Advice from before the reversal is no longer valid.
         if self.advisor.is_astern() != was_astern {
             self.hysteresis.forget();
         }
@@ -294,15 +294,15 @@ mod tests {
             }
             advised.entries.iter().map(|entry| entry.advice.left.time_s).collect::<Vec<_>>()
         };
-        assert_eq!(left_s(Some(100.0), Some(10.0)), [Some(80.0), Some(79.8)], "only of this tick");
+        assert_eq!(left_s(Some(100.0), Some(10.0)), [Some(80.0), Some(79.8)], "entries of this tick only");
         assert_eq!(left_s(None, Some(10.0)), [None, None]);
         assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
     }
 
-    /// The vehicle yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. At 0.1 m/s, the rear one of
-    /// two heads 0.8 m apart reaches a place 8 s after the front one.
+    /// The vehicle yaws by 0.01 rad/s. Two heads at opposite angles turn in 8 s, so one of them passes every 4 s.
+    /// At 0.1 m/s, the rear one of two heads 0.8 m apart reaches a place 8 s after the front one.
     #[test]
-    fn rotation_is_counted_over_the_time_between_passes_and_the_delay_between_heads() {
+    fn swing_covers_the_time_between_passes_and_the_delay_between_heads() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();
@@ -315,7 +315,7 @@ mod tests {
             }
             last
         };
-        // The tolerance is one advice update (0.2 s).
+        // The tolerance of 5 % is one advice update (0.2 s) in the 4 s between two passes.
         let near = |found: f64, expected: f64| (found - expected).abs() < 0.05 * expected;
         for (apart_m, speed_mps) in [(0.8, 0.1), (0.8, -0.1), (0.8, 0.2)] {
             let found = swung(apart_m, speed_mps);
@@ -324,7 +324,7 @@ mod tests {
         let side_by_side = swung(0.0, 0.1);
         assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
         // For a stationary vehicle a speed of 0.05 m/s is assumed, so the second head arrives 16 s after the
-        // first. Only the rotation of the last 30 s counts.
+        // first. Only the rotation within the most recent 30 s counts.
         let at_rest = swung(0.8, 0.0);
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }

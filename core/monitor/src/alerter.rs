@@ -24,7 +24,7 @@ use headrace_sensor::reading::SourceId;
 
 /// Largest share of the target that position errors may use up. Above it, the position is doubtful.
 const SPREAD_SHARE: f64 = 0.2;
-/// Maximum number of notices in a tick per alert in the list. An alert may change several times in a tick.
+/// Number of notices per alert and tick that have room. An alert may change several times in a tick.
 const NOTICES_PER_ALERT: usize = 4;
 
 /// Alerts, notes and the live state.
@@ -47,7 +47,7 @@ pub struct Alerter {
 impl Alerter {
     /// Creates the alerter. `keeps_results` says whether its streams keep the contents of each tick.
     ///
-    /// `runs` is the maximum number of runs of missed sections that change in a tick. Allocates: all memory.
+    /// `runs` is the maximum number of missed stretches that change in a tick. Allocates: all memory.
     pub(super) fn new(
         list: AlertList,
         state: &LiveState,
@@ -96,7 +96,7 @@ impl Alerter {
         self.state.now = now;
     }
 
-    /// Applies the changes of runs of missed sections that were judged at the end of a dive.
+    /// Applies the missed stretches that the judgement at the end of a dive has changed.
     pub(super) fn take_runs_at_end(&mut self, runs: &[RunInput]) {
         self.notices.clear();
         for run in runs {
@@ -221,7 +221,7 @@ struct Inputs<'a> {
     runs: &'a [RunInput],
     commands: &'a [ReceivedCommand],
     events: &'a [Event],
-    /// Number of the tick's changed runs of missed sections, commands and events applied so far.
+    /// Number of changed missed stretches, of commands and of events that have been applied so far.
     taken: (usize, usize, usize),
 }
 
@@ -245,7 +245,7 @@ impl Alerter {
         self.hear(inputs, inputs.events.len());
     }
 
-    /// Applies a changed run of flagged sections.
+    /// Applies a changed missed stretch.
     fn take_run(&mut self, run: &RunInput) {
         let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
         self.list.take_run(run, &mut to);
@@ -261,7 +261,7 @@ impl Alerter {
         inputs.taken.2 = until.max(inputs.taken.2);
     }
 
-    /// Applies changed runs of missed sections, and commands, up to an advice update, or all of them.
+    /// Applies changed missed stretches and commands: those before an advice update, or all if `beat` is `None`.
     ///
     /// A command comes before the results of the event that follows it.
     fn take_until(&mut self, beat: Option<usize>, inputs: &mut Inputs<'_>) {

@@ -212,7 +212,7 @@ fn head_descriptions(world: &mut World, mission: &Mission, sources: &[SourceInfo
     )
 }
 
-/// Largest distance of a head before or behind the vehicle's origin, m.
+/// Largest distance of a head ahead of or behind the vehicle's origin, m.
 fn heads_reach_m(world: &mut World) -> f64 {
     let mut heads = world.query_filtered::<&Mounted, With<Head>>();
     heads.iter(world).map(|mounted| mounted.info.mount.position.x().abs()).fold(0.0, f64::max)

@@ -26,7 +26,7 @@ pub use text::ShortText;
 pub use headrace_vehicle::CONSOLE_ID;
 /// Maximum number of commands that wait for the loop.
 const MOST_WAITING: usize = 256;
-/// Least time between two calls of a live loop that counts as a stall of the computer.
+/// Shortest time between two calls of `take_in_live` that counts as a stall of the computer.
 const STALL: DurNs = DurNs(500_000_000);
 /// Interval of [`Command::Time`] while no sensor delivers readings. The commands let the loop notice stale data.
 const TIME_EVERY: DurNs = DurNs(500_000_000);
@@ -87,7 +87,7 @@ pub struct ConsoleInput {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     port: Port,
     time_told: MonoNs,
-    /// Time of the last call of a live dive's loop.
+    /// Time of the most recent call of `take_in_live`; `None` before the first call.
     called: Option<MonoNs>,
 }
 
@@ -102,7 +102,7 @@ impl ConsoleInput {
         Some((input, ConsolePort { waiting, clock, notes: Arc::default() }))
     }
 
-    /// Moves waiting commands into the ring at `now`, for the next tick. Commands without room keep waiting.
+    /// Moves waiting commands into the ring at `now`, for the next tick. A command keeps waiting if the ring is full.
     pub fn take_in(&mut self, now: MonoNs) {
         while self.port.has_room(MAX_COMMAND_BYTES) {
             let Some((at, command)) = self.waiting.pop() else { return };
@@ -111,7 +111,7 @@ impl ConsoleInput {
     }
 
     /// Moves waiting commands into the ring of a live dive. While no sensor delivers readings, also sends the
-    /// time to the loop. It is called many times per second; a long time between two calls was a stall of the computer.
+    /// time to the loop. The program calls it many times per second, so a long time between two calls is a stall.
     pub fn take_in_live(&mut self, dive: &Loop, now: MonoNs) {
         self.take_in(now);
         let idle = self.called.replace(now).map_or(DurNs(0), |called| now.since(called));

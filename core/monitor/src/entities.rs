@@ -125,7 +125,7 @@ impl SensorHealth {
         self.span = Some(widened(self.span, received));
     }
 
-    /// Time for which the sensor has been silent at `now`; `None` before its first reading.
+    /// Time since the sensor's most recent packet, at `now`; `None` before the first packet.
     pub fn silent_for(&self, now: MonoNs) -> Option<DurNs> {
         self.span.map(|(_, last)| now.since(last))
     }

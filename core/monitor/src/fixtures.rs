@@ -59,7 +59,7 @@ pub(crate) fn mount() -> Mount {
     Mount { position: Vec3::zero(), rotation: Rot::identity() }
 }
 
-/// A level pose in the centre of the pipe.
+/// A pose in the centre of the pipe, without roll, pitch and yaw.
 pub(crate) fn pose(x_m: f64) -> Pose {
     let [y_m, z_m] = pipe().reference();
     Pose { position: Point3::new(x_m, y_m, z_m), attitude: Rot::identity() }

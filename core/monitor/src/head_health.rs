@@ -4,18 +4,18 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math::{self, TAU};
 
-/// Angle without a return after which a head is deaf, radians: a whole turn.
+/// Angle without a return after which a head counts as detecting no wall, radians: a whole turn.
 ///
 /// Absorbing walls and side tunnels suppress returns over less than a turn.
 const DEAF_RAD: f64 = TAU;
 /// Averaging angle for the share of returns that are away from the design wall, radians.
 const ELSEWHERE_RAD: f64 = TAU / 2.0;
-/// A head is stuck if it returns a constant range over this angle, radians, while the deviation from the
-/// design varies by this much, m.
+/// A head is stuck if its range stays constant over this angle, radians, although the deviation from the
+/// design varies by more than `STUCK_M`, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
-/// Upper and lower share of returns away from the design wall. A head is deaf if its share is above the first
-/// value while another head's is below the second.
+/// Two limits for the share of returns that are away from the design wall. A head detects no wall if its share
+/// is above the first limit while another head's share is below the second limit.
 const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 
 /// Health of a head; part of the loop's state.
@@ -85,7 +85,7 @@ impl HeadHealth {
             return;
         };
         if self.hears_nothing() {
-            // When deafness ends, all averages start again.
+            // When the head gets returns again, all averages start anew.
             *self = Self { last_rad: angle_rad, ..Self::default() };
         }
         self.unheard_rad = 0.0;
@@ -100,7 +100,7 @@ impl HeadHealth {
         self.unheard_rad >= DEAF_RAD
     }
 
-    /// Whether the head is deaf: it detects no wall at all.
+    /// Whether the head is deaf, which means that it detects no wall.
     ///
     /// A head is deaf in three cases. A whole turn gave no return. All returns of half a turn have the same
     /// range although the wall's distance varies. Nearly all returns are off the design while another head
@@ -141,11 +141,11 @@ mod tests {
     }
 
     #[test]
-    fn head_is_deaf_after_a_turn_without_returns() {
+    fn head_detects_no_wall_after_a_turn_without_returns() {
         let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
-        // A single return ends the head's deafness.
+        // A single return is enough: the head counts as detecting the wall again.
         let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
         // Three quarters of each turn give no return, as beside a side tunnel or an absorbing wall.
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn head_contradicting_the_design_is_deaf_if_another_head_detects_the_wall() {
+    fn head_off_the_design_counts_as_detecting_no_wall_if_another_head_detects_it() {
         let elsewhere = hearing(1200, |ping| Some(ping < 400));
         let [hears, does_not] = [hearing(1200, |_| Some(true)), hearing(1200, |_| Some(false))];
         assert!(elsewhere.is_deaf([does_not.elsewhere(), hears.elsewhere()].into_iter()));

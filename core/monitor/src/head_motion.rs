@@ -41,7 +41,7 @@ pub struct Turned {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct MeasuredMotion {
     last: Option<(MonoNs, f64)>,
-    /// Signed angle by which the head moved last, radians.
+    /// Signed angle of the head's most recent step, radians.
     last_step_rad: f64,
     /// Unsigned angle turned through since the last turning point or start, radians.
     since_turning_rad: f64,
@@ -56,7 +56,7 @@ pub struct MeasuredMotion {
 }
 
 impl MeasuredMotion {
-    /// Time and angle, radians, of the last ping at a new angle.
+    /// Time and angle (radians) of the most recent ping at a new angle.
     pub fn last(&self) -> Option<(MonoNs, f64)> {
         self.last
     }
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn stalled_head_restarts_with_a_fresh_rate() {
+    fn stall_of_a_head_does_not_change_its_measured_rate() {
         let mut track = MeasuredMotion::default();
         for k in 0..100 {
             track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * k as f64));

@@ -21,17 +21,17 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Time between two messages on the coverage extent and its metres by verdict, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
-/// Minimum length of missed sections, m, for which a cause that wasn't reported before is reported.
+/// A further cause of a missed stretch is reported only if it applies to at least this length, m.
 const LASTS_M: f64 = 1.0;
 
 /// A live message. The field names are the contract of `--json-lines`. Lengths are in m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum LiveMessage {
-    /// Sections were missed. If a run of missed sections continues with another cause, the message is
+    /// Sections were missed. If a missed stretch continues with another cause, the message is
     /// repeated from the first section with that cause.
     Flag {
-        /// Number of the run of flagged sections.
+        /// Number of the missed stretch.
         run: u32,
         /// Beginning of the stretch with this cause, m.
         from_m: f64,
@@ -43,20 +43,20 @@ pub enum LiveMessage {
         #[serde(skip)]
         missed: Missed,
     },
-    /// The end of the run of sections that was most recently flagged as missed is known.
+    /// The end of the most recently flagged missed stretch is known.
     FlagEnds {
-        /// Number of the run of flagged sections.
+        /// Number of the missed stretch.
         run: u32,
-        /// Beginning of the run of missed sections.
+        /// Beginning of the missed stretch.
         from_m: f64,
-        /// End of the run of missed sections.
+        /// End of the missed stretch.
         to_m: f64,
-        /// Metres of the run's sections that fail at present.
+        /// Metres of the stretch that fail at present.
         failed_m: f64,
     },
     /// The vehicle has driven through a missed stretch again, and none of its sections fails any more.
     Cleared {
-        /// Number of the run of sections that was flagged as missed.
+        /// Number of the missed stretch.
         run: u32,
         /// Beginning of the cleared stretch.
         from_m: f64,
@@ -95,15 +95,14 @@ pub enum LiveMessage {
 /// A dive has one converter. All readers share its messages.
 #[derive(Debug, Default)]
 pub struct LiveMessages {
-    /// Run of sections that was most recently flagged as missed, with its reported causes, until its end is
-    /// reported.
+    /// The most recently flagged missed stretch, with its reported causes, until its end is reported.
     run: Option<(RunId, Causes)>,
     /// Stretches reported as missed, as long as any of their sections fails.
     missed: Vec<ReportedMiss>,
     /// Last reported stretch without a verdict, until its end is reported.
     unsure: Option<Stretch>,
-    /// Whether the stretch without a verdict was reported as one in which the hole's error, rather than its
-    /// size, prevents a verdict.
+    /// Whether the stretch without a verdict was reported with its hole's error, and not the hole's size, as the
+    /// reason.
     told_as_error: bool,
     /// Stretches without a verdict whose ends were reported.
     told: Vec<Stretch>,
@@ -132,8 +131,8 @@ impl ReportedMiss {
 }
 
 impl LiveMessages {
-    /// Resets all state after a jump of the playback, which is recognised by a time other than the end of the
-    /// last tick.
+    /// Resets all state after a jump of the playback. After a jump, `now` differs from the end of the last tick
+    /// that was played.
     ///
     /// After a mere pause, the messages continue.
     pub fn stopped(&mut self, now: MonoNs) {
@@ -186,7 +185,7 @@ impl LiveMessages {
         }
     }
 
-    /// Reports the ends of open stretches at the end of a dive.
+    /// Reports the ends of the stretches that last until the end of a dive.
     pub fn end(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         self.close_run(sections, tell);
         self.close_unsure(sections, tell);
@@ -254,8 +253,8 @@ impl LiveMessages {
         if let Some(last) = &mut self.unsure
             && (is_told(last) || last.join(&here, section_m))
         {
-            // The first sections of a stretch without a verdict may lack it for another reason than most of
-            // the sections.
+            // The first sections of the stretch may lack a verdict for another reason than most of its
+            // sections.
             if self.told_as_error && !last.is_mostly_error() {
                 self.told_as_error = false;
                 tell(LiveMessage::CannotSay(UnsureStretch::of(last, sections)));
@@ -274,10 +273,10 @@ impl LiveMessages {
         }
     }
 
-    /// Reports the end of the most recently flagged run of sections once a section beyond the run has a
-    /// verdict other than fail.
+    /// Reports the end of the most recently flagged missed stretch once a section beyond it has a verdict other
+    /// than fail or open.
     fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
-        // An open section, which may still get samples, may still join the run of missed sections.
+        // An open section may still get samples, so it may still join the missed stretch.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|(id, _)| sections.runs().get(id));
@@ -298,7 +297,7 @@ impl LiveMessages {
         let sections = &dive.view().coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
         match change {
-            // A run of missed sections within a reported stretch is not a new stretch.
+            // A missed stretch within a reported stretch is not a new stretch.
             RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
             RunChange::Raised => {
                 self.close_run(sections, tell);
@@ -322,7 +321,7 @@ impl LiveMessages {
         }
     }
 
-    /// Merges a run of missed sections that has grown into the reported stretches that it touches.
+    /// Merges a missed stretch, which has grown, with the reported stretches that it touches.
     fn widen(&mut self, run: &Run) {
         let mut met = self.missed.iter().filter(|told| told.meets(run));
         let Some(mut whole) = met.next().copied() else { return };
@@ -351,7 +350,7 @@ impl LiveMessages {
         self.close_unsure(sections, tell);
     }
 
-    /// Reports a run of missed sections again if at least a metre of it fails for a cause not reported yet.
+    /// Reports a missed stretch again if at least a metre of it fails for a cause not reported yet.
     ///
     /// A pilot who follows only the earlier advice may miss that wall again.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
@@ -375,8 +374,8 @@ fn alert_change(change: AlertChange, alert: &ListedAlert, at: MonoNs, dive: &Loo
     LiveMessage::AlertChange { change, alert: Box::new(alert.json(&dive.view().surroundings(), at)) }
 }
 
-/// The reported stretch without a verdict, with the present state of its sections, but with the ends that
-/// were reported.
+/// Returns a reported stretch without a verdict, with the present state of its sections. The ends stay as
+/// they were reported.
 ///
 /// If every section has a verdict by now, returns the stretch as it was reported.
 fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
@@ -393,7 +392,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     now
 }
 
-/// Message that reports a run of sections as missed, beginning at one of these sections.
+/// Message that reports a missed stretch, from one of its sections on.
 fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> LiveMessage {
     let sections = &dive.view().coverage().sections;
     let from_m = sections.bounds_m(section).0;

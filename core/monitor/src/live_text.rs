@@ -93,8 +93,8 @@ impl PilotLine {
     }
 }
 
-/// Status line: place, speed, condition and action. The turn's forecast, silent sensors and failed metres
-/// follow.
+/// Status line: place, speed, condition and action. Missed metres, faulty sensors and the turn's
+/// forecast follow the condition.
 ///
 /// `name` returns a source's id.
 pub fn status_line(

@@ -17,7 +17,7 @@ const LEAST: u32 = 100;
 /// Weight of the overall loss share, in pings, in the estimate of the loss share after a lost ping. It
 /// matters while few pings are lost.
 const USUAL: f64 = 50.0;
-/// Share of lost pings above which a head is nearly deaf. Hardly any angle then gives a return in two
+/// Share of lost pings above which a head hardly detects the wall. Hardly any angle then gives a return in two
 /// successive turns.
 const NEARLY_ALL: f64 = 0.75;
 
@@ -62,8 +62,8 @@ impl Angles {
 /// Returns that one head loses by chance; part of the loop's state.
 ///
 /// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
-/// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such returns are not lost by
-/// chance, and none of them is counted.
+/// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such missing returns
+/// are not lost by chance, and none of them is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
     /// Whether the wall was detected at each angle in the last turn, and in the turn before that.
@@ -71,8 +71,8 @@ pub struct LossCount {
     heard_before: Angles,
     /// For each angle: whether the ping just before the last ping at that angle was lost.
     followed_lost: Angles,
-    /// Counts of all pings at wall within range, of the counted pings, and of the counted pings that followed
-    /// a lost ping.
+    /// Three counts: all pings at wall within range; the counted pings, see above; and the counted pings that
+    /// followed a lost ping.
     any: Count,
     by_chance: Count,
     after_lost: Count,
@@ -112,7 +112,7 @@ impl LossCount {
         let was_deaf = self.hearing.hears_nothing();
         self.hearing.add(angle_rad, heard);
         if was_deaf && heard.is_some() {
-            // Losses during deafness say nothing about the losses from now on.
+            // Losses while the head detected nothing say nothing about the losses from now on.
             *self = Self { hearing: self.hearing, ..Self::default() };
         }
     }
@@ -122,7 +122,7 @@ impl LossCount {
         &self.hearing
     }
 
-    /// Upper bound of the rate of random losses. All lost pings count until enough pings have been counted.
+    /// Upper bound of the rate of random losses. Until enough pings are counted, all lost pings count.
     pub fn at_most(&self) -> LossRate {
         if self.by_chance.all >= LEAST {
             self.rate()
@@ -131,7 +131,7 @@ impl LossCount {
         }
     }
 
-    /// Rate at which returns are lost by chance. For a nearly deaf head all lost pings count.
+    /// Rate at which returns are lost by chance. If a head hardly detects the wall, all lost pings count.
     pub fn rate(&self) -> LossRate {
         let deaf = ((self.any.share() - NEARLY_ALL) / (1.0 - NEARLY_ALL)).max(0.0);
         let share = self.by_chance.share();
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn loss_count_restarts_when_a_deaf_head_detects_the_wall_again() {
+    fn loss_count_restarts_at_the_first_return_after_a_turn_without_returns() {
         let wall = Heard { range_m: 5.0, off_m: 0.0, is_wall: true };
         let mut count = LossCount::default();
         for ping in 0..4000 {
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn rate_and_run_length_of_random_losses_are_measured() {
+    fn share_of_random_losses_is_measured_overall_and_after_a_lost_ping() {
         for in_hundred in [2_u32, 10, 40, 70] {
             let LossRate { share, after_lost } = turned(24_000, |ping| chance(ping, in_hundred.into()));
             let expected = f64::from(in_hundred) / 100.0;
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn loss_rate_of_a_deaf_head_exceeds_90_percent() {
+    fn loss_rate_of_a_head_without_returns_exceeds_90_percent() {
         let deaf = turned(24_000, |ping| ping >= 4000);
         assert!(deaf.share > 0.9 && deaf.after_lost > 0.9, "{deaf:?}");
         // The few losses in the second turn hardly change the rate.

@@ -62,7 +62,8 @@ impl Inbox {
         self.packets.is_empty()
     }
 
-    /// Takes the waiting packets, of at most `allowance_bytes`. They are sorted by recorded order, then receive time, source and sequence.
+    /// Takes waiting packets, at most `allowance_bytes` in total. They are sorted by recorded order, then by
+    /// receive time, source and sequence.
     ///
     /// Packets of one source stay in order of arrival, whatever their timestamps. Allocates: never.
     pub(super) fn fill(&mut self, readers: &mut [PortReader], allowance_bytes: usize) {

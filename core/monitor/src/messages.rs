@@ -144,7 +144,7 @@ pub struct PlacedItem {
     pub placement: Placement,
 }
 
-/// Judged metres and the observations that hold at an advice update.
+/// Coverage results and observations at an advice update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
     /// Metres of the coverage extent by verdict.
@@ -175,13 +175,13 @@ pub enum Notice {
         /// Kind of the section's change.
         change: Judgement,
     },
-    /// A run of flagged sections has changed.
+    /// A missed stretch has changed.
     Run {
-        /// Number of the run.
+        /// Number of the missed stretch.
         id: RunId,
         /// Time of the change, in data time.
         at: MonoNs,
-        /// Kind of the run's change.
+        /// Kind of the stretch's change.
         change: RunChange,
     },
     /// Speed advice at an update.

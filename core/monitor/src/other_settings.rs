@@ -44,8 +44,8 @@ impl HeadSpecification {
         }
     }
 
-    /// Among the scan modes with a finer step, the one that allows the highest speed. If none meets the
-    /// target: the finest one.
+    /// Returns the scan mode with a finer step that allows the highest speed. If no such mode meets the target,
+    /// returns the finest.
     ///
     /// `t_y_m` converts a step of the head, radians, to the step along the wall, m.
     fn finer(&self, target_m: f64, t_y_m: impl Fn(f64) -> f64) -> Option<&HeadMode> {
@@ -61,8 +61,8 @@ impl HeadSpecification {
         fastest.map(|(mode, _)| mode).or_else(finest)
     }
 
-    /// Wall as seen by the head with the vehicle level in the tunnel's centre; `None` if the head is outside
-    /// the profile then.
+    /// Wall as the head sees it from the tunnel's centre while roll, pitch and yaw are zero; `None` if the head is
+    /// then outside the profile.
     fn ring_in_the_middle(&self, profile: &Profile, rays: u32) -> Option<Ring> {
         let [y, z] = profile.reference();
         let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -86,8 +86,8 @@ fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(
     longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
-/// Largest ratios of a head's angular step and turn period with the alternative setting to those with the
-/// present one. The head with the largest change decides for the vehicle.
+/// Effect of the alternative settings: ratios of a head's new angular step and turn period to the present ones.
+/// The head with the largest ratio decides for the vehicle.
 pub(super) fn of_heads(world: &mut World, profile: &Profile, target_m: f64) -> OtherSettings {
     let mut heads = world.query::<&HeadSpecification>();
     let farthest_m = profile.farthest_m(profile.reference());
@@ -107,8 +107,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    // The steps computed above assume perpendicular beams. The samples of the trial show whether the mode is
-    // also fine enough in corners.
+    // The step along the wall assumes a perpendicular beam here. Coverage tests with the section's samples whether
+    // the mode is also fine enough in corners.
     let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),
@@ -165,7 +165,7 @@ mod tests {
         let ceran = shapes::ceran().unwrap();
         let named = |target_m: f64| head(2.4, None).settings("", &ceran, target_m).finer;
         let farthest_m = ceran.farthest_m(ceran.reference());
-        assert!(0.9_f64.to_radians() * farthest_m < 0.13, "squarely FAST would do");
+        assert!(0.9_f64.to_radians() * farthest_m < 0.13, "FAST would do for a perpendicular beam");
         assert_eq!(named(0.14).unwrap().as_str(), "medium");
         assert_eq!(named(0.5).unwrap().as_str(), "fast");
     }

@@ -87,7 +87,7 @@ impl From<&Evidence> for CauseFigures {
 }
 
 impl CauseFigures {
-    /// Figures of a run of failed sections. For each cause that the text names, the figures come from the
+    /// Figures of a missed stretch. For each cause that the text names, the figures come from the
     /// section that represents the cause.
     pub fn of_run(sections: &Sections, run: &Run) -> Option<Self> {
         let causes = run.named();
@@ -272,8 +272,8 @@ pub(super) fn no_position_text(lacking: NoFix) -> String {
 
 /// Text of the setting that allows a higher speed.
 ///
-/// If a lower speed doesn't help, it is the remedy. Otherwise it is a mode that all heads have and that
-/// allows a higher speed.
+/// If a lower speed doesn't help, the setting is the remedy. If no head sees a part of the wall, it is a longer
+/// range. Otherwise it is a mode that all heads have and that allows a higher speed.
 pub fn gain_text(advice: &Advice, heads: &HeadDescriptions) -> Option<String> {
     if advice.remedy.is_some() {
         return Some(remedy_text(advice.remedy));
@@ -333,7 +333,7 @@ pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an observation that a log has in `judgements`; `None` if no kind of observation has this number.
+/// Text of an observation from a log's stream `judgements`; `None` if no kind of observation has this number.
 ///
 /// `head` is the head or velocity log, if the observation names one.
 pub fn recorded_observation_text(kind: u64, head: &str, occurrence: Occurrence) -> Option<String> {

@@ -115,7 +115,7 @@ impl core::ops::Deref for PlacedTick {
 }
 
 impl Placer {
-    /// Creates the placer from a world that has the sensors, and the vehicle's entity.
+    /// Creates the placer from a world that has the entities of the sensors and of the vehicle.
     ///
     /// Errors: the order of two systems is ambiguous.
     pub(super) fn new(
@@ -147,7 +147,7 @@ impl Placer {
         Ok(Self { part, readers })
     }
 
-    /// Processes the waiting packets, of at most `allowance_bytes`. Allocates: never, if the lists have room.
+    /// Processes waiting packets, at most `allowance_bytes` in total. Allocates: never, if the lists have room.
     pub fn tick(&mut self, allowance_bytes: usize, into: &mut Placed) {
         self.swap_lists(into);
         let Self { part, readers } = self;
@@ -176,7 +176,7 @@ impl Placer {
         debug_assert!(into.commands.0.is_sorted_by_key(|command| command.before), "commands are in order");
     }
 
-    /// Takes the waiting packets, of at most `allowance_bytes`, without processing them. Allocates: never.
+    /// Takes waiting packets, at most `allowance_bytes` in total, without processing them. Allocates: never.
     pub(super) fn receive(&mut self, allowance_bytes: usize, into: &mut Placed) {
         into.inbox.fill(&mut self.readers, allowance_bytes);
         into.events.clear();
@@ -184,7 +184,7 @@ impl Placer {
         into.commands.0.clear();
     }
 
-    /// Results before the next tick, with room for a tick of any size. Allocates: all memory of the lists.
+    /// Returns the results so far, with room for a tick of any size. Allocates: all memory of the lists.
     pub(super) fn placed_with_room(&self) -> Placed {
         let mut placed = Placed {
             inbox: Inbox::with_room(),
@@ -223,8 +223,8 @@ impl Placer {
 
     /// Copies the state of the placer of another loop.
     ///
-    /// Errors: the other placer has other sensors or another navigation. This placer must not be used
-    /// afterwards.
+    /// Errors: the other placer has other sensors or another navigation. After an error, this placer must not be
+    /// used.
     pub fn take_over(&mut self, other: &Self) -> Result<(), SnapshotError> {
         let mut to = Saver::default();
         to.part("placer");

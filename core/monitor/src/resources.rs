@@ -23,7 +23,7 @@ use headrace_sampling::layout::HeadLayout;
 pub struct TunnelDesign {
     /// Design profile of the tunnel's cross-section.
     pub profile: Profile,
-    /// Water properties, gravity and levels of the site.
+    /// Water properties, gravity and water level of the site.
     pub site: Site,
     /// Length of the tunnel, m.
     pub length_m: f64,
@@ -130,7 +130,7 @@ impl Digests {
 pub struct Tally {
     /// Number of samples on the wall.
     pub samples: u64,
-    /// Number of pings without a return although the wall was within range, or without a fix.
+    /// Number of pings without a return although the wall was within range. Without a fix, the range is not checked.
     pub missing: u64,
     /// Number of pings without a return because the wall was out of range.
     pub out_of_range: u64,

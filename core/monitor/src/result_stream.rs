@@ -19,7 +19,7 @@ pub enum RecordKind {
     NoSample = 2,
     /// A judged section.
     Section = 3,
-    /// A changed run of sections that are flagged as missed.
+    /// A missed stretch that has changed.
     Run = 4,
     /// Speed advice.
     Advice = 5,

@@ -374,8 +374,8 @@ impl Loop {
         (self.held, self.ticks) = (true, tick);
     }
 
-    /// Ends [`Loop::hold`]. From now on the loop processes packets in the state `snapshot`, which another loop has
-    /// reached with all packets that were passed on. `None` means the state of a new loop.
+    /// Ends [`Loop::hold`]. From now on the loop processes packets, beginning in the state `snapshot`. Another loop
+    /// has reached this state with all packets that were passed on. `None` means the state of a new loop.
     ///
     /// Packets waiting in the rings stay there. The number and time of the last tick are kept.
     ///

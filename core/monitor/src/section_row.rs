@@ -1,4 +1,4 @@
-//! One section as read by outsiders. The report, the page and the tables are encodings of this row.
+//! One section as the report, the page and the tables give it. All three encode this row.
 
 use serde::{Serialize, Serializer};
 
@@ -55,7 +55,7 @@ pub struct SectionRow {
     /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
     #[serde(skip)]
     pub settled: bool,
-    /// Whether the section is open although further driving won't change it.
+    /// Whether the section is open although driving on won't change it.
     ///
     /// The vehicle began or turned back there, so some heads have not been in the section.
     pub not_inspected: bool,

@@ -1,5 +1,5 @@
 //! The surveyor: the world that converts georeferenced pings to samples, passes, verdicts on sections, and
-//! runs of missed sections.
+//! missed stretches.
 //!
 //! Its entities are the heads.
 
@@ -164,7 +164,7 @@ impl Surveyor {
         wall::end_returns(&mut self.part.world);
     }
 
-    /// Requests to judge sections at the end of a dive, and the fields that all these requests share.
+    /// Returns the sections to judge at the end of a dive, and a request whose other fields fit all of them.
     pub(super) fn open_requests(&mut self, at: MonoNs) -> (Vec<i64>, Option<Request>) {
         let outlook = self.outlook(at);
         let (mut open, mut common) = (Vec::new(), None);

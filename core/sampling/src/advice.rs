@@ -35,7 +35,7 @@ pub use search::SPEED_MARGIN;
 const ALTERNATIVES_EVERY: u32 = 25;
 /// Number of iterations that solve for the speed and the position margin, which depend on each other.
 const FALLS: u32 = 3;
-/// Speed below which the last direction of travel is assumed to continue, m/s.
+/// Speed below which the previous direction of travel is assumed to continue, m/s.
 const UNDER_WAY_MPS: f64 = 0.02;
 /// Maximum number of stretches of wall outside a head's range limits.
 const OUT_OF_REACH: usize = 16;
@@ -46,7 +46,7 @@ struct Fastest {
     speed_mps: f64,
     /// Advised speed, which is lower by the margin for speed errors, m/s.
     advised_mps: f64,
-    /// T_y (largest distance between samples of a turn) at the place that limits the speed, m.
+    /// T_y (largest distance between neighbouring samples of a turn) at the place that limits the speed, m.
     t_y_m: f64,
 }
 
@@ -54,11 +54,11 @@ struct Fastest {
 struct Chosen {
     /// Advised speed, m/s; `None` if no speed meets the target.
     advised_mps: Option<f64>,
-    /// Lower end of the interval of speeds that ends at the advised one, m/s.
+    /// Lower end of the interval of speeds that ends at the advised speed, m/s.
     from_mps: f64,
-    /// Speed nearest to the present one that meets the target, m/s.
+    /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
     nearest_mps: Option<f64>,
-    /// Whether only the passes of several swings together meet the target at the advised speed.
+    /// Whether the advised speed meets the target only with the passes of several swings of the vehicle together.
     by_several_swings: bool,
 }
 
@@ -90,7 +90,7 @@ pub struct Advisor {
     /// Largest distance between neighbouring samples of a turn, in each mode, at the tunnel's centre, m.
     centred_m: Vec<f64>,
     parallax_rad: f64,
-    /// Number of ring soundings per angular step, for each head that turns.
+    /// Number of rays of the ring per angular step, for each head that turns.
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring of rays is checked first at the next update.
     next: usize,
@@ -100,7 +100,7 @@ pub struct Advisor {
     anew: Option<Anew>,
     margins: Option<Margins>,
     astern: bool,
-    /// Largest speed that met the target in the last update.
+    /// Largest speed that met the target in the previous update.
     last_mps: Option<f64>,
     /// Distance that the vehicle may move before the heads' rings are recast, m.
     still_m: f64,
@@ -191,7 +191,7 @@ impl Advisor {
         self.heads.iter().map(|head| head.hidden.as_slice())
     }
 
-    /// Number of ring soundings per angular step of a head.
+    /// Number of rays of the ring per angular step of a head.
     fn stride(&self, step_rad: f64) -> usize {
         Ring::stride(step_rad, self.task.looks.ring)
     }
@@ -291,7 +291,8 @@ impl Advisor {
         left_m.clamp(0.0, self.task.length_m)
     }
 
-    /// Chooses between the largest speed at which successive passes meet the target, and that of several swings.
+    /// Chooses between two speeds: the largest speed at which successive passes meet the target, and the speed at which
+    /// passes of several swings meet the target together.
     fn choose(&self, fastest: Option<&Fastest>, driving: &Driving<'_>, now_mps: f64) -> Chosen {
         let Some(fastest) = fastest.filter(|fastest| fastest.advised_mps >= self.swung_mps) else {
             let advised_mps = Some(self.swung_mps).filter(|mps| *mps > 0.0);
@@ -309,7 +310,7 @@ impl Advisor {
 
     /// Returns the advised speed at which passes of several swings meet the target together, m/s.
     ///
-    /// Zero if there is none, or if the swing is too small for this speed to be higher than that of successive passes.
+    /// Zero if there is no such speed, or if the swing is so small that successive passes allow a higher speed.
     fn swung_mps(
         &self,
         phasing: &Phasing,
@@ -319,7 +320,7 @@ impl Advisor {
         pose: &Pose,
     ) -> f64 {
         const PLACES: u32 = 8;
-        /// Smallest displacement by swing at which the passes of several swings are simulated, as a share of the target.
+        /// The passes of several swings are simulated only if the beams swing by at least this share of the target.
         const LEAST_SHARE: f64 = 0.5;
         /// Shortest history that shows how the vehicle swings, seconds.
         const LEAST_S: f64 = 30.0;
@@ -404,7 +405,7 @@ impl Advisor {
         }
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
-        // Most heads' rings are unchanged since the last advice.
+        // The steps are kept with the ring, because most rings are unchanged since the previous advice.
         for (head, stride) in self.heads.iter_mut().zip(self.strides) {
             if let Some(stride) = stride {
                 head.ring.keep_steps(stride);
@@ -554,7 +555,7 @@ impl Advisor {
             fastest(lossy, going, sure),
         ];
         let mut advised = speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN));
-        // With all margins, the speed is the advised one, which may rest on the passes of several swings.
+        // Like the advised speed, the speeds that allow for swing may rest on the passes of several swings.
         for speed_mps in advised.iter_mut().skip(BEFORE_SWING) {
             *speed_mps = speed_mps.max(self.swung_mps);
         }
@@ -669,7 +670,9 @@ fn largest_phase_error_rad(passes: &Passes, heads: usize) -> Option<f64> {
     errors.max_by(|a, b| a.abs().total_cmp(&b.abs())).filter(|_| passes.heads().len() > 1)
 }
 
-/// Width of the strip that no head sees, and the arc length of its middle, m, if it is why no speed meets the target.
+/// Width of the strip that no head sees, and the arc length of its middle, m.
+///
+/// `None` unless this strip is the reason why no speed meets the target.
 fn unseen_m(fastest: &Result<Fastest, SamplingError>) -> Option<[f64; 2]> {
     match fastest {
         Err(SamplingError::UnseenStrip { width_m, arc_m, .. }) => Some([*width_m, *arc_m]),

@@ -11,7 +11,7 @@ use headrace_geometry::time::DurNs;
 /// Headrace does not wait for a silent head, and leaves it out of the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
-/// Tolerance for a whole number of steps per turn, because steps are specified in decimal degrees.
+/// Tolerance with which a turn must be a whole number of steps. Steps are specified in decimal degrees.
 const WHOLE_STEPS: f64 = 1e-6;
 /// Maximum number of angular steps per turn of a head.
 const MAX_STEPS: f64 = 100_000.0;
@@ -156,11 +156,11 @@ pub struct HeadMotion {
     pub mount: Mount,
     /// Current angle of the head in the sensor frame, radians.
     pub angle_rad: f64,
-    /// Rate of the head's rotation, rad/s, positive where its angle grows.
+    /// Rate of the head's rotation, rad/s, positive if its angle grows.
     pub rate_radps: f64,
     /// Angle between two pings, radians, positive.
     pub step_rad: f64,
-    /// Size of the sector between the last two turning points, radians; `None` for continuous rotation.
+    /// Size of the sector between the two latest turning points, radians; `None` for continuous rotation.
     pub sector_rad: Option<f64>,
 }
 

@@ -67,7 +67,7 @@ pub fn start_rad(phase_rad: f64, rate_radps: f64, x_m: f64, speed_mps: f64) -> R
 
 /// gamma: start angle of a head that faces opposite to the foremost head, in [0, 2 pi).
 ///
-/// The angles of this head grow in the opposite sense to those of the foremost head.
+/// The angles of this head and of the foremost head grow in opposite senses.
 ///
 /// Errors: as for [`start_rad`].
 /// Source: Jorge et al. 2021, Eq. 21 (gamma = 2 pi - (phi(k) - omega x / v)).
@@ -190,7 +190,7 @@ fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f
     }
 }
 
-/// Returns programs of the heads with evenly interleaved passes at `speed_mps`, in the given order.
+/// Returns the program of each head, such that the heads' passes interleave evenly at `speed_mps`.
 ///
 /// Head k of s starts at the body-frame angle gamma_k = 2 pi k / s - omega x_k / v, where x_k is its distance behind
 /// the foremost head (Eq. 20). A head that faces aft turns the other way, so its start is mirrored (Eq. 21). In
@@ -261,26 +261,26 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// Spacing rule for heads that are apart along the hull, with starts that differ by multiples of 1/s turn.
+/// Spacing rule x = q v T / s for s heads that are x apart along the hull, at the speed v with the turn period T.
 ///
-/// The rule relates distance, speed and turn period such that the heads' passes interleave. Heads with these start
-/// angles interfere least.
+/// If the rule holds for a whole number q, the heads' passes interleave with start angles that differ by multiples of
+/// 1/s turn. Heads with these start angles interfere least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HullRule {
-    /// q: number of s-ths of a turn in which the vehicle travels the distance between the heads, rounded.
+    /// q: time in which the vehicle travels the distance between the heads, in units of T / s, rounded.
     pub q: u32,
-    /// The speed that fits the rule, m/s: s x / (q T).
+    /// Speed that meets the rule with the given distance and turn period, m/s: s x / (q T).
     pub speed_mps: f64,
-    /// The distance that fits the rule, m: q v T / s.
+    /// Distance between the heads that meets the rule with the given speed and turn period, m: q v T / s.
     pub apart_m: f64,
-    /// The turn period that fits the rule, seconds: s x / (q v).
+    /// Turn period that meets the rule with the given distance and speed, seconds: s x / (q v).
     pub turn_s: f64,
 }
 
-/// Returns the spacing rule for a head `apart_m` behind the first, of `heads` heads in phase shift.
+/// Returns the figures of the spacing rule for `heads` heads in phase shift, one of them `apart_m` behind the first.
 ///
 /// Errors: an argument that isn't above zero, or an invalid number of heads.
-/// Source: Jorge et al. 2021, §5.1 (x = q v T; T = s x / (q v), which is the same rule for s-ths of a turn).
+/// Source: Jorge et al. 2021, §5.1 (x = q v T for whole turns; T = s x / (q v) for fractions 1/s of a turn).
 pub fn hull_rule(apart_m: f64, heads: usize, speed_mps: f64, turn_s: f64) -> Result<HullRule, SamplingError> {
     HeadLayout::PhaseShift.check(heads)?;
     let apart_m = positive("the distance along the hull in metres", apart_m)?;
@@ -323,7 +323,7 @@ pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Each figure meets the rule x = q v T / s with the other two, and q is the nearest whole number.
+    /// Each figure meets the rule x = q v T / s with the other two given figures, and q is the nearest whole number.
     #[test]
     fn each_hull_rule_figure_satisfies_the_rule_with_the_other_inputs() {
         for (apart_m, heads, speed_mps, turn_s, q) in

@@ -2,8 +2,8 @@
 //!
 //! [`section`] and [`spacing`] contain the closed forms of Jorge et al. 2021, [`ring`] the general case by ray
 //! casting. [`layout`] and [`schedule`] define how several heads turn, [`passes`] how often they pass a place.
-//! [`swing`] adds the effect of the vehicle's own rotation, and [`losses`] that of lost returns. [`advice`] combines
-//! them for the pilot during the dive, [`plan`] for the engineer before it.
+//! [`swing`] adds the effect of the vehicle's own rotation, and [`losses`] the effect of lost returns. [`advice`]
+//! combines all effects for the pilot during the dive, [`plan`] for the engineer before the dive.
 //!
 //! ```
 //! use headrace_sampling::head::Turn;

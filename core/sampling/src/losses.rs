@@ -36,7 +36,7 @@ const MOST_SHARE: f64 = 0.999;
 pub struct LossRate {
     /// Share of pings with lost returns among all pings, from 0 to 1.
     pub share: f64,
-    /// Share of lost pings among those that follow a lost ping, from 0 to 1.
+    /// Share of lost pings among the pings that follow a lost ping, from 0 to 1.
     pub after_lost: f64,
 }
 
@@ -66,7 +66,7 @@ impl LossRate {
     /// Length in pings of the longest run of lost pings to expect at this many places of the wall.
     ///
     /// A run of this length occurs at one of these places with the probability [`MAY_FAIL`]. Zero if even a single
-    /// lost ping is less likely.
+    /// lost ping is less likely than that.
     fn longest_run(self, places: f64) -> f64 {
         let expected = places * self.share / MAY_FAIL;
         if expected <= 0.0 {
@@ -91,10 +91,10 @@ pub struct Sampled {
 impl Sampled {
     /// Returns the number of passes over each place that lost returns require in place of a single pass.
     ///
-    /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of two distances
-    /// between passes: the one that the target allows, and the one that losses leave. It ranges from 1 without losses
-    /// to [`MOST_PASSES`], and is continuous in all inputs. The model assumes that heads pass in turn, and that the
-    /// heads with the highest losses come first.
+    /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of the distance
+    /// between passes that the target allows without losses to the smaller distance that it allows with losses. The
+    /// number ranges from 1 without losses to [`MOST_PASSES`], and is continuous in all inputs. The model assumes that
+    /// heads pass in turn, and that the heads with the highest losses come first.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {
@@ -167,9 +167,9 @@ impl Sampled {
 
     /// Distance between passes at which the largest circle equals the target, m.
     ///
-    /// One of two neighbouring passes misses a run of pings. With half the distance h between samples of a turn and
-    /// half the gap g, the circle touches both ends of the gap and two neighbouring samples of the previous pass. Its
-    /// centre is (a^2 + h^2 - g^2) / (2 a) from the pass with the gap, where a is the distance between passes.
+    /// One of two neighbouring passes misses a run of pings, which leaves a gap. The circle touches both ends of the
+    /// gap and two neighbouring samples of the other pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with
+    /// the gap: a is the distance between passes, h half the distance between samples of a turn, g half the gap.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

@@ -7,8 +7,8 @@ use crate::target::Target;
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation of a hole's size up to which no margin is needed, m: about that of navigation without error
-/// estimates.
+/// Standard deviation of a hole's size up to which no margin is needed, m. Navigation without error estimates has about
+/// this value.
 const NOTHING_M: f64 = 0.002;
 /// Minimum share of the allowed distance between passes that remains after the margin for position errors.
 ///
@@ -18,10 +18,10 @@ const LEFT_SHARE: f64 = 0.6;
 const MOST_SHARE: f64 = 0.2;
 /// Share of the travel time from the foremost to the rearmost head that counts towards the time between passes.
 ///
-/// Only some neighbouring passes are by such heads, and holes between these passes grow by less than the heads'
-/// separation. With this share, a hole's size D is within two of its standard deviations 93 % of the time, over the
-/// dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a share
-/// of 0, and 99 % with a share of 1.
+/// Only some neighbouring passes are by these two heads, and holes between these passes grow by less than the heads'
+/// separation. With this share, the error of a hole's size D is within two standard deviations in 93 % of all cases,
+/// over the dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a
+/// share of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as at rest, m/s.
 const SLOW_MPS: f64 = 0.01;
@@ -31,8 +31,8 @@ const LONGEST_APART_S: f64 = 20.0;
 /// Time over which position errors accumulate between neighbouring passes of a place, s.
 ///
 /// The time is the sum of two terms: the time between two passes of evenly spread heads, and a share of the time
-/// until the rearmost head reaches the position of the foremost. `passes_per_s` is the sum of the heads' turns per
-/// second, above zero; `apart_m` is the length of hull between the heads.
+/// until the rearmost head reaches the position of the foremost head. `passes_per_s` is the sum of the heads' turns per
+/// second, above zero; `apart_m` is the length of hull between the foremost and the rearmost head.
 pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share: f64) -> f64 {
     let apart_s = (apart_m / speed_mps.abs().max(SLOW_MPS)).min(LONGEST_APART_S);
     1.0 / passes_per_s + apart_share * apart_s
@@ -42,8 +42,8 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 ///
 /// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
 /// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth
-/// of the target. With the margin, the allowed distance between passes is at least three fifths of that without
-/// margin. A larger margin would slow the vehicle by more than it is worth.
+/// of the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
+/// without margin. A larger margin would slow the vehicle by more than it is worth.
 pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
     let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
@@ -59,8 +59,8 @@ pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
 
 /// Exponent with which position errors grow with the time between two passes.
 ///
-/// It lies between the exponent of independent noise, 0.5, and that of drifting speeds, 1. On a swaying VITA 2 with
-/// two heads, the error is 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
+/// The exponent lies between 0.5, for independent noise, and 1, for drifting speeds. On a swaying VITA 2 with two
+/// heads, the error is 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
 const GROWTH: f64 = 0.7;
 
 /// Target minus the margin for position errors, as a function of speed.
@@ -87,7 +87,7 @@ impl RemainingTarget {
     /// Returns the target minus the margin at a speed, m; grows continuously with speed.
     pub fn at_m(&self, speed_mps: f64) -> f64 {
         let time_s = error_time_s(1.0 / self.even_gap_s, self.apart_m, speed_mps, APART_SHARE);
-        // If no heads turn, the time between passes is unknown.
+        // If no heads turn, the time between passes is unknown, and the measured error is used unchanged.
         let same = self.measured_s <= 0.0 || (time_s - self.measured_s).abs() <= f64::EPSILON * time_s;
         let growth = if same { 1.0 } else { math::exp(GROWTH * math::ln(time_s / self.measured_s)) };
         let error_m = self.pass_error_m * growth;
@@ -126,7 +126,7 @@ impl ExpectedErrors {
     }
 }
 
-/// A cause that lowers the speed below that of the ideal geometry.
+/// A cause that lowers the speed below the speed of the ideal geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Margin {
     /// Ideal geometry: only the distance that the vehicle travels between two passes limits the speed.
@@ -161,7 +161,7 @@ impl Margin {
     }
 }
 
-/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the previous one.
+/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the speed before it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
@@ -181,7 +181,9 @@ pub struct Margins {
 }
 
 impl Margins {
-    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; no speed may exceed the previous one.
+    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s.
+    ///
+    /// In the result, no speed exceeds the speed before it.
     pub fn of(speeds_mps: [f64; 6], pass_error_m: f64) -> Self {
         // Each speed is raised to the largest later speed, so that a margin with a negative cost counts as zero.
         let mut most = 0.0_f64;
@@ -237,7 +239,7 @@ mod tests {
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
         // If the distance between samples of one turn nearly equals the target, the margin reduces the allowed
-        // distance between passes to three fifths of that without margin.
+        // distance between passes to three fifths of the distance without margin.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);
         assert!(margin_m(0.1, 0.5).abs() <= 0.0 && margin_m(0.1, 0.6).abs() <= 0.0);
@@ -264,7 +266,7 @@ mod tests {
         assert!((error_time_s(0.5, 1.0, 0.0, 0.4) - 10.0).abs() < 1e-12, "at rest");
     }
 
-    /// At any speed, errors measured at another speed give the same margin as errors measured at that speed.
+    /// The margin at a speed is the same, whether the errors were measured at this speed or at another speed.
     #[test]
     fn margin_does_not_depend_on_the_speed_at_which_errors_were_measured() {
         let sure = RemainingTarget {

@@ -297,8 +297,8 @@ mod tests {
             }
         }
         let mount = head([0.0; 3], true).mount;
-        // Angles of an aft-facing head are mirrored, so its quarter turn from 10 degrees on becomes the one that ends
-        // at -10 degrees.
+        // Angles of an aft-facing head are mirrored: its quarter turn that begins at 10 degrees becomes a quarter turn
+        // that ends at -10 degrees.
         let quarter = AngleRange { from_rad: 10_f64.to_radians(), size_rad: TAU / 4.0 }.across_body(&mount);
         assert!((quarter.from_rad.to_degrees() - 260.0).abs() < 1e-9, "{quarter:?}");
         assert!(quarter.has(300_f64.to_radians()) && !quarter.has(355_f64.to_radians()));

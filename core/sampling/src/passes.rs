@@ -20,7 +20,7 @@ const AT_REST_MPS: f64 = 1e-3;
 const SAME_TURN: f64 = 0.02;
 /// Limit for the cosine of the angle between a head's axis and the tunnel's axis.
 ///
-/// Below it, the head is askew: its scan plane meets no wall near the vehicle.
+/// Below this limit, the head is askew: its scan plane meets no wall near the vehicle.
 const ASKEW: f64 = 0.1;
 
 /// Tolerance for rounding errors in shares of a turn or of a length.
@@ -190,10 +190,10 @@ impl Phasing {
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
     }
 
-    /// Mean distance of successive heads in a schedule, as a share of [`Phasing::apart_m`].
+    /// Mean distance along the hull between heads that pass a place in succession, as a share of [`Phasing::apart_m`].
     ///
-    /// The distance is measured along the hull. The share is 1 for two heads, and a half for four heads if successive
-    /// heads are side by side in pairs. It is zero if no heads are apart.
+    /// The share is 1 for two heads, and a half for four heads if successive heads are side by side in pairs. It is
+    /// zero if all heads are at the same place along the hull.
     pub fn neighbours_apart(&self) -> f64 {
         let apart_m = self.apart_m();
         if apart_m <= 0.0 {
@@ -211,7 +211,7 @@ impl Phasing {
         share
     }
 
-    /// Returns this phasing, with its phases replaced by those of a schedule of `scheduled` heads for `planned_mps`.
+    /// Returns this phasing with the phases of a schedule for `scheduled` heads at `planned_mps`.
     ///
     /// A speed of zero means a schedule that ignores positions along the hull. Heads in sectors or out of step keep
     /// their phases.
@@ -435,9 +435,9 @@ impl Passes {
 
     /// Largest unevenness of neighbouring heads at the end that their sectors share.
     ///
-    /// The unevenness is a share of the vehicle's advance in a sweep there and back. It is 0 if one head comes half a
-    /// sweep after the other, and 0.5 if both come at the same place or the timing is unknown. `None` for
-    /// continuously rotating heads.
+    /// The unevenness is a share of the vehicle's advance in a sweep there and back. It is 0 if one head reaches the
+    /// shared end half a sweep after the other head. It is 0.5 if both heads reach it at the same chainage, or if the
+    /// timing is unknown. `None` for continuously rotating heads.
     pub fn uneven_ends(&self) -> Option<f64> {
         match self.pattern {
             Pattern::Sectors { uneven, .. } => Some(uneven),

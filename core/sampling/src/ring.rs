@@ -1,6 +1,6 @@
 //! Points where a head's beams meet the wall, by ray casting for any profile and pose.
 //!
-//! The functions compute the points where the beams of a head at rest meet the wall.
+//! The head is at rest: the distance that the vehicle travels between pings is left out.
 
 use serde::{Deserialize, Serialize};
 
@@ -116,7 +116,7 @@ impl Sounding {
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// The distance is the shortest one around the perimeter. The size of a holiday is measured in this way.
+    /// The distance is measured along the shorter way around the perimeter, like the size of a holiday.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -140,7 +140,9 @@ pub struct Ring {
     perimeter_m: f64,
     /// Angles and beam directions of the soundings, cached for the next cast.
     beams: Vec<(f64, Vec3<Sensor>)>,
-    /// Number of soundings between the pairs whose distances `steps_m` caches; zero if no distances are cached.
+    /// Stride of the distances cached in `steps_m`: each is from a sounding to the sounding `stride` places on.
+    ///
+    /// Zero if no distances are cached.
     stride: usize,
     steps_m: Vec<f64>,
 }
@@ -205,7 +207,7 @@ impl Ring {
         (rounds - math::round_to_i64(rounds) as f64).abs() <= 1e-6
     }
 
-    /// Computes the beam directions of a turn, unless the last cast used the same directions.
+    /// Computes the beam directions of a turn, unless the previous cast used the same directions.
     fn aim(&mut self, start_rad: f64, count: u32) {
         let from_rad = self.beams.first().map(|(angle_rad, _)| angle_rad.to_bits());
         if self.beams.len() == count as usize && from_rad == Some((start_rad + 0.0).to_bits()) {
@@ -278,7 +280,7 @@ impl Ring {
         self.steps_m(stride).fold(0.0, f64::max)
     }
 
-    /// Distances on the unrolled wall from each sounding to the sounding `stride` places further, m.
+    /// Distances on the unrolled wall from each sounding to the sounding `stride` places on, m.
     ///
     /// The distances follow the direction of rotation. With one ping per turn, the distance is the whole perimeter.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {

@@ -29,7 +29,7 @@ impl Schedule {
         self.heads.iter().map(|(_, program)| program)
     }
 
-    /// Angle of a head's last ping at the time `since` after the start, in the sensor frame, radians.
+    /// Angle of a head's latest ping at the time `since` after the start, in the sensor frame, radians.
     ///
     /// The angle is in [0, 2 pi) for continuous rotation, or within the head's sector. `None` for a head that does
     /// not exist, or before the start.
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn last_step_of_a_sector_is_shorter_if_steps_do_not_divide_it() {
+    fn last_step_of_a_sector_is_shorter_if_steps_do_not_divide_the_sector() {
         let schedule = Schedule::new(&[head(75.0), head(75.0)], HeadLayout::SectorOffset, 0.0).unwrap();
         let there_and_back = [0.0, 75.0, 150.0, 180.0, 105.0, 30.0, 0.0, 75.0, 150.0, 180.0, 105.0];
         assert_eq!(angles_deg(&schedule, 0, 11), there_and_back);

@@ -7,7 +7,7 @@
 use super::error::{SamplingError, not_negative, positive};
 use headrace_geometry::math;
 
-/// T_y1, m: distance between samples of a turn on a flat wall at the foot of the perpendicular, the smallest there.
+/// T_y1, m: distance between samples of a turn on a flat wall at the foot of the perpendicular, where it is smallest.
 ///
 /// `distance_m` > 0 is the distance h to the wall, `step_rad` the step theta, in (0, pi/2).
 /// Errors: an argument out of range; a step of 90 degrees or more.
@@ -20,8 +20,8 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
 ///
 /// The distance is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall. The
 /// formula h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)),
-/// which avoids cancellation. Multiples of theta have twice double precision, so that a beam almost along the wall is
-/// as accurate.
+/// which avoids cancellation. Multiples of theta have twice double precision, so that the result is as accurate for a
+/// beam almost along the wall.
 /// Errors: an argument out of range; m theta of 90 degrees or more.
 /// Source: Jorge et al. 2021, Eq. 6.
 pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingError> {
@@ -101,7 +101,8 @@ pub fn beam_width_m(range_m: f64, beam_rad: f64) -> Result<f64, SamplingError> {
 /// `distance_m` is the perpendicular distance to the wall, `angle_rad` the beam's angle from the perpendicular (either
 /// side), `beam_rad` its full width.
 /// Errors: an argument out of range; an edge of the beam that never meets the wall.
-/// Source: Jorge et al. 2021, §9.2 and Fig. 15 (h (tan(alpha + zeta/2) - tan(alpha - zeta/2)), without the subtraction).
+/// Source: Jorge et al. 2021, §9.2 and Fig. 15: h (tan(alpha + zeta/2) - tan(alpha - zeta/2)), computed without the
+/// subtraction.
 pub fn footprint_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> Result<f64, SamplingError> {
     positive("the distance to the wall in metres", distance_m)?;
     positive("the beam's width in radians", beam_rad)?;

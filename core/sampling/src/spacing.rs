@@ -75,8 +75,8 @@ impl Spiral {
         math::hypot(self.advance_m(), t_y2_m)
     }
 
-    /// T_ymin, m: smallest distance between samples of a turn, from that of a head at rest: T_y1 or T_c. Source: Eq.
-    /// 14.
+    /// T_ymin, m: smallest distance between samples of a turn, from the smallest distance of a head at rest (T_y1 or
+    /// T_c). Source: Eq. 14.
     pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
         math::hypot(self.advance_m(), smallest_step_m)
     }
@@ -91,8 +91,8 @@ impl Spiral {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }
 
-    /// Mean distance between samples of a turn, m: that of a head at rest combined with the advance between two
-    /// pings.
+    /// Mean distance between samples of a turn, m: the mean distance `t_yp_m` of a head at rest, combined with the
+    /// advance between two pings.
     pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_yp_m)
     }

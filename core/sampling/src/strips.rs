@@ -32,12 +32,12 @@ pub struct Strip {
     pub seen_by: HeadSet,
     /// Whether any part of the strip is hidden from a head whose beam would otherwise sweep it.
     ///
-    /// Pings then stop up to one angular step before the strip's edge. If the strip is merely outside a sector, pings
+    /// Pings then stop up to one angular step before the strip's edge. If the strip is only outside a sector, pings
     /// stop at its edge.
     pub hidden: bool,
-    /// Longest time between two passes over the strip, as a share of the longest time on any strip: 0.5 to 1.
+    /// Longest time between two passes over the strip, as a share of a sweep there and back: 0.5 to 1.
     ///
-    /// The time is the longest at the ends of a sector.
+    /// The share is largest at the ends of a sector. For heads that rotate continuously, it is 1.
     pub wait: f64,
 }
 
@@ -67,7 +67,7 @@ pub struct Unmet {
     pub gap_s: f64,
     /// The largest distance between neighbouring samples of a turn on the strip, m.
     pub t_y_m: f64,
-    /// Width of the strip around the wall, m: the minimum distance between the samples on either side of it.
+    /// Width of the strip around the wall, m: the minimum distance between the samples on its two sides.
     pub width_m: f64,
 }
 
@@ -80,14 +80,16 @@ pub struct Strips {
     strips: Vec<Strip>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
-    /// Largest distance between samples of a turn, m, of the heads that see a strip and of all heads; by setting and
-    /// strip.
-    steps_m: Vec<[f64; 2]>,
-    /// Number of passes needed because of lost returns, within and across a strip; by setting and strip.
+    /// Largest distances between samples of a turn on a strip, m: of the heads that see the strip, and of all heads.
     ///
-    /// The list is empty before the first call of `count_losses`.
+    /// The list is ordered by setting, then by strip.
+    steps_m: Vec<[f64; 2]>,
+    /// Numbers of passes needed because of lost returns, within a strip and across it.
+    ///
+    /// The list is ordered by setting, then by strip. It is empty before the first call of `count_losses`.
     needed: Vec<[f64; 2]>,
-    /// Strip of each sounding of the current ring, and approximate distance from the sounding to the strip's end, m.
+    /// Strip of each sounding of the present ring of rays, and approximate distance from the sounding to the strip's
+    /// end, m.
     strip_of: Vec<(usize, f64)>,
 }
 
@@ -164,8 +166,7 @@ impl Strips {
     /// Measures the largest distance between samples of a turn on each strip, for each of `settings` settings of the
     /// heads.
     ///
-    /// `stride` returns the number of ring soundings in a head's step, by setting and head; `None` for an absent
-    /// head.
+    /// `stride` returns the number of rays in a head's step, by setting and head; `None` for an absent head.
     ///
     /// Allocates: not if the capacity suffices for the settings.
     pub fn measure<'a>(
@@ -197,7 +198,7 @@ impl Strips {
         }
     }
 
-    /// Finds the strip of each sounding of a ring.
+    /// Finds the strip of each sounding of a ring of rays.
     fn find_strips(&mut self, ring: &Ring, forward: bool) {
         let first_m = self.strips.first().map_or(0.0, |strip| strip.arc.from_m);
         let mut number = 0;
@@ -253,7 +254,7 @@ impl Strips {
         of_setting.map(|needed| needed[0]).fold(1.0, f64::max)
     }
 
-    /// Returns T_max predicted at a speed, m: the largest of any strip.
+    /// Returns T_max predicted at a speed, m: the largest spacing T on any strip.
     ///
     /// The result is infinite if there is a wide strip that no head sees. Passes are farther apart on a strip that
     /// some heads do not see. On a narrow strip, the samples on either side limit T as well.
@@ -275,7 +276,7 @@ impl Strips {
     ) -> Option<Unmet> {
         let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
-        // The samples on either side of a strip matter only if the strip itself misses the target.
+        // The samples on the two sides of a strip matter only if the strip itself misses the target.
         let is_unmet = |(k, strip): &(usize, &Strip)| {
             !(self.within(setting, (*k, strip), &thin).is_some_and(is_met)
                 || self.across(setting, (*k, strip), &thin).is_some_and(is_met))
@@ -328,7 +329,7 @@ impl Strips {
 
     /// Returns the largest speed at which [`Strips::t_max_m`] meets a target, and the T_y that limits it.
     ///
-    /// `passes` applies to all speeds.
+    /// The same `passes` are assumed at all speeds.
     ///
     /// Errors: a strip on which no speed meets the target.
     pub fn bound_for_target(
@@ -364,10 +365,10 @@ impl Strips {
         Ok(slowest)
     }
 
-    /// Returns two upper bounds of the spacing T for each strip: one from samples within the strip, and one from the
-    /// samples on either side of it.
+    /// Returns two upper bounds of the spacing T for each strip: the first from samples within the strip, the second
+    /// from the samples on its two sides.
     ///
-    /// The first is `None` if no head sees the strip. The second is `None` if the strip is not thin.
+    /// The first bound is `None` if no head sees the strip. The second bound is `None` if the strip is not thin.
     fn limits(
         &self,
         setting: usize,
@@ -426,8 +427,8 @@ impl Strips {
         (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
     }
 
-    /// Computes how many passes over each strip replace a single pass because of lost returns, in a setting of the
-    /// heads.
+    /// Computes how many passes over each strip are needed in place of a single pass because of lost returns, in a
+    /// setting of the heads.
     ///
     /// The number is used with [`crate::passes::Passes::lossy`]. `rates` are the losses of each head, `None` for an
     /// absent head.
@@ -455,7 +456,7 @@ impl Strips {
         }
     }
 
-    /// Returns how many passes replace a single pass because of lost returns, within a strip and across it.
+    /// Returns how many passes are needed in place of a single pass, within a strip and across it.
     fn needed(&self, setting: usize, k: usize, thin: &Thin<'_>) -> [f64; 2] {
         let needed = || self.needed.get(setting * self.strips.len() + k).copied();
         if thin.is_lossy() { needed().unwrap_or([1.0; 2]) } else { [1.0; 2] }

@@ -18,7 +18,9 @@ const WINDOW: DurNs = DurNs(30_000_000_000);
 const DEAD_RAD: f64 = 0.0075;
 /// Time between two stored directions from which on the history counts as interrupted.
 const INTERRUPTED: DurNs = DurNs(1_000_000_000);
-/// Smallest part of a direction along the tunnel for which displacements are computed: 60 degrees off.
+/// Lower limit of a direction's component along the tunnel in the computation of displacements.
+///
+/// The component of a heading 60 degrees off the tunnel's axis has this value.
 const LEAST_ALONG: f64 = 0.5;
 
 /// Size and speed of a vehicle's swing.
@@ -31,9 +33,9 @@ pub struct Swing<'a> {
     /// Largest rotation between the passes of two heads that are apart along the hull, divided by the time between
     /// them, rad/s.
     ///
-    /// The time is that until the rearmost head reaches the position of the foremost head.
+    /// The rearmost head reaches the position of the foremost head after this time.
     pub apart_rate_radps: f64,
-    /// The directions of the vehicle of which the swing consists, if known.
+    /// History of the vehicle's directions from which the swing was computed, if known.
     pub history: Option<&'a Looks>,
 }
 
@@ -50,7 +52,7 @@ pub struct Looks {
 #[derive(Debug, Clone, Copy)]
 pub struct RecentSwing<'a> {
     looks: &'a Looks,
-    /// Index of the oldest of these directions, from the newest one.
+    /// Index of the oldest of these directions, counted from the newest direction.
     last: usize,
     span_s: f64,
 }
@@ -85,7 +87,7 @@ impl Looks {
         recent.map(|(_, then)| (look + -*then).norm()).fold(0.0, f64::max)
     }
 
-    /// Returns the largest swing of the last half minute up to `now`.
+    /// Returns the largest swing in the half minute before `now`.
     ///
     /// The result stays about constant while the vehicle swings to and fro. `gap_s` is the time between passes; all
     /// heads pass a place within `apart_s`. Rotation within the navigation errors is excluded, with a continuous
@@ -107,7 +109,9 @@ impl Looks {
         Swing { rate_radps, most_rad: counted(largest_rad) * most_rad, apart_rate_radps, history: Some(self) }
     }
 
-    /// Returns the largest rotation between two moments this duration apart within the last half minute, radians.
+    /// Returns the largest rotation between two moments that are `over_s` apart, radians.
+    ///
+    /// The later moment is within the half minute before `now`.
     fn turned_over(&self, now: MonoNs, over_s: f64) -> f64 {
         let over = DurNs::from_secs_f64(over_s.min(1e3));
         let oldest = self.newest_first().last().map(|(_, look)| *look);
@@ -204,7 +208,7 @@ mod tests {
 
     const BEAT: i64 = 200_000_000;
 
-    /// Directions of a vehicle whose yaw and pitch, radians, are functions of time in s.
+    /// Directions of a vehicle. `yaw_pitch` returns its yaw and pitch, radians, at a time, s.
     fn looks(seconds: f64, yaw_pitch: impl Fn(f64) -> [f64; 2]) -> (Looks, MonoNs) {
         let mut looks = Looks::default();
         let mut at = MonoNs(7 * BEAT as u64);
@@ -232,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_vehicle_swing_counts_between_heads_at_different_positions_along_the_hull() {
+    fn slow_swing_counts_between_heads_at_different_positions_along_the_hull() {
         // The rotation between passes is within the navigation errors, but the rotation over ten seconds is not.
         let (looks, now) = looks(80.0, |t| [0.02 * math::sin(TAU * t / 50.0), 0.0]);
         let swing = looks.swing(now, 2.0, 10.0);
@@ -277,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn pitch_swing_counts_and_longer_pass_intervals_use_the_oldest_direction() {
+    fn pitch_swing_counts_and_pass_intervals_beyond_the_history_use_its_oldest_direction() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
         // The largest rotation is from the oldest stored direction to the direction farthest from it.
@@ -286,7 +290,7 @@ mod tests {
         assert_eq!(Swing { history: None, ..looks.swing(now, f64::NAN, 0.0) }, Swing::default());
     }
 
-    /// The vehicle yaws by 0.1 rad, has no position for a minute, and then lies along the tunnel, turning at the end.
+    /// The vehicle has a yaw of 0.1 rad, then no position for a minute, then no yaw, and at the end a yaw of 0.01 rad.
     #[test]
     fn recent_swing_begins_after_an_interruption_and_is_continued_backwards() {
         let mut looks = Looks::default();

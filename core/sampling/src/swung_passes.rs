@@ -9,14 +9,14 @@ use super::swing::RecentSwing;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Yz;
 
-/// Maximum number of simulated passes over a place. At a speed that needs more, the gaps are unknown.
+/// Maximum number of simulated passes over a place. At a speed that needs more passes, the gaps are unknown.
 const MOST_PASSES: usize = 512;
 /// Length of the stretch in which gaps count, as a multiple of the target.
 const STRETCH: f64 = 3.0;
-/// Ratio of each tried speed to the previous one, and number of tried speeds.
+/// Ratio of each tried speed to the speed tried before, and number of tried speeds.
 const SLOWER_BY: f64 = 0.93;
 const TRIED: u32 = 40;
-/// Shares of a speed at which the target must be met, too. A single speed may meet it by chance.
+/// Multiples of a speed that must also meet the target. A single speed may meet the target by chance.
 const ALSO: [f64; 6] = [1.0, 1.1, 1.2, 0.9, 0.8, 0.7];
 
 /// A place on the wall's perimeter, and the heads that see it.
@@ -28,10 +28,10 @@ pub(crate) struct Place {
     pub(crate) seen_by: HeadSet,
 }
 
-/// Returns the largest speed up to `bound_mps` at which all gaps between passes meet the target, m/s; zero if there is none.
+/// Returns the largest speed up to `bound_mps` at which all gaps between passes meet the target, m/s.
 ///
-/// `meets` tells whether a gap, m, meets the target at a speed, m/s. Speeds around the result meet the target, too. The
-/// vehicle is assumed to go on swinging as before.
+/// Zero if there is no such speed. `meets` tells whether a gap, m, meets the target at a speed, m/s. Speeds around the
+/// result meet the target, too. The vehicle is assumed to go on swinging as before.
 /// Allocates: never.
 pub(crate) fn highest_mps(
     bound_mps: f64,
@@ -134,7 +134,7 @@ mod tests {
         })
     }
 
-    /// A minute of yaw `yaw_rad` with this period, s.
+    /// A minute of directions of a vehicle whose yaw is a sine with the amplitude `yaw_rad` and this period, s.
     fn looks(yaw_rad: f64, period_s: f64) -> Looks {
         let mut looks = Looks::default();
         for beat in 0..320_u32 {
@@ -175,15 +175,16 @@ mod tests {
         inner.map(|pair| pair[1] - pair[0]).fold(0.0, f64::max)
     }
 
-    /// Heads side by side whose passes alternate meet the target at the speed without swing, up to the tried speeds.
+    /// Without swing, the result is about a sixth below the bound, because speeds up to 20 % higher must also meet the
+    /// target.
     #[test]
-    fn steady_vehicle_reaches_the_bound() {
+    fn steady_vehicle_gets_a_speed_10_to_25_percent_below_the_bound() {
         let (bound_mps, found_mps) = (TARGET_M / (TURN_S / 2.0), highest(0.0, 20.0, 0.0));
         assert!((0.75 * bound_mps..0.9 * bound_mps).contains(&found_mps), "{found_mps} m/s");
         assert!(highest(0.005, 20.0, 0.0) < found_mps);
     }
 
-    /// A swing of ten degrees moves successive passes by up to 0.7 m, over the target of 0.5 m.
+    /// A swing of ten degrees moves successive passes apart by up to 0.7 m, which exceeds the target of 0.5 m.
     #[test]
     fn passes_of_several_swings_meet_the_target_at_a_low_speed() {
         for (period_s, apart_m) in [(20.0, 0.0), (13.0, 0.0), (27.0, 0.0), (20.0, 1.1), (17.0, 0.6)] {
@@ -205,7 +206,7 @@ mod tests {
         }
     }
 
-    /// A speed at which more passes would be needed than there is room for is not advised.
+    /// A place without passes has an infinite gap.
     #[test]
     fn place_that_no_head_sees_allows_no_speed() {
         let places = [Place { from_vehicle_m: [3.5, 0.0], seen_by: HeadSet::default() }];

@@ -178,7 +178,7 @@ pub trait Device: Send + Sync {
         None
     }
 
-    /// Writes a packet without the payload that a log may omit to `shorter`, and returns `true`.
+    /// Writes a packet to `shorter`, without the payload that a log may omit, and returns `true`.
     ///
     /// Returns `false` if the packet has no such payload, or if the payload cannot be recognised from these bytes
     /// alone.

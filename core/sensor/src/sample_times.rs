@@ -22,13 +22,12 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// any other stamp.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
-/// Longest time between two stamps that is used in full when the usual delay is updated, s.
+/// A longer time between two stamps counts as this time when the usual delay is updated, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// Minimum delay of a sample that is corrected. Smaller delays come from clock ticks and from the time to send its
-/// frames.
+/// Smaller delays of a sample are not corrected. They come from clock ticks and from the time to send its frames.
 const LEAST: DurNs = DurNs(1_000_000);
-/// Maximum delay of a sample that is corrected. A stopped device clock also looks like a delay, and navigation waits
-/// no longer than this for samples.
+/// Larger delays of a sample are not corrected. A stopped device clock also looks like a delay, and navigation waits no
+/// longer than this for samples.
 const MOST: DurNs = DurNs(150_000_000);
 
 /// Corrects the times of the samples of a device with a clock. Allocates: never.
@@ -56,7 +55,7 @@ struct Stamped {
 /// Number of kinds of readings: turn rate, force, attitude. A stamp belongs to the first reading of each kind after
 /// it.
 const KINDS: usize = 3;
-/// Minimum of `leads` at which stamps count as coming before the readings, and the limit at which `leads` is clamped.
+/// Stamps count as coming before the readings if `leads` is at least the first value. The second value limits `leads`.
 const SURE_LEADS: i8 = 8;
 const MOST_LEADS: i8 = 16;
 

@@ -1,4 +1,4 @@
-//! `[advice]` of a vehicle file: resolution and recast interval of the rays that locate the wall for the speed
+//! `[advice]` of a vehicle file: resolution and recast distance of the rays that locate the wall for the speed
 //! advice.
 
 use core::ops::RangeInclusive;
@@ -12,7 +12,7 @@ use headrace_sampling::advice::Looks;
 /// The finest angle is the one that the command `plan` uses. With an angle above 1 degree, the steps of every
 /// mode would be rounded.
 const RING_DEG: RangeInclusive<f64> = 0.1..=1.0;
-/// Allowed settings of the vehicle's movement across the tunnel after which a ring of rays is recast, m.
+/// Allowed distances that the vehicle moves across the tunnel before a ring of rays is cast again, m.
 const LOOK_M: RangeInclusive<f64> = 0.001..=0.1;
 
 /// Reads the `[advice]` table of a vehicle file.

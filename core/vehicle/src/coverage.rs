@@ -10,9 +10,9 @@ use headrace_sampling::target::{CONFIDENCE_SD, Target};
 /// Parameters for the verdicts on the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageConfig {
-    /// Maximum width of the bounds on a hole's size, m; zero for the exact search.
+    /// Maximum difference between the upper and the lower bound of a hole's size, m; zero for the exact search.
     pub hole_tolerance_m: f64,
-    /// Deviation from the design profile above which a sample contradicts the profile, m.
+    /// A sample contradicts the design profile if it deviates from the profile by more than this, m.
     ///
     /// A section cannot pass if most of its samples contradict the profile.
     pub contradiction_m: f64,

@@ -48,9 +48,9 @@ const BEAMS: u32 = 720;
 ///
 /// If the share is lower, the range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
-/// Relative difference of turn periods below which heads stay in phase for hours.
+/// Heads stay in phase for hours if their turn periods differ by less than this ratio.
 const SAME_TURN: f64 = 1e-6;
-/// Finest range step of a sonar, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet).
+/// Finest range step of a sonar, m: the step of an 881L with a range setting of 5 m or less (data sheet).
 ///
 /// No return resolves finer details of a wall.
 const FINEST_M: f64 = 0.002;
@@ -58,7 +58,7 @@ const FINEST_M: f64 = 0.002;
 ///
 /// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, whose radius is 0.1 m.
 const ENOUGH_M: f64 = 0.01;
-/// Distance along the hull below which heads are side by side, m.
+/// Heads count as side by side if they are at most this far apart along the hull, m.
 const APART_M: f64 = 0.01;
 
 impl VehicleConfig {

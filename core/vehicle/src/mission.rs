@@ -34,7 +34,7 @@ pub struct Mission {
     pub hull: Vec<Obstacle>,
     /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// Resolution and recast interval of the rays that locate the wall for the speed advice.
+    /// Resolution and recast distance of the rays that locate the wall for the speed advice.
     pub looks: Looks,
     /// Time limit of the dive, counted from the first packet; `None` if not set.
     pub dive_time: Option<DurNs>,

@@ -16,7 +16,7 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// Allowed values of noise settings.
 ///
-/// Zero is excluded, because the filter would then rely on that sensor alone. Mounts may be exact.
+/// Zero is excluded, because the filter would then rely on that sensor alone. Only the mount error may be zero.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const MOUNT_DEGREES: RangeInclusive<f64> = 0.0..=5.0;
@@ -42,8 +42,8 @@ pub enum NavigationConfig {
 impl NavigationConfig {
     /// Reads the `[navigation]` table; the default method is the filter.
     ///
-    /// Missing keys take the inertial unit's `noise` and the cable `counter` if these are known, and the defaults
-    /// otherwise.
+    /// A missing key gets its value from the inertial unit's `noise` or the cable `counter` if these are known. All
+    /// other missing keys get their defaults.
     ///
     /// Errors: the first key that is unknown or out of range.
     pub fn parse(

@@ -49,7 +49,7 @@ pub struct VehicleConfig {
     pub coverage: CoverageConfig,
     /// Navigation method and settings.
     pub navigation: NavigationConfig,
-    /// Resolution and recast interval of the rays that locate the wall for the speed advice.
+    /// Resolution and recast distance of the rays that locate the wall for the speed advice.
     pub looks: Looks,
     /// Maximum duration of the dive.
     pub dive_time: Option<DurNs>,
@@ -289,7 +289,7 @@ fn parse_water(section: &Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option
     Ok((site, sound_speed_from))
 }
 
-/// Reads the boxes of the hull that are right.
+/// Reads the valid boxes of the hull.
 fn parse_hulls(root: &Section<'_>) -> Result<Vec<Obstacle>, ConfigError> {
     let mut hull = Vec::new();
     for section in root.sections("hull")? {

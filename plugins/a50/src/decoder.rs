@@ -161,8 +161,8 @@ impl State {
     }
 }
 
-/// Whether a report repeats the previous one: true if it has the same timestamp, or if its values are
-/// bit-identical. The values of a new report always differ from those of the last one.
+/// Whether a report repeats the previous one: both have the same timestamp, or their values are bit-identical. Noise
+/// makes the values of two different measurements differ.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

@@ -20,7 +20,7 @@ const NOT_UNDERSTOOD_FROM: u32 = 20;
 pub struct A50Driver {
     cutter: Cutter<Lines, MAX_LINE_BYTES>,
     velocities: u64,
-    /// Number of lines since the last velocity, and the name of their format, if they have one.
+    /// Number of lines since the latest velocity (`others`), and format named in the latest of these lines (`format`).
     others: u32,
     format: Option<String>,
 }

@@ -13,7 +13,7 @@ const BEGINS_US: i64 = 1_638_191_471_000_000;
 /// Reported altitude, m. It is constant, because the emulator has no model of the surface that the beams
 /// meet.
 const ALTITUDE_M: f64 = 1.0;
-/// Figures of merit, sent in turn, because the decoder withholds identical reports as repeats.
+/// Two figures of merit, sent alternately, because the decoder withholds identical reports as repeats.
 const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
 
 /// Settings of the emulated A50.
@@ -54,7 +54,7 @@ impl Emulator<GroundVelocity> for A50Emulator {
     }
 
     fn tell(&mut self, moved: &GroundVelocity, line: LineSink<'_>) {
-        // Converts to device axes: y and z change sign, as in the conversion from device axes.
+        // Converts to device axes: the signs of y and z change, as in the opposite conversion.
         let [x, y, z] = moved.velocity_mps.0.into();
         let at_us = BEGINS_US + moved.at.since(self.start).0 / 1000;
         let [even, odd] = FOMS_MPS;

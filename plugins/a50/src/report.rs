@@ -159,7 +159,7 @@ fn valid_beams(next: u8, lexer: &mut SliceLexer<'_>) -> Result<u8, Error> {
     Ok(valid)
 }
 
-/// True if the object's `type` is a velocity report.
+/// True if the object's `type` is that of a velocity report.
 fn is_velocity(line: &str) -> Result<bool, Error> {
     let mut is_velocity = false;
     SliceLexer::new(line.as_bytes()).exactly_one(SliceLexer::ws_peek, |next, lexer| {
@@ -241,7 +241,7 @@ fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error>
 /// Maximum length of a displayed format name, bytes.
 const MAX_FORMAT_BYTES: usize = 24;
 
-/// Name of the format that a line, or a part of one, states. The format may be unknown to the decoder.
+/// Name of the format in a line, or in a part of a line. The decoder may not know this format.
 ///
 /// Only letters, digits, `_` and `.` are accepted, because the name is displayed.
 pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
@@ -336,7 +336,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn lines_other_than_velocity_reports_are_accepted_without_a_reading() {
+    fn lines_other_than_velocity_reports_are_accepted_but_give_no_reading() {
         let mut codec = LineCodec::default();
         let lines = [POSITION, RESPONSE, "{}\n", EXAMPLE].concat();
         assert_eq!(decode_all(&mut codec, lines.as_bytes()).len(), 1);
@@ -375,7 +375,7 @@ pub(crate) mod tests {
         assert_eq!((got.len(), codec.counts().skipped_bytes), (1, endless.len() as u64));
     }
 
-    /// Whether a line whose unknown key has this JSON value is accepted.
+    /// Whether the parser accepts a line with this JSON value under an unknown key.
     fn is_good(value: &str) -> bool {
         line(format!("{{\"a\":{value}}}\n").as_bytes()).is_some()
     }

@@ -61,7 +61,7 @@ fn good() -> Velocity {
 }
 
 #[test]
-fn velocities_round_trip_with_their_times() {
+fn encoded_velocities_are_decoded_with_their_times() {
     let setup = EmulatorSetup { start: START, head: None, site: Site::default(), polled: true };
     let device = configured("rate_hz = 12.5\n").unwrap();
     assert_eq!(device.sense(), Sense::Velocity);
@@ -109,7 +109,7 @@ fn device_axes_are_converted_and_the_device_delay_is_subtracted() {
 }
 
 #[test]
-fn report_without_times_uses_the_latency_alone() {
+fn validity_time_of_a_report_without_times_is_receive_time_less_latency() {
     let report = Velocity { times_us: None, ..good() };
     assert_eq!(decode(&mut decoder(), START, &report.encode())[0].valid_at, START - LATENCY);
 }
@@ -124,7 +124,7 @@ fn split_line_has_the_time_of_its_first_byte() {
 }
 
 #[test]
-fn unusable_reports_are_withheld_by_reason() {
+fn unusable_reports_are_withheld_and_counted_by_reason() {
     let none = Withheld::default();
     for (report, wanted) in [
         (Velocity { is_valid: false, ..good() }, Withheld { invalid: 1, ..none }),
@@ -201,7 +201,7 @@ fn unknown_format_is_reported_until_a_velocity_arrives() {
         let health = driver.health();
         let complaint = health.complaint.unwrap();
         assert!(complaint.contains(&format!("format {format} ")), "{complaint}");
-        assert_eq!(health.good_frames, 0, "it isn't running");
+        assert_eq!(health.good_frames, 0, "no velocity has been received");
         driver.heard(START, EXAMPLE.as_bytes(), &mut Nowhere);
         assert_eq!((driver.health().complaint, driver.health().good_frames), (None, 1));
     }

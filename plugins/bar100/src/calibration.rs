@@ -152,12 +152,13 @@ impl Calibration {
         u16::try_from(math::round_to_i64(counts).max(1)).unwrap_or(u16::MAX)
     }
 
-    /// Resolution of the pressure: one count, in Pa.
+    /// Pressure of one count, Pa: the resolution.
     pub fn resolution_pa(&self) -> f64 {
         (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN * PA_PER_BAR
     }
 
-    /// The five memory words of this calibration, with its date.
+    /// Addresses and words of the five memory cells of this calibration. `date` is the date of calibration; its `mode`
+    /// is ignored.
     #[expect(clippy::cast_possible_truncation, reason = "the memory holds single precision")]
     pub fn to_words(&self, date: Scaling0) -> [(u8, u16); 5] {
         let halves = |limit_bar: f64| {
@@ -187,7 +188,7 @@ pub struct Overrides {
     pub mode: Option<PressureMode>,
 }
 
-/// The calibration's memory cells read so far.
+/// Memory cells of the calibration that have been read so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CalibrationCells {
     scaling0: Option<u16>,

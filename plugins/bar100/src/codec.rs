@@ -12,7 +12,8 @@ use headrace_sensor::codec::{Framed, Framing, Verdict};
 /// Command that starts a conversion of pressure and temperature.
 pub const MEASURE: u8 = 0xAC;
 
-/// Memory cells lie below the commands, so the first byte alone gives a transaction's length.
+/// Smallest command byte. Smaller first bytes are addresses of memory cells. So the first byte gives a transaction's
+/// length.
 const FIRST_COMMAND: u8 = 0x80;
 
 /// Length of a measurement transaction.
@@ -32,7 +33,8 @@ pub struct Measurement {
     /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0: a sensor returns 0 before the
     /// conversion is done.
     pub pressure_counts: u16,
-    /// Temperature in counts of 0.05 degrees / 16. Never 0: a sensor returns 0 before the conversion is done.
+    /// Temperature in counts. One count is 0.05 degrees Celsius / 16. Never 0: a sensor returns 0 before the conversion
+    /// is done.
     pub temperature_counts: u16,
 }
 

@@ -129,7 +129,7 @@ mod tests {
     /// After a late answer, the driver has requested the first cell twice. The second answer must not count for the
     /// next cell, whose request is lost and repeated.
     #[test]
-    fn late_answer_counts_for_no_other_memory_cell() {
+    fn late_answer_is_not_taken_for_the_next_memory_cell() {
         let (mut driver, mut bus) = (Bar100Driver::new(10.0), Bus::default());
         driver.opened(MonoNs(0), &mut bus);
         let answer = |cell| MemoryWord { cell, status: Status::IDLE, word: 7 }.encode();

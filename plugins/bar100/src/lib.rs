@@ -1,4 +1,4 @@
-//! Blue Robotics Bar100 depth sensor (Keller 7LD) on I2C: transactions to absolute pressure and back.
+//! Blue Robotics Bar100 depth sensor (Keller 7LD) on I2C: converts transactions to absolute pressure and back.
 //!
 //! [`codec`] decodes transactions, [`calibration`] converts counts to pressure, [`decoder`] joins the two for the loop,
 //! [`driver`] is the host side of the bus, [`emulator`] the device side for simulations and rehearsals, and [`plugin`]

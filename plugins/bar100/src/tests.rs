@@ -64,7 +64,7 @@ fn readings_are_withheld_until_the_calibration_is_known() {
     for read in [[0x12, 0x40, 0x5B, 0x3D], [0x13, 0x40, 0, 0], [0x14, 0x40, 0, 0], [0x15, 0x40, 0x42, 0xC8]] {
         assert!(decode(&mut decoder, at, &read).is_empty());
     }
-    assert!(decode(&mut decoder, at, &measure).is_empty(), "half of the upper limit is still unknown");
+    assert!(decode(&mut decoder, at, &measure).is_empty(), "the upper limit's low word is still unknown");
     decode(&mut decoder, at, &[0x16, 0x40, 0, 0]);
     let readings = decode(&mut decoder, at, &measure);
     assert_eq!(readings[0].valid_at, MonoNs(991_000_000));

@@ -32,7 +32,7 @@ pub(crate) const WAITING: usize = 64;
 const MOST_SAMPLES: usize = 20_000;
 /// Maximum length of wall whose samples are read from the loop's store for one message, m.
 const MENDED_AT_ONCE_M: f64 = 10.0;
-/// Length of wall that isn't divided further, m. A densely sampled piece of this length is sent incompletely.
+/// Shortest piece of wall whose samples are read from the store, m. If it has too many samples, some are left out.
 const SHORTEST_MENDED_M: f64 = 0.01;
 /// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
@@ -42,7 +42,7 @@ const SECTIONS_AT_ONCE: usize = 4096;
 const EVERY: DurNs = DurNs(200_000_000);
 /// Averaging window for the sensors' rates of readings.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
-/// Least change of the length of the way back that is sent, m.
+/// Minimum change in the length of the way back after which the way is sent again, m.
 const WAY_STEP_M: f64 = 0.5;
 /// Minimum interval between two lists of missed stretches to go back to.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
@@ -60,7 +60,7 @@ struct Followed {
     id: String,
     mount: Mount,
     is_echosounder: bool,
-    /// Index of this sensor among the heads.
+    /// Number of this sensor among the heads; [`NONE`] for other sensors.
     head: u8,
     ping: Option<Ping>,
     hz: f64,
@@ -344,7 +344,7 @@ impl Collector {
         u32::try_from(since).unwrap_or(u32::MAX)
     }
 
-    /// Returns the index among the heads of a packet source.
+    /// Returns the number of the head with this packet source.
     fn head(&self, source: u64) -> u8 {
         let sensor = usize::try_from(source).ok().and_then(|source| self.sensors.get(source));
         sensor.map_or(NONE, |sensor| sensor.head)

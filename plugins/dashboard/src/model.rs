@@ -25,7 +25,7 @@ const MOST_TOLD: usize = 256;
 const MOST_AT_ONCE: usize = 1000;
 /// Maximum number of samples sent to a viewer that connects or reconnects.
 const MOST_BACK: usize = 10_000;
-/// Number of messages for which the number of samples sent so far is kept: five minutes of messages.
+/// Number of messages for which the number of samples sent before is kept: five minutes of messages.
 const MOST_PLACES: usize = 1500;
 /// Maximum number of samples in the answer to a request for a range of chainage.
 pub const MOST_IN_RANGE: usize = 200_000;

@@ -27,16 +27,16 @@ const LEISURE: DurNs = DurNs::from_millis(60);
 /// Slowest sound (m/s) and slowest line (bit/s) for which the answer timeout is long enough.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
 const LINE_BAUD: f64 = 115_200.0;
-/// Number of unanswered commands after which the head is polled less often, and the interval then. Source:
-/// LSTS DUNE, which retries after a second.
+/// Number of unanswered commands in a row after which the head is polled less often, and the interval of this polling.
+/// Source: LSTS DUNE, which retries after a second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// Limits beyond which a head is homed. It may lag behind its scan program by at most 1/n of the program's
-/// period, and lead by at most a few pings.
+/// Limits beyond which a head is homed: a lag of the scan program's period divided by the first value, or a lead of the
+/// second value. Before the head has joined its program, the limit of the lag is one ping.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
-/// A head that answers but lags by more than 1/n of its scan program's period is reported as too slow for its
-/// settings.
+/// A head that answers is reported as too slow for its settings if it lags by more than the scan program's period
+/// divided by this value.
 const TOO_SLOW_SHARE: u64 = 8;
 
 /// Minimum number of unanswered commands, among the last 32, at which a head's lag is attributed to the line.
@@ -185,8 +185,8 @@ impl HeadDriver {
         let from = homing::Standing { angle_rad: self.settings.sensor_rad(position), growing };
         let current = self.timetable.first_at(now);
         self.joins_at = current;
-        // The homing distance depends on the program's position on arrival, which depends on the homing distance:
-        // iterate.
+        // The homing distance depends on the program's position on arrival. This position depends on the homing
+        // distance. Both are therefore found by iteration.
         for _ in 0..3 {
             let Some(Planned { position, clockwise, .. }) = self.timetable.ping(self.joins_at).copied()
             else {
@@ -305,8 +305,8 @@ impl Driver for HeadDriver {
 
 /// Time limit for the head's answer to a command.
 ///
-/// The timeout is twice the sum of three times: the two-way travel time at the range setting, the transmission of the
-/// command and the longest return on a serial line, and the processing allowance.
+/// The timeout is twice the sum of three durations: the two-way travel time at the range setting, the transmission of
+/// the command and the longest return on a serial line, and the processing allowance.
 fn answer_time(command: &Command) -> DurNs {
     let sound_s = 2.0 * f64::from(command.range_m) / SLOWEST_SOUND_MPS;
     let line_s = (COMMAND_BYTES + MAX_RETURN_BYTES) as f64 * 10.0 / LINE_BAUD;

@@ -1,4 +1,4 @@
-//! An emulated head, which either an emulated host polls once per ping period, or a real host polls.
+//! An emulated head. An emulated host polls it once per ping period, or a real host polls it.
 
 use std::collections::VecDeque;
 

@@ -21,8 +21,7 @@ pub struct Standing {
 /// program's direction.
 ///
 /// A head pings with every command. The range setting while homing differs from the configured one, so that these
-/// returns don't count as samples. If only the direction is wrong, a last command reverses the direction without a
-/// step.
+/// returns don't count as samples. If the direction is wrong at the end, a final command reverses it without a step.
 pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Vec<Command> {
     let normal = settings.angle_sign > 0.0;
     let half = COUNTS_PER_TURN / 2;

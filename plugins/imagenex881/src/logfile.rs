@@ -34,7 +34,7 @@ pub struct Shot<'a> {
     pub raw: &'a [u8],
 }
 
-/// A reason why a log file can't be read further.
+/// A reason why the reading of a log file stops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogFileError {

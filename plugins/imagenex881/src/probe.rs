@@ -101,11 +101,11 @@ mod tests {
         let mut probe = HeadProbe::default();
         assert_eq!(probe.identity(), None);
         let answers = answers("mode = \"slow\"");
-        assert_eq!(answers.len(), 1, "only the question with its id is its");
+        assert_eq!(answers.len(), 1, "the head answers only the question with its id");
         let (first, second) = answers[0].split_at(5);
         probe.heard(b"noise");
         probe.heard(first);
-        assert_eq!(probe.identity(), None, "half a return is none");
+        assert_eq!(probe.identity(), None, "half a return identifies no head");
         probe.heard(second);
         assert_eq!(probe.identity().unwrap(), "Imagenex 881 family, head_id = 0x10, at 0.0 degrees");
     }

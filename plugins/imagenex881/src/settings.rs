@@ -68,7 +68,7 @@ impl Settings {
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let choices = MODES.map(|mode| (mode.name, mode));
         let known = own.required("mode", own.choice("mode", &choices)?);
-        // If the key `mode` is missing, the remaining keys are checked with an arbitrary mode.
+        // If the key `mode` is missing, the other keys are still checked, with an arbitrary mode.
         let mode = *known.as_ref().unwrap_or(&MODES[0]);
         let command = command(mode, own)?;
         let measured = measured_turns(mode, command.range_m, own)?;

@@ -59,14 +59,14 @@ struct State {
     stamped_by_filter: Option<bool>,
     received: MonoNs,
     group: Option<u16>,
-    /// Components of acceleration received since the last complete vector.
+    /// Components of acceleration received since the latest complete vector.
     acceleration_mps2: [Option<f64>; 3],
     withheld: u64,
 }
 
 stateful!(State { state: invalid, sends_quaternions, sample_time_ticks, clock, stamped_by_filter, received, group, acceleration_mps2, withheld; fixed: meaning; });
 
-/// Quantities marked invalid by the unit's last status.
+/// Quantities marked invalid by the unit's latest status.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Invalid {
     orientation: bool,
@@ -110,13 +110,13 @@ impl ImuDecoder {
         self.passed_over
     }
 
-    /// Timestamp of the unit's last sample, if the unit sends timestamps. The timestamp wraps.
+    /// Timestamp of the unit's latest sample, if the unit sends timestamps. The timestamp wraps.
     pub fn sample_time(&self) -> Option<DurNs> {
         let ticks = self.state.sample_time_ticks?;
         Some(DurNs(self.state.meaning.sample_time_tick.0.saturating_mul(i64::from(ticks))))
     }
 
-    /// Number of the unit's last sample, if the unit sends numbers. The number wraps.
+    /// Number of the unit's latest sample, if the unit sends numbers. The number wraps.
     pub fn group(&self) -> Option<u16> {
         self.state.group
     }

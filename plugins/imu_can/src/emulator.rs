@@ -9,7 +9,7 @@ use crate::codec::{Message, MessageSet};
 use crate::decoder::DecoderSettings;
 use crate::sets::{bosch, j1939, sbg, xsens};
 
-/// Temperature of an emulated unit: 10 degrees Celsius.
+/// Temperature of an emulated unit: 10 degrees Celsius, in hundredths.
 const SBG_TEMPERATURE: i16 = 1000;
 
 /// An ideal emulated unit: there is no noise, bias or added delay, but counts are whole numbers.

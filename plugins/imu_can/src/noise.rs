@@ -10,8 +10,8 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const DEGREE_AN_HOUR: f64 = DEGREE / 3600.0;
 /// A millionth of standard gravity, m/s^2.
 const MICRO_G: f64 = 9.806_65e-6;
-/// Time constant of the bias wander, s. It is the usual time of the minimum of an Allan deviation, for which data
-/// sheets state the in-run stability.
+/// Time constant of the bias wander, s. An Allan deviation usually has its minimum near this time. Data sheets state
+/// the in-run stability at that minimum.
 const WANDERS_OVER_S: f64 = 300.0;
 /// Constant bias of a factory-calibrated unit after power-on, rad/s.
 ///
@@ -26,7 +26,7 @@ const ACCEL_IN_RUN_MPS2: f64 = 2e-3;
 pub(crate) fn of(set: MessageSet) -> Option<InertialNoise> {
     match set {
         // MT1603P: 0.007 degrees/s/sqrt(Hz), 8 degrees/h, 60 ug/sqrt(Hz). A resolution of 2^-9 rad/s at 100 Hz adds
-        // 0.003.
+        // 0.003 degrees/s/sqrt(Hz).
         MessageSet::Xsens(_) => Some(unit(0.0077 * DEGREE, 8.0 * DEGREE_AN_HOUR, 60.0 * MICRO_G)),
         // Ellipse: 0.15 degrees/sqrt(h), 7 degrees/h, 57 ug/sqrt(Hz). The resolution is 1e-3 rad/s and 1e-2 m/s^2.
         MessageSet::Sbg => Some(unit(0.003 * DEGREE, 7.0 * DEGREE_AN_HOUR, 65.0 * MICRO_G)),

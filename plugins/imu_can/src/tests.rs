@@ -144,7 +144,7 @@ fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: 
 }
 
 #[test]
-fn emulated_xsens_round_trips() {
+fn readings_of_an_emulated_xsens_unit_match_its_motion() {
     for (roll, yaw) in [(0.0, 0.0), (0.0, 0.2), (0.3, 0.0)] {
         let truth = Going::new(roll, yaw);
         let mut decoder = ImuDecoder::new(meaning(XSENS));
@@ -170,7 +170,7 @@ fn unit_at_rest_gives_zero_rate_and_constant_readings() {
 }
 
 #[test]
-fn emulated_sbg_round_trips_in_headrace_axes() {
+fn readings_of_an_emulated_sbg_unit_match_its_motion_in_headrace_axes() {
     let truth = Going::new(0.1, 0.0);
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
     let readings = emulated("preset = \"sbg_ellipse\"\nrate_hz = 50\n", &mut decoder, &truth, 200);
@@ -179,7 +179,7 @@ fn emulated_sbg_round_trips_in_headrace_axes() {
 }
 
 #[test]
-fn emulated_j1939_unit_round_trips_in_either_axis_order() {
+fn readings_of_an_emulated_j1939_unit_match_its_motion_in_either_axis_order() {
     for (key, axis_order) in [("yxz", AxisOrder::Yxz), ("xyz", AxisOrder::Xyz)] {
         let truth = Going::new(0.0, 0.0);
         let mut decoder = ImuDecoder::new(DecoderSettings { axis_order, ..meaning(J1939) });

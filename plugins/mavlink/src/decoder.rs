@@ -31,7 +31,8 @@ const QUALITY_INVALID_PERCENT: u8 = 1;
 pub struct DecoderSettings {
     /// Sensor whose messages are decoded.
     pub part: Part,
-    /// Accepted MAVLink system id; `None` for that of the first autopilot received.
+    /// Accepted MAVLink system id. `None` accepts the first system that sends an autopilot's heartbeat or one of the
+    /// sensor's messages.
     pub system_id: Option<u8>,
     /// Accepted MAVLink component id; `None` for any.
     pub component_id: Option<u8>,
@@ -125,7 +126,7 @@ impl MavlinkDecoder {
         self.state.passed_over
     }
 
-    /// Time since the autopilot's boot, as stated in the sensor's last message.
+    /// Time since the autopilot's boot, as stated in the sensor's latest message.
     pub fn since_boot(&self) -> Option<DurNs> {
         self.state.boot.last_ms.map(|_| DurNs::from_millis(self.state.boot.since_boot_ms))
     }
@@ -145,10 +146,10 @@ impl Decoder for MavlinkDecoder {
         self.codec.counts()
     }
 
-    /// Number of withheld messages of the sensor.
+    /// Number of withheld readings, plus the number of the sensor's messages from other systems.
     ///
-    /// Messages are withheld if they are from another system or have invalid values: angles beyond their range,
-    /// non-finite numbers, a pressure not above zero, contradictory limits.
+    /// Readings are withheld if their values are invalid: angles beyond their range, non-finite numbers, a pressure not
+    /// above zero, contradictory limits.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -220,7 +221,9 @@ impl State {
     }
 }
 
-/// An intrinsic z-y-x rotation equals an extrinsic x-y-z rotation, which [`Rot`] takes.
+/// Converts roll, pitch and yaw to an attitude; `None` if an angle is beyond its limits.
+///
+/// MAVLink's angles are an intrinsic z-y-x rotation. It equals the extrinsic x-y-z rotation that [`Rot`] takes.
 fn attitude(attitude: &ATTITUDE_DATA) -> Option<Reading> {
     let [roll, pitch, yaw] = to_ours([attitude.roll, attitude.pitch, attitude.yaw].map(f64::from));
     let within = |angle: f64, most: f64| angle.abs() <= most + ANGLE_TOLERANCE_RAD;

@@ -6,8 +6,9 @@
 //! ```
 //! Definitions, checksum and packing come from the mavlink crate. Its reader isn't used for three reasons. It doesn't
 //! report the start of a frame, which the receive time needs. It has no counters. It accepts version 1 frames of any
-//! length. Version 2 truncates trailing zeros of a payload. Signatures aren't verified, because access to the
-//! vehicle's own network is controlled elsewhere. So a frame cut off in its signature swallows the following bytes.
+//! length. Version 2 truncates trailing zeros of a payload. Signatures aren't verified, because access to the vehicle's
+//! own network is controlled elsewhere. If a frame is cut off in its signature, the bytes that follow are therefore
+//! taken as the rest of the signature.
 //! Source: MAVLink guide, "Packet Serialization" and "Message Signing".
 
 use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};

@@ -1,9 +1,9 @@
 //! MAVLink from a vehicle whose autopilot owns the sensors.
 //!
 //! Attitude, rates and forces, pressure and distances are decoded and encoded. [`frame`] separates frames from noise,
-//! [`message`] reads the supported messages, [`decoder`] makes readings for the loop, [`emulator`] is the autopilot
-//! side for simulations, [`out`] encodes the program's own messages, [`plugin`] reads the vehicle file and [`tlog`]
-//! the log files of ground stations. Message definitions come from the mavlink crate.
+//! and [`message`] reads the supported messages. [`decoder`] makes readings for the loop, and [`emulator`] is the
+//! autopilot side for simulations. [`out`] encodes the program's own messages. [`plugin`] reads the vehicle file, and
+//! [`tlog`] reads the log files of ground stations. Message definitions come from the mavlink crate.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

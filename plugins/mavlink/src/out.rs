@@ -53,7 +53,7 @@ impl From<Gravity> for MavSeverity {
 pub struct Speaker {
     system_id: u8,
     sequence: u8,
-    /// Number of the last text that was sent in parts.
+    /// Number of the latest text that was sent in parts.
     text: u16,
 }
 

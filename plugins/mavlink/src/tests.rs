@@ -121,7 +121,7 @@ fn felt(inertia: Inertia) -> Inertia {
 }
 
 #[test]
-fn attitude_rates_and_forces_round_trip() {
+fn attitude_rates_and_forces_match_the_emulated_motion() {
     for (own, part, each) in [
         ("part = \"imu\"\n", RAW_IMU, 3),
         ("part = \"imu\"\nmessage = \"scaled_imu2\"\n", Part::Imu { message: Some(ImuMessage::Scaled2) }, 3),
@@ -151,7 +151,7 @@ fn attitude_rates_and_forces_round_trip() {
 }
 
 #[test]
-fn pressures_round_trip_to_half_a_quantum() {
+fn pressures_match_the_emulated_pressures_within_half_a_quantum() {
     for (own, message) in
         [("", PressureMessage::Second), ("message = \"scaled_pressure\"\n", PressureMessage::First)]
     {
@@ -174,7 +174,7 @@ fn pressures_round_trip_to_half_a_quantum() {
 }
 
 #[test]
-fn distances_round_trip_and_a_missing_echo_gives_no_distance() {
+fn distances_match_the_emulated_distances_and_a_missing_echo_gives_no_distance() {
     let own = "part = \"distance\"\norientation = 25\nsensor_id = 3\nsound_speed_mps = 1500\n";
     let device = configured(own).unwrap();
     assert_eq!(device.sense(), Sense::Echosounder);

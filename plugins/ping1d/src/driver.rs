@@ -20,7 +20,7 @@ const SILENCE: DurNs = DurNs::from_millis(50);
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
 /// Time beyond the ping interval that the device has to answer a distance request.
 const PING_TIME: DurNs = DurNs::from_millis(250);
-/// Number of times that a setting without an acknowledgement is sent before the next one is tried.
+/// Maximum number of times that a setting is sent. Without an acknowledgement, the next setting then follows.
 const TRIES: u32 = 4;
 /// Interval at which the speed of sound is checked, since other clients of a bridge can change it.
 const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
@@ -43,7 +43,7 @@ pub struct PingDriver {
     /// Messages to send before the next distance request.
     to_say: VecDeque<(Asked, Vec<u8>)>,
     asked: Option<(Asked, MonoNs)>,
-    /// The setting that awaits an acknowledgement, and its remaining retries.
+    /// The setting or query that awaits an answer, and the number of times that it may still be sent.
     again: Option<(Vec<u8>, u32)>,
     next_at: MonoNs,
     look_at: MonoNs,

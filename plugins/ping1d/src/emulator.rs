@@ -62,7 +62,7 @@ pub struct PingEmulator {
     /// Message ids of the answers to the pings that a real host has requested.
     asked: VecDeque<u16>,
     polled: bool,
-    /// Last frame that the device has sent.
+    /// Buffer for the frame that device or host sends.
     frame: Bytes<MAX_FRAME_BYTES>,
 }
 

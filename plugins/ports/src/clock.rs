@@ -6,7 +6,8 @@ use std::time::{Duration, SystemTime};
 use headrace_geometry::time::{DurNs, MonoNs, UtcNs};
 use rustix::time::{ClockId, clock_gettime};
 
-/// Time to add to the host's clock, ns. It isn't zero only in a dive that continues one from before a reboot.
+/// Time to add to the host's clock, ns. It is zero, except in a resumed dive that began before the host was last
+/// rebooted.
 static AHEAD_NS: AtomicU64 = AtomicU64::new(0);
 
 /// Returns the current time on the dive's clock: the host's monotonic clock, which counts from boot and is never set,
@@ -31,8 +32,8 @@ pub fn set_ahead(by: DurNs) {
 
 /// Converts a wall-clock timestamp of the kernel to the monotonic clock.
 ///
-/// The age of the timestamp is kept. A timestamp in the future, after the wall clock was set back, becomes the
-/// current time.
+/// The age of the timestamp is kept. A timestamp in the future becomes the current time. It can occur after the wall
+/// clock was set back.
 pub fn of_wall(stamped: SystemTime) -> MonoNs {
     let now = now();
     let ago = wall().duration_since(stamped).unwrap_or(Duration::ZERO);

@@ -217,7 +217,7 @@ pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a EmulatedPort>, wait
     poll(&mut polled, Some(&wait)).unwrap_or_default();
 }
 
-/// Whether an error means that the host has closed the host end.
+/// Whether an error means that the host has closed its end of the line.
 fn is_gone(error: &io::Error) -> bool {
     /// A pseudoterminal's master returns this error while no host has the terminal open. Source: Linux, EIO.
     const EIO: i32 = 5;
@@ -271,7 +271,8 @@ fn can_socket(interface: &str) -> io::Result<socketcan::CanSocket> {
 /// The frame is lost while the interface is down or absent.
 #[cfg(target_os = "linux")]
 fn write_can(interface: &str, socket: &mut Option<socketcan::CanSocket>, bytes: &[u8]) -> io::Result<()> {
-    /// No such device or address; no such device; network is down; no buffer space. Source: Linux, errno.
+    /// `GONE`: no such device or address; no such device. `LOST`: network is down; no buffer space. Source: Linux,
+    /// errno.
     const GONE: [i32; 2] = [6, 19];
     const LOST: [i32; 2] = [100, 105];
     let number = |error: &io::Error| error.raw_os_error().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Interface of the lines to the machine's clock and ports, which tests can replace.
+//! Interface through which lines reach the machine's clock and ports. Tests can replace it.
 
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::connect::Connect;

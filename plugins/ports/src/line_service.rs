@@ -31,7 +31,7 @@ const LONGEST_LOCAL_PAUSE: DurNs = DurNs::from_millis(1_000);
 const LOOK: Duration = Duration::from_millis(50);
 /// Interval between checks of the devices' health.
 const STANDING_PERIOD: DurNs = DurNs::from_millis(500);
-/// Time for which a line must have been open so that a disconnect resets the reconnect backoff.
+/// The reconnect backoff is reset if the line was open for at least this time and delivered a frame.
 const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
 /// Keep-alive interval on an idle connection.
 const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
@@ -98,7 +98,7 @@ enum LineState {
 struct OpenLine {
     line: Box<dyn Line>,
     opened: MonoNs,
-    /// Time of the next health check of the devices, and time of the next keep-alive.
+    /// Time of the next health check of the devices (`look_at`), and of the next keep-alive (`knock_at`).
     look_at: MonoNs,
     knock_at: MonoNs,
 }
@@ -111,10 +111,10 @@ struct AttachedState {
     dropped_told: u64,
     dropped_until: MonoNs,
     status: Option<(Phase, String)>,
-    /// Number of good frames so far, and the number when the line was opened. The two times are those of the
-    /// last bytes and of the last good frame.
+    /// Number of good frames so far (`frames`), and the number when the line was opened (`frames_before`).
     frames: u64,
     frames_before: u64,
+    /// Times at which the latest bytes and the latest good frame arrived.
     last_bytes: MonoNs,
     last_frame: MonoNs,
 }
@@ -389,7 +389,7 @@ impl LineService {
         Ok(Served::Open)
     }
 
-    /// Passes the number of packets dropped since the last report to [`LineRecord`].
+    /// Reports to [`LineRecord`] how many packets were dropped since the previous report.
     fn tell_dropped(&mut self) {
         let now = self.common.host.now();
         for AttachedState { attached, history, dropped_told, dropped_until, .. } in &mut self.devices {
@@ -431,8 +431,8 @@ impl LineService {
 
     /// Wakes drivers that are due, unless another driver on the line awaits an answer.
     ///
-    /// Several drivers may await answers, e.g. just after the line was opened. In that case the first one
-    /// times out first; otherwise all would wait for each other indefinitely.
+    /// Several drivers may await answers, e.g. just after the line was opened. The first of these is woken all the
+    /// same, so that it can time out. Otherwise they would wait for each other for ever.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();
@@ -527,7 +527,7 @@ impl AttachedState {
         let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
-            // The frame arrived with the last bytes, which may be earlier than `now`.
+            // The frame arrived with the latest bytes, which may be earlier than `now`.
             self.last_frame = self.last_bytes;
         }
         if let Some(complaint) = complaint {

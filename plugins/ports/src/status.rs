@@ -16,7 +16,7 @@ pub enum Phase {
     Silent,
     /// Bytes arrive, but they contain no valid frame.
     Babbling,
-    /// The line has another device than expected, or the device refuses its settings.
+    /// The device on the line isn't the expected one, or refuses its settings.
     Wrong,
     /// Good frames arrive.
     Running,
@@ -66,7 +66,7 @@ pub struct LineHistory {
     pub dropped: u64,
     /// Number of messages from rejected senders.
     pub strangers: u64,
-    /// Last status of the device, as text.
+    /// Latest status of the device, as text.
     pub last: String,
 }
 

@@ -52,7 +52,7 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// Starts the threads of the lines. The present thread must run the loop, because the lines wake it.
+    /// Starts the threads of the lines. The calling thread must run the loop, because the lines wake this thread.
     ///
     /// `record` receives line events that don't pass through the loop.
     ///
@@ -88,7 +88,7 @@ impl Supervisor {
 
     /// Stops all threads and drains the rings. Returns each sensor's line history, in the order of the sensors.
     pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
-        // A thread that panicked has reported that itself. This history replaces those of its sensors.
+        // A thread reports its own panic. Its sensors then get this history instead of their own.
         let ended_early =
             LineHistory { last: "its thread has ended early".to_owned(), ..LineHistory::default() };
         let mut all = vec![ended_early; self.sensors];

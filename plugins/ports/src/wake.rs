@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-/// Functions that park threads: those of the system, or those of a model.
+/// Functions that park threads of the system, or threads of a model.
 pub trait Threads {
     /// Handle by which a thread can be woken.
     type Thread: Clone;
@@ -63,7 +63,8 @@ impl<T: Threads> Waker<T> {
     }
 }
 
-/// Sleeps until this thread is woken, at most for `at_most`. Returns at once if it was woken since its last sleep.
+/// Sleeps until this thread is woken, at most for `at_most`. Returns at once if the thread was woken since its last
+/// sleep.
 pub(crate) fn sleep<T: Threads>(at_most: Duration) {
     T::park(at_most);
 }

@@ -86,7 +86,7 @@ impl HidDecoder {
         self.tracker.health()
     }
 
-    /// Status byte of the last report, if the layout has one. Its meaning depends on the device.
+    /// Status byte of the latest report, if the layout has one. Its meaning depends on the device.
     pub fn status(&self) -> Option<u8> {
         self.status
     }

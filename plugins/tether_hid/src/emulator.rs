@@ -76,7 +76,7 @@ impl HidEmulator {
         Self { reeling, counter, start, begun: 0, told: 0, told_counts: 0 }
     }
 
-    /// Count in the next report. In delta mode, a change too large for one report is spread over several reports.
+    /// Count in the next report. In delta mode, a change too large for one report is divided among several reports.
     fn count(&mut self, counts: i64) -> i64 {
         let layout = &self.counter.layout;
         match self.counter.counting {

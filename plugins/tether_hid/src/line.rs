@@ -4,8 +4,8 @@
 //!   RD,TTTTTTTT,SSSSSSSS,PPPPPPPP,CCCC<CR><LF>                              LCI-90, protocol 1
 //!   NNRD,yyyy-mm-ddThh:mm:ss.mmm,TTTTTTTT,SSSSSSSS,PPPPPPPP,CCCC<CR><LF>    LCI-90i, winch NN
 //! ```
-//! Numbers have eight characters, zero-padded, with an optional leading `-` and a decimal point anywhere. CCCC is the decimal
-//! sum of the codes of all preceding characters. Any bytes may precede a line.
+//! Numbers have eight characters. They are zero-padded, with an optional leading `-` and a decimal point anywhere. CCCC
+//! is the decimal sum of the codes of all preceding characters. Any bytes may precede a line.
 //! Source: LCI-90 Operator Manual, p. 48; a recorded LCI-90i line whose sum confirms the order of the fields.
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
@@ -74,8 +74,8 @@ impl Decimal {
         fits.then_some(Self { mantissa, places })
     }
 
-    /// Number nearest to `value`, with as many decimal places as fit but at most `most_places`; zero if none can
-    /// represent it.
+    /// Number nearest to `value`, with as many decimal places as fit but at most `most_places`; zero if `value` doesn't
+    /// fit eight characters.
     pub fn nearest(value: f64, most_places: u8) -> Self {
         let with = |places: u8| {
             let scale = f64::from(*POWERS_OF_TEN.get(usize::from(places))?);

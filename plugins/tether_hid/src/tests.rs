@@ -98,14 +98,14 @@ fn worked_example_1_gives_a_length_of_minus_61_728_m() {
 }
 
 #[test]
-fn reference_counter_round_trips() {
+fn length_of_the_emulated_reference_counter_matches_the_cable() {
     let mut decoder = HidDecoder::new(reference_counter()).unwrap();
     round_trip("counts_per_metre = 2000\nzero_at_m = 12.5\nscale = 0.98\n", &mut decoder, 12.5, 0.98, 2000);
     assert_eq!(decoder.health(), crate::tracker::TrackerHealth::default());
 }
 
 #[test]
-fn narrow_falling_big_endian_counter_round_trips() {
+fn length_of_an_emulated_narrow_falling_big_endian_counter_matches_the_cable() {
     let layout = ReportLayout {
         report_id: None,
         report_bytes: 4,
@@ -125,7 +125,7 @@ fn narrow_falling_big_endian_counter_round_trips() {
 }
 
 #[test]
-fn delta_counter_round_trips() {
+fn length_of_an_emulated_delta_counter_matches_the_cable() {
     let layout = ReportLayout { width: Width::Bits8, ..ReportLayout::REFERENCE };
     let layout =
         ReportLayout { sequence_offset: None, status_offset: None, auxiliary_offset: None, ..layout };
@@ -156,7 +156,7 @@ fn counter_clock_is_followed_if_configured() {
 }
 
 #[test]
-fn emulated_line_monitor_round_trips() {
+fn length_of_an_emulated_line_monitor_matches_the_cable() {
     let mut decoder = LineDecoder::new(1.0, DurNs::from_millis(4));
     round_trip("kind = \"lci90\"\nzero_at_m = 30.0\n", &mut decoder, 30.0, 1.0, 500);
     let mut decoder = LineDecoder::new(0.3048, DurNs::from_millis(4));

@@ -4,9 +4,10 @@
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other. If
 //!   [`PERSIST`] consecutive reports agree, the counter has really moved, and the reports weren't corrupt.
 //!   - If the first of these reports was near zero, the device counts from zero again. The length continues from its
-//!     last value and is marked with the restart, since the device may have been replugged.
+//!     latest value. The restart is recorded, since the device may have been replugged.
 //!   - Otherwise the counter's new value is accepted.
-//! - After a silence, too, a step back to zero is accepted directly only if the winch can cover it in a second.
+//! - A step back to near zero is accepted at once only if the winch can cover it in a second. This holds after a
+//!   silence too.
 //! - After an accepted jump, and whenever counts may have been lost, the length is uncertain. `re_zero_needed` is then
 //!   set, and stays set.
 
@@ -20,8 +21,8 @@ use crate::report::{Report, Width};
 /// Number of consecutive reports, consistent with each other, that are needed to accept a jump of the count.
 pub const PERSIST: u32 = 5;
 
-/// Additional time in which the winch may have caused a change of the count, s. Reports queued in the kernel
-/// arrive together, with hardly any time between them.
+/// Time added to the interval between two reports when the change of the count is checked, s. Reports queued in the
+/// kernel arrive together, with hardly any time between them.
 const SLACK_S: f64 = 0.1;
 
 /// Maximum time for which a replugged device has counted before its first report, s.
@@ -100,7 +101,7 @@ impl CountTracker {
         }
     }
 
-    /// The last restart of the count from zero, if any.
+    /// The latest restart of the count from zero, if any.
     pub fn restart(&self) -> Option<CountRestart> {
         self.restart
     }
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn narrow_counter_wraps_without_a_jump() {
+    fn length_is_continuous_where_a_narrow_counter_wraps() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits8, FASTEST);
         let totals = take_all(&mut tracker, &[250, 6, 20, 250, 6]);
         assert_eq!(totals, [250, 262, 276, 250, 262].map(Some));

@@ -89,7 +89,7 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let id = match id_text.len() {
         3 if number <= STANDARD_IDS => number,
         8 if number <= EXTENDED_IDS => number | EXTENDED,
-        // Error frames of the CAN controller keep the flag in their identifier.
+        // In error frames of the CAN controller, the identifier contains the error flag, bit 29.
         8 if number >> 29 == 1 => number,
         _ => return Err(NO_LINE),
     };

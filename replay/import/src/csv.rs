@@ -14,7 +14,7 @@ use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::entry::{Clock, Entry, Step};
 use crate::format::Format;
 
-/// Maximum number of values that a sensor's reading has.
+/// Maximum number of values in a reading of a sensor.
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
 
@@ -52,7 +52,7 @@ fn quantities(sense: Sense) -> &'static [Quantity] {
     }
 }
 
-/// The CSV format of a table with a known header. Its streams are the sensors' ids.
+/// The CSV format of a table with a known header. Its streams are named after the sensors' ids.
 pub struct Csv {
     separator: char,
     /// Number of cells in a row of the table.
@@ -63,7 +63,7 @@ pub struct Csv {
     header_passed: bool,
 }
 
-/// A sensor, and the table's columns with its values.
+/// A sensor, and the table's columns with the sensor's values.
 struct Target {
     sensor: EmulatedSensor,
     /// For each of the sensor's values, its column in the table, and the factor of its unit.

@@ -1,4 +1,4 @@
-//! A sensor of the vehicle file as an emulator, which encodes foreign values as the bytes that the sensor would have
+//! Emulates a sensor of the vehicle file. It encodes values of a foreign log as the bytes that the sensor would have
 //! sent.
 
 use headrace_config::{ConfigError, Section};
@@ -10,7 +10,7 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, So
 use headrace_sensor::reading::Level;
 use headrace_vehicle::VehicleConfig;
 
-/// Sample period stated in emulated inertial samples, because foreign logs don't give one.
+/// Period between emulated inertial samples. Foreign logs don't state the period.
 const PERIOD: DurNs = DurNs(10_000_000);
 
 /// A measured value, for an emulator to encode.
@@ -34,7 +34,7 @@ pub(super) enum Value {
 impl Value {
     /// Whether the measured value is possible, by limits far beyond the values in tunnels.
     ///
-    /// Larger values must be refused, because wire formats would wrap or clamp them into plausible ones.
+    /// Larger values must be refused, because wire formats would wrap or clamp them to plausible values.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
         // A NaN means "not measured", which is allowed.

@@ -1,11 +1,11 @@
 //! Entries of a foreign log, and the results of splitting the log into entries.
 
-/// Bytes that a foreign log recorded on one line, at one time.
+/// Bytes that a foreign log recorded from one connection, at one time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
     /// Timestamp of the entry, nanoseconds on the file's clock.
     pub stamp_ns: u64,
-    /// Name of the line in the file, such as a CAN interface.
+    /// Name of the connection in the file, such as a CAN interface.
     pub stream: String,
     /// Bytes as the device sent them.
     pub bytes: Vec<u8>,
@@ -20,7 +20,7 @@ pub enum Step {
     Lost(usize, &'static str),
     /// More bytes are needed. At the end of the file, this means that the last entry is truncated.
     More,
-    /// The same bytes hold further entries, so none of these bytes are consumed yet.
+    /// The same bytes contain more entries, so none of these bytes are consumed yet.
     Held,
 }
 

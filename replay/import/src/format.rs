@@ -16,8 +16,8 @@ pub trait Format {
         MOST_HELD
     }
 
-    /// Returns how late an entry may come in the file, ns: the longest time by which it may follow entries with later
-    /// timestamps.
+    /// Returns how far entries may be out of time order, ns. An entry may follow entries whose timestamps are later by
+    /// up to this time.
     fn reach_ns(&self) -> u64 {
         WINDOW_NS
     }

@@ -9,7 +9,7 @@ use headrace_imagenex881::logfile::{LogFile, LogFileError};
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImagenexFormat;
 
-/// Name of the line that carries all returns in an Imagenex file.
+/// Name of the only stream in an Imagenex file: all returns belong to it.
 pub const STREAM: &str = "imagenex";
 
 const DAY_NS: u64 = 86_400_000_000_000;

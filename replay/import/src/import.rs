@@ -36,11 +36,11 @@ pub struct Import<S> {
 pub struct Imported {
     /// Number of entries in the foreign log.
     pub entries: u64,
-    /// Number of entries that belong to no sensor, because of their line or content.
+    /// Number of entries that belong to no sensor, because of their connection or content.
     pub passed_over: u64,
     /// Number of messages written for each source of the log.
     pub messages: Vec<u64>,
-    /// Log time of the last message written.
+    /// Latest log time of the messages written.
     pub last: MonoNs,
     /// Losses of the import, as text.
     pub losses: Vec<String>,
@@ -83,7 +83,7 @@ impl<S: Source> Import<S> {
         Ok(Self { input, order, first_ns, clock })
     }
 
-    /// Returns metadata for the log: the epoch of the file's clock and, if known, the time of day at the start.
+    /// Returns metadata for the log: the epoch of the file's clock, and the time on this clock at the log's start.
     pub fn clock_metadata(&self) -> Vec<(String, String)> {
         let mut all = vec![("import_clock".to_owned(), self.clock.as_str().to_owned())];
         if self.clock == Clock::Utc {
@@ -97,7 +97,7 @@ impl<S: Source> Import<S> {
 
     /// Writes to the log everything that the sensors would have received.
     ///
-    /// `beside` is called with the number of entries so far.
+    /// Calls `beside` after each entry, with the number of entries so far.
     ///
     /// Errors: reading the file or writing the log fails.
     pub fn write<W: Write>(

@@ -24,7 +24,7 @@ pub trait Source {
     /// Returns the epoch of the file's timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
-    /// Returns the longest time by which an entry may follow entries with later timestamps, ns.
+    /// Returns how far entries may be out of time order, ns. See [`Format::reach_ns`].
     fn reach_ns(&self) -> u64;
 
     /// Returns the number of bytes read from the file so far.

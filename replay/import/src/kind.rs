@@ -122,7 +122,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the name of the line to which a sensor with this `connect` listens.
+    /// Returns the name in the file of the connection that a sensor with this `connect` uses.
     pub(crate) fn usual_line(self, connect: &str) -> Option<String> {
         match self {
             Self::Candump => match Connect::parse(connect) {
@@ -133,7 +133,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the form of a line's name in files of this kind, for messages.
+    /// Returns the form of a connection's name in files of this kind, for error texts.
     pub(crate) fn line_form(self) -> &'static str {
         match self {
             Self::Tlog => tlog::STREAM,

@@ -4,7 +4,7 @@
 //!
 //! A [`Format`] splits one kind of file, without I/O; [`FileKind`] lists the known kinds. [`Import`] reads with
 //! bounded memory, moves the file's times to a clock that begins at [`BEGIN`], and counts losses. A [`Taker`] is a
-//! sensor of the vehicle file; [`routing`] assigns lines to sensors.
+//! sensor of the vehicle file; [`routing`] assigns recorded connections to sensors.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

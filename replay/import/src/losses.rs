@@ -8,7 +8,8 @@ use headrace_geometry::time::MonoNs;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Losses {
     kinds: BTreeMap<&'static str, Kind>,
-    /// End and reason of the last loss. A single lost byte directly after it belongs to the same loss.
+    /// End and reason of the latest loss. A single byte lost directly after it for the same reason belongs to the same
+    /// loss.
     last: Option<(u64, &'static str)>,
     cut_off: Option<(u64, usize)>,
     late: u64,
@@ -37,7 +38,7 @@ impl Losses {
         self.cut_off = Some((at, bytes));
     }
 
-    /// Counts entries dropped because they came too late in the file to be put in time order.
+    /// Sets the number of entries dropped because they came too late in the file to be put in time order.
     pub(super) fn late(&mut self, count: u64) {
         self.late = count;
     }

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::entry::Entry;
 
-/// Entries within this time of the latest timestamp are held back, because older entries may still follow.
+/// An entry is held back until another entry is later by more than this time, ns. Until then, earlier entries may
+/// follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
 /// Maximum number of entries held back for sorting, whatever their timestamps.
 const MOST_ENTRIES: usize = 1 << 15;
 const MOST_BYTES: usize = 1 << 24;
-/// Maximum number of entries held back for formats whose entries may come later than [`WINDOW_NS`].
+/// Maximum number of entries held back for formats whose entries may be out of order by more than [`WINDOW_NS`].
 const MOST_REACHING: usize = 1 << 18;
 
 /// Sorts entries by their timestamps. Entries with equal timestamps keep their order in the file.
@@ -31,7 +32,7 @@ impl Default for Order {
 }
 
 impl Order {
-    /// Creates an order for entries that may follow entries with timestamps up to `window_ns` later.
+    /// Creates an empty order. An entry may follow entries whose timestamps are up to `window_ns` later.
     pub(super) fn reaching(window_ns: u64) -> Self {
         let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
         Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }

@@ -15,7 +15,7 @@ pub struct PingFormat {
     last_of_day_ns: u64,
 }
 
-/// Name of the line that carries all messages in a Ping Viewer log.
+/// Name of the only stream in a Ping Viewer log: all messages belong to it.
 pub const STREAM: &str = "ping";
 
 /// Number of texts in the preface after the title and the version. Two numbers follow them.

@@ -1,5 +1,5 @@
-//! Assigns the lines of a foreign log to sensors. A line is a connection whose data was recorded, such as a CAN
-//! interface.
+//! Assigns the connections recorded in a foreign log, such as CAN interfaces, to sensors. Options and error texts call
+//! them lines.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_replay::log::SourceInfo;
@@ -12,10 +12,10 @@ use crate::kind::FileKind;
 pub struct Taker {
     /// Number of the sensor's source in the log.
     pub source: u16,
-    /// Name of the line in the foreign log whose data the sensor receives.
+    /// Name of the recorded connection whose data the sensor receives.
     pub stream: String,
-    /// Driver that picks the sensor's data from a shared line. Without a driver, the sensor gets everything on the
-    /// line.
+    /// Driver that picks the sensor's data from a shared connection. Without a driver, the sensor gets all data of the
+    /// connection.
     pub driver: Option<Box<dyn Driver>>,
 }
 
@@ -33,7 +33,7 @@ impl Wire for Heard {
 }
 
 impl Taker {
-    /// Whether the sensor receives the data of this line.
+    /// Whether the sensor receives the data of this connection.
     pub(super) fn listens_to(&self, stream: &str) -> bool {
         self.stream == stream
     }
@@ -49,7 +49,7 @@ impl Taker {
     }
 }
 
-/// Reason why the lines of a file can't be assigned to sensors.
+/// Reason why the connections in a file can't be assigned to sensors.
 ///
 /// Messages name the options of `headrace import`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -68,7 +68,7 @@ pub enum RoutingError {
     NoTaker {
         /// Description of sensors that could receive the data.
         which: String,
-        /// Form of a line's name in this kind of log file.
+        /// Form of a connection's name in this kind of log file.
         line: &'static str,
     },
     /// The file comes from one device, but several sensors could be that device.
@@ -80,7 +80,7 @@ pub enum RoutingError {
         several: String,
         /// Plugin that these sensors have in common.
         plugin: &'static str,
-        /// Form of a line's name in this kind of log file.
+        /// Form of a connection's name in this kind of log file.
         line: &'static str,
     },
     /// The file contains values, and there is no vehicle file with sensors that could encode them.
@@ -92,26 +92,26 @@ pub enum RoutingError {
     /// Neither a vehicle file nor an option names a sensor.
     #[error("the sensors of the messages are unknown; give --vehicle VEHICLE.toml or --source ID={line}")]
     NoSensor {
-        /// Form of a line's name in this kind of log file.
+        /// Form of a connection's name in this kind of log file.
         line: &'static str,
     },
-    /// An option names lines, but the file contains values instead of lines.
+    /// An option names a connection, but the file contains values instead of the bytes of connections.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
         /// Kind of the file that contains values.
         format: &'static str,
     },
-    /// An option names a line that this kind of log file doesn't have.
+    /// An option names a connection that this kind of log file doesn't have.
     #[error("--source {id}={line}: such a file has one line, {only}")]
     NoSuchLine {
         /// Name of the sensor in the option.
         id: String,
-        /// Name of the line in the option.
+        /// Name of the connection in the option.
         line: String,
-        /// The only line that this kind of log file has.
+        /// The only connection that this kind of log file has.
         only: &'static str,
     },
-    /// Two options name the same sensor, which can listen to only one line.
+    /// Two options name the same sensor, but a sensor can have only one connection.
     #[error("--source {id}: named twice; a sensor listens to one line")]
     Twice {
         /// Name of the sensor in both options.
@@ -119,9 +119,10 @@ pub enum RoutingError {
     },
 }
 
-/// Returns the sensors that receive lines: the sensors of the vehicle file, or the sensors in `explicit`.
+/// Returns the sensors that receive data: the sensors of the vehicle file, or the sensors in `explicit`.
 ///
-/// `explicit` has pairs of a sensor's id and its line, which replace the lines in the vehicle file.
+/// `explicit` has pairs of a sensor's id and the name of its connection. They replace the connections in the vehicle
+/// file.
 ///
 /// Errors: see [`RoutingError`].
 pub fn takers(
@@ -145,7 +146,7 @@ pub fn takers(
         let is_of_kind = kind == FileKind::Candump || config.plugin == kind.plugin();
         let usual = kind.usual_line(&config.connect).filter(|_| is_of_kind);
         let Some(stream) = own.or(usual.filter(|_| explicit.is_empty())) else { continue };
-        // All devices of a telemetry link share one line, so each device's driver must pick out its own messages.
+        // All devices of a telemetry link share one connection, so each device's driver must pick out its own messages.
         let setup = DriverSetup { begun: MonoNs(0), head: None };
         let has_driver = kind == FileKind::Tlog && config.plugin == kind.plugin();
         takers.push(Taker { source, stream, driver: has_driver.then(|| device.driver(&setup)) });

@@ -14,7 +14,7 @@ pub struct TlogFormat {
     last_us: u64,
 }
 
-/// Name of the line that carries all frames of a telemetry log.
+/// Name of the only stream in a telemetry log: all frames belong to it.
 pub const STREAM: &str = "mavlink";
 
 /// Maximum difference between the times of two entries, µs. A larger difference after damage means a false match.

@@ -1,4 +1,4 @@
-//! Provides a loop that advises a simulated pilot. The recorded dive is later run through the same loop.
+//! Provides a loop that advises a simulated pilot. The recorded dive is later run through a loop of the same kind.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::work_off;
@@ -36,7 +36,7 @@ pub fn simulation(scene: &Scene, noting: bool) -> Result<Simulation, SimulationE
 
 /// Simulates a scene as [`simulation`] does, but arms the pilot's loop with another vehicle file, `believed`.
 ///
-/// Its sensors must send the same bytes as those of the scene's vehicle file.
+/// The sensors of `believed` must send the same bytes as those of the scene's vehicle file.
 ///
 /// Errors: see [`SimulationError`].
 pub fn simulation_believing(
@@ -77,7 +77,7 @@ impl LoopAdviser {
     }
 }
 
-/// Returns the advice of the last tick, if any.
+/// Returns the advice of the latest tick, if any.
 fn told_by(dive: &Loop) -> Option<PilotAdvice> {
     let last = dive.view().advised().entries.last()?;
     let sections = &dive.view().coverage().sections;

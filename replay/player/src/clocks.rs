@@ -11,7 +11,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 
 /// Minimum offset between two clocks, far longer than any dive.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Maximum number of clocks that are distinguished. Messages of further clocks are assigned to no clock.
+/// Maximum number of clocks that are distinguished. Messages of more clocks are assigned to no clock.
 const MAX_CLOCKS: usize = 100;
 
 /// A clock, described by the range of its timestamps. The ranges of two clocks are more than a year apart.
@@ -39,7 +39,7 @@ impl Clock {
     }
 }
 
-/// Returns the clock with the most source messages; `None` if the log has only one clock.
+/// Returns the clock with the most raw messages; `None` if the log has only one clock.
 ///
 /// The messages are read only if the chunk headers span more than a year.
 ///

@@ -196,7 +196,7 @@ impl Driver {
         sent
     }
 
-    /// Sets the end of the last tick to `until`, after both the feed and the loop have jumped there.
+    /// Sets the end of the previous tick to `until`, after both the feed and the loop have jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }
@@ -220,7 +220,8 @@ fn send_until(
     until: MonoNs,
     work_off: &mut dyn FnMut(MonoNs),
 ) -> Result<(), DriveError> {
-    // No packet can follow the clock's last value, so a packet with that timestamp belongs to the last tick.
+    // No packet can have a timestamp above the clock's largest value, so a packet with this value belongs to the last
+    // tick.
     let is_due = |coming: &Coming| coming.at < until || until == MonoNs(u64::MAX);
     while let Some(coming) = feed.coming()?.filter(is_due) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };

@@ -69,7 +69,7 @@ pub struct EffectInfluence {
     pub hole_m: Mean,
     /// Cost of simulating with all effects, ns of processor time per sonar return.
     pub all_ns: Mean,
-    /// Each effect left out alone, the most expensive effect first.
+    /// Results of leaving out each effect alone, the most expensive effect first.
     pub each: Vec<LeftOut>,
     /// The effects that can all be left out together, because the change stays within the limits.
     pub spared: LeftOut,
@@ -222,7 +222,7 @@ impl Figures {
         Ok(figures)
     }
 
-    /// Returns the mean of the hole diameter D over all sections, m.
+    /// Returns the mean of the hole diameter D over all sections whose hole is bounded, m.
     fn hole_m(&self) -> f64 {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }

@@ -63,7 +63,7 @@ pub trait PlaybackObserver {
     /// Called when playback pauses, after a jump, and at the end of the log. Only at the end of the log, `ended` is
     /// true.
     ///
-    /// `at` is the end of the last tick.
+    /// `at` is the end of the latest tick.
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
 
     /// Called when playback pauses or resumes, and when its speed changes.
@@ -78,12 +78,12 @@ pub struct Playback<'a> {
     driver: Driver,
     clock: Clock,
     speed: Option<f64>,
-    /// End of the last tick that was played.
+    /// End of the latest tick that was played.
     now: MonoNs,
-    /// First time that occurs in the log.
+    /// Receive time of the log's first packet.
     begun: MonoNs,
     mode: Mode,
-    /// Wall time spent on ticks since the last snapshot.
+    /// Wall time spent on ticks since the latest snapshot.
     worked: Duration,
 }
 
@@ -100,8 +100,8 @@ enum Mode {
 impl<'a> Playback<'a> {
     /// Creates a playback that starts at the beginning of the log. The player must already be connected to the loop.
     ///
-    /// A snapshot is taken whenever the work since the last one exceeds an interval. A jump therefore never takes
-    /// much longer than that interval.
+    /// A snapshot is taken whenever the processing time since the previous one exceeds an interval. A jump therefore
+    /// never takes much longer than that interval.
     ///
     /// Errors: the log can't be read, or the first snapshot can't be taken.
     pub fn new(
@@ -129,7 +129,7 @@ impl<'a> Playback<'a> {
         Ok(playback)
     }
 
-    /// Returns the first time that occurs in the log.
+    /// Returns the receive time of the log's first packet.
     pub fn begun(&self) -> MonoNs {
         self.begun
     }

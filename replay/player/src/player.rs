@@ -164,7 +164,7 @@ impl Player {
         all
     }
 
-    /// Returns losses and omissions so far, as text, except that the last file is cut off.
+    /// Returns losses and omissions so far, as text. The cut-off end of the last file is left out.
     pub(crate) fn losses_before_cut(&self) -> Vec<String> {
         let cut = self.reader.losses().iter().rfind(|loss| loss.is_open_end()).map(Loss::to_string);
         let mut losses = self.losses_here();
@@ -255,7 +255,7 @@ impl PacketSource for Player {
     }
 }
 
-/// Formats a time for messages: seconds on the log's clock.
+/// Formats a time for texts: seconds on the log's clock.
 pub fn seconds(at: MonoNs) -> String {
     format!("{:.3} s", at.as_secs_f64())
 }

@@ -1,7 +1,7 @@
 //! Rebuilds the state of an interrupted dive from its log, on a thread of its own, while new packets are only recorded.
 //!
-//! The log is replayed into a second loop, followed by the new packets. When it has caught up, its state is restored
-//! into the dive's loop.
+//! The log is replayed into a second loop, followed by the new packets. When the second loop has caught up, its state
+//! is restored into the dive's loop.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,8 +21,8 @@ use crate::playback::PlaybackError;
 use crate::player::Player;
 use crate::saved_state::{Consumed, SavedState};
 
-/// Number of new packets that the rebuilding loop may still have to process when the dive's loop waits for it. They
-/// are a fraction of a second of a dive.
+/// Once the rebuilding loop has at most this many new packets left, the dive's loop waits for it, for a fraction of a
+/// second.
 const NEAR_PACKETS: u64 = 100;
 
 /// A dive whose state is being rebuilt.
@@ -56,7 +56,7 @@ struct Packet {
 
 #[derive(Default)]
 struct Progress {
-    /// Time of the last packet from the log, ns.
+    /// Time of the latest packet from the log, ns.
     at_ns: AtomicU64,
     /// Number of new packets taken so far.
     taken: AtomicU64,
@@ -68,8 +68,8 @@ struct Progress {
 impl Rebuild {
     /// Starts to rebuild a dive from the files of its recording. `dive` is a new loop of the same vehicle.
     ///
-    /// `saved` is the path of a state saved during the dive. If it fits the log and this program, only the log's rest is
-    /// replayed.
+    /// `saved` is the path of a state saved during the dive. If it fits the log and this program, only the rest of the
+    /// log is replayed.
     ///
     /// Errors: the log can't be opened, or the thread can't be started.
     pub fn start(mut dive: Loop, files: Vec<PathBuf>, saved: PathBuf) -> Result<Self, LogError> {
@@ -126,7 +126,7 @@ impl Rebuild {
         self.thread.is_finished() || self.progress.read.load(Ordering::Relaxed) && behind <= NEAR_PACKETS
     }
 
-    /// Returns the state after all packets passed on, and ends the thread.
+    /// Waits until all packets passed on are processed, ends the thread, and returns the state.
     ///
     /// Errors: the log can't be read, or the loop fails.
     pub fn finish(self) -> Result<Rebuilt, PlaybackError> {
@@ -146,7 +146,7 @@ struct Rejoined {
     live: Receiver<Packet>,
     /// The next new packet.
     next: Option<Packet>,
-    /// Order of the next new packet among all packets.
+    /// Number of the next new packet, counted over all packets of the dive.
     order: u64,
     consumed: Consumed,
     progress: Arc<Progress>,

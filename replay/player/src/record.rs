@@ -53,7 +53,7 @@ pub fn result_channels() -> Vec<ResultChannel> {
     STREAMS.iter().map(channel).chain(view::channels()).collect()
 }
 
-/// Returns the results of a loop's last tick as messages, for a [`crate::log::DerivedChannels`].
+/// Returns the results of a loop's latest tick as messages, for a [`crate::log::DerivedChannels`].
 ///
 /// Each message has the number of its channel. The loop must keep its results. This function allocates, so it may be
 /// called only by outlets between ticks.
@@ -70,8 +70,8 @@ pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
 
 /// Records with one or several recorders every packet that the loop consumes, every tick and every result.
 ///
-/// Packets are recorded in the order of consumption. If a recorder's queue has no room for another largest tick, the
-/// loop consumes nothing until there is room. Recorded input is therefore never dropped.
+/// Packets are recorded in the order of consumption. If a recorder's queue has no room for a tick of the largest size,
+/// the loop consumes nothing until there is room. Recorded input is therefore never dropped.
 ///
 /// A dive that reads ports doesn't wait, see [`RecorderOutlet::of_ports`]. If all recorders have ended, the dive
 /// continues without recording; their handles return the errors.

@@ -129,14 +129,14 @@ pub struct StateKeeper {
     consumed: Consumed,
     /// Time of the next state.
     due: Option<MonoNs>,
-    /// A state that contains packets which are not on the medium yet, and its time.
+    /// A state, and its time. It is written once all its packets are on the medium.
     waiting: Option<(MonoNs, SavedState)>,
     states: Sender<SavedState>,
     ended: Arc<AtomicBool>,
 }
 
 impl StateKeeper {
-    /// Keeps states beside a recording, of a dive without packets so far.
+    /// Starts to save states of a dive beside its recording. The dive has no packets yet.
     ///
     /// Errors: the thread can't be started.
     pub fn start(recording: &Path) -> std::io::Result<Self> {
@@ -168,7 +168,7 @@ impl StateKeeper {
 
     /// Counts the packets of a tick, and saves the loop's state if that is due. Call it after every tick.
     ///
-    /// Data up to `safe_to` is on the medium. A state is written only once all its packets are.
+    /// Data up to `safe_to` is on the medium. A state is written only once all its packets are on the medium.
     pub fn after_tick(&mut self, dive: &Loop, safe_to: MonoNs) {
         self.consumed.add_tick(&dive.view().placed().inbox);
         if let Some((_, state)) = self.waiting.take_if(|(at, _)| safe_to >= *at) {

@@ -87,7 +87,7 @@ impl FirstPass {
         Ok((Self { settings, steps, consistency: [None; MAX_SOURCES] }, Box::new(navigation)))
     }
 
-    /// Stores the steps of the last tick. Must be called after every tick.
+    /// Stores the steps of the latest tick. Must be called after every tick.
     pub fn after_tick(&mut self, dive: &Loop) {
         self.steps.take();
         self.consistency = core::array::from_fn(|source| dive.consistency(source));

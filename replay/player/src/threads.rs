@@ -1,8 +1,8 @@
 //! Drives a loop from a log on several threads, or several loops that share one navigation.
 //!
-//! The placer runs on one thread, the adviser on another, and the rest on the caller's. Bounded queues pass batches of
-//! ticks between the threads. Each part processes all ticks in order, so the results are identical bit for bit on any
-//! number of threads.
+//! The placer, which georeferences pings, runs on one thread. The adviser runs on another, and all other work on the
+//! caller's thread. Bounded queues pass batches of ticks between the threads. Each part processes all ticks in order,
+//! so the results are identical bit for bit on any number of threads.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -25,7 +25,8 @@ pub const MOST_THREADS: usize = 3;
 const BATCH_TICKS: usize = 32;
 /// Maximum number of batches of ticks that wait between two threads.
 const MOST_WAITING: usize = 4;
-/// Capacity of the queue of used batches. It fits the batches of two queues, and the batches being processed.
+/// Capacity of the queue of used batches. It has room for the batches of two queues, and for the batches being
+/// processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 
 /// A tick, with its georeferenced pings and its speed advice.
@@ -53,7 +54,7 @@ impl Batch {
         }
         let tick = &mut self.ticks[self.len];
         tick.now = now;
-        // A loop may still hold the georeferenced pings of its last tick. Those of all other ticks can be
+        // A loop may still hold the georeferenced pings of its latest tick. Those of all other ticks can be
         // overwritten.
         if Arc::get_mut(&mut tick.placed).is_none() {
             tick.placed = Arc::default();
@@ -251,8 +252,8 @@ fn drive_all(
             covering.push(scope.spawn(move || {
                 for batch in placed {
                     survey_all(&mut some, &batch);
-                    // The last loop returns the batch. An error means that the placing thread has ended and needs no
-                    // batches.
+                    // The loop that finishes last returns the batch. An error means that the placing thread has ended
+                    // and needs no batches.
                     if let Some(batch) = Arc::into_inner(batch) {
                         used.try_send(batch).ok();
                     }
@@ -271,8 +272,8 @@ fn drive_all(
     })
 }
 
-/// For each loop, runs advice (for the loop's own target) and judging of all ticks in a batch of
-/// georeferenced pings.
+/// Runs advice and judging of each loop for all ticks in a batch of georeferenced pings. Advice is for the loop's own
+/// target.
 fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
     let mut own = Tick::default();
     for (dive, adviser) in dives {

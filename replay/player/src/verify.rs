@@ -65,7 +65,7 @@ pub enum What {
 pub struct Verifier {
     reader: DiveLog,
     streams: [Stream; STREAMS.len()],
-    /// Tick of the live results that were read last.
+    /// Tick of the live results that were read most recently.
     last_tick: u64,
     has_results: bool,
     at_end: bool,
@@ -176,7 +176,7 @@ impl Verifier {
         Ok(Self { reader: DiveLog::open(log)?, streams, last_tick: 0, has_results: false, at_end: false })
     }
 
-    /// Compares the results of the replay's last tick.
+    /// Compares the results of the replay's latest tick.
     ///
     /// Errors: reading the log fails.
     pub fn after_tick(&mut self, dive: &Loop) -> Result<(), LogError> {

@@ -1,4 +1,4 @@
-//! Assembles a simulation. Only here can effects add systems, components and random streams.
+//! Assembles a simulation. Effects add systems, components and random streams only here.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
@@ -42,7 +42,7 @@ pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Effects that drew random numbers before the dive, each with the source for which it drew them.
+    /// Pairs of an effect and a sensor: the effect drew random numbers for the sensor before the dive.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
@@ -70,7 +70,7 @@ pub struct Builder<'a> {
     seed: u64,
     entities: &'a [Entity],
     systems: Vec<(Stage, Option<u16>, Configs)>,
-    /// Index of the effect that is being built; `None` for the base.
+    /// Index of the effect that is being built; `None` for the base systems.
     current: Option<usize>,
     added: Vec<Added>,
     base_systems: Vec<(Stage, String)>,
@@ -176,13 +176,13 @@ impl<'a> Builder<'a> {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }
 
-    /// Makes `effect` the effect to which further systems and components belong.
+    /// Begins an effect. Systems and components added from now on belong to this effect.
     pub(crate) fn effect(&mut self, effect: &'static str) {
         self.current = Some(self.added.len());
         self.added.push(Added { effect, ..Added::default() });
     }
 
-    /// Ends the effects. Systems added later belong to the base.
+    /// Ends the effects. Systems added from now on are base systems.
     pub(crate) fn base(&mut self) {
         self.current = None;
     }
@@ -217,7 +217,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The last two segments of a type's path, and the last segment of its type parameter.
+/// Shortens the path of a type to its last two segments, and the path of its type parameter to the last segment.
 fn short_name(name: &str) -> String {
     let last = |path: &str, count: usize| {
         let parts: Vec<&str> = path.rsplit("::").take(count).collect();

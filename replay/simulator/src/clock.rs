@@ -7,13 +7,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Time at which every simulated dive starts.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// Number of parts in a second. A drift is a whole number of parts per second, so that no sum depends on rounding.
+/// Number of parts in a second. Drifts are whole numbers of parts per second, so sums have no rounding errors.
 const PARTS: i128 = 1_000_000_000_000;
 
 /// A clock that is correct at the start and drifts at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Clock {
-    /// Number of [`PARTS`] by which a second shown by the clock is longer than a true second.
+    /// Excess of a second of this clock over a true second, in parts; see [`PARTS`].
     longer: i128,
 }
 
@@ -31,7 +31,7 @@ impl Clock {
         START + DurNs(i64::try_from(true_span).unwrap_or(i64::MAX))
     }
 
-    /// First time shown by the clock for which the true time is at or after `at`.
+    /// Earliest time on this clock at which the true time is `at` or later.
     pub(crate) fn shows(&self, at: MonoNs) -> MonoNs {
         let true_span = i128::from(at.since(START).0);
         let near = (true_span * PARTS).div_euclid(PARTS + self.longer);

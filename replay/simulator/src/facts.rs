@@ -14,7 +14,7 @@ pub struct Facts {
     pub sensors: Vec<SensorFacts>,
     /// Parts of the vehicle that may hide a head's view.
     pub hull: Vec<Obstacle>,
-    /// Whether the trajectory's speeds are relative to the water, so that a current carries the vehicle.
+    /// Reference of the trajectory's speeds: the water, which carries the vehicle, or the tunnel.
     pub ground: Ground,
     /// Length of the tunnel, m.
     pub length_m: f64,

@@ -126,7 +126,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// Returns a system that records all changes since the last such system ran, and attributes them to `effect`.
+/// Returns a system that records all changes since the previous such system ran, and attributes them to `effect`.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

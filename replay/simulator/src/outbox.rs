@@ -113,7 +113,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Releases all messages. Returns false if they were released before.
+    /// Releases all messages. Returns false if all were released before.
     pub(crate) fn finish(&mut self) -> bool {
         let more = self.until < NEVER;
         self.release(NEVER);
@@ -157,7 +157,7 @@ mod tests {
         line
     }
 
-    /// Time, source and only byte of each released message.
+    /// Time, source and the single byte of each released message.
     fn going(outbox: &mut Outbox) -> Vec<(u64, u16, u8)> {
         let mut gone = Vec::new();
         while outbox.has_next() {

@@ -24,10 +24,10 @@ use crate::simulation::Simulation;
 /// Duration of the dive, s. After this time, the uncertainty of an inertial unit's biases is within a few per cent of
 /// its final value.
 const CALM_S: f64 = 180.0;
-/// Speed of the dive, m/s, and the largest share of the tunnel covered by the dive.
+/// Largest speed of the dive, m/s, and largest share of the tunnel that the dive covers.
 const CALM_MPS: f64 = 0.1;
 const MOST_SHARE: f64 = 0.5;
-/// Number of evaluated times between two passes, one per second.
+/// Largest evaluated time between two passes, s. All whole seconds up to this time are evaluated.
 const TIMES_S: u32 = 110;
 
 /// Expected position errors of a vehicle. `load` returns the vehicle file for its `name`.
@@ -80,8 +80,8 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
     Ok(navigation)
 }
 
-/// Pairs of the time between two passes, s, and the standard deviation of the size of a hole between these passes, m.
-/// The standard deviation is the largest around the wall.
+/// Standard deviations of the hole's size by the time between two passes: pairs of time, s, and deviation, m. Each
+/// deviation is the largest around the wall.
 fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig, mount_sd_rad: f64) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;

@@ -46,7 +46,8 @@ impl Stream {
         self.block(step, 0)
     }
 
-    /// A further block of random numbers for `step`, for an effect that needs more than two.
+    /// Block number `block` of random numbers for `step`. An effect needs it if it draws more than two numbers per
+    /// step.
     pub fn block(self, step: u64, block: u64) -> Draw {
         let half = |value: u64| [(value & 0xFFFF_FFFF) as u32, (value >> 32) as u32];
         let ([a, b], [c, d]) = (half(step), half(block));

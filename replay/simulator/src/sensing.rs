@@ -108,7 +108,7 @@ pub(crate) struct LineMessage {
     pub direction: Direction,
     /// Start and end of the message in [`Line::bytes`].
     pub bytes: (usize, usize),
-    /// Number within the time slice of the measurement that the message reports.
+    /// Number of the reported measurement within the time slice.
     pub sample: usize,
 }
 

@@ -121,7 +121,7 @@ impl Simulation {
         }
         sim.base();
         if asker == Asker::Hosts {
-            // Before the counters encode their counts, and so after all effects on them.
+            // This system runs after all effects on the counters, and before the counters encode their counts.
             sim.system(Stage::Tell, stages::freeze);
         }
         add_base_systems(&mut sim);
@@ -292,7 +292,7 @@ impl Simulation {
         }
     }
 
-    /// The next message that has crossed its line. Does not simulate further.
+    /// The next message that has crossed its line. Does not advance the simulation.
     pub fn waiting_message(&mut self) -> Option<Message<'_>> {
         self.outbox.has_next().then(|| self.outbox.next()).flatten()
     }

@@ -14,9 +14,9 @@ use crate::{Scene, SceneError, Simulation, TruthRow};
 pub(crate) struct Dive {
     /// Keys of the scene's table `[tunnel]`.
     pub(crate) tunnel: &'static str,
-    /// Id, plugin and further keys of each sensor.
+    /// Id, plugin and other keys of each sensor.
     pub(crate) sensors: Vec<(&'static str, &'static str, String)>,
-    /// Further tables of the vehicle file, as text.
+    /// Other tables of the vehicle file, as text.
     pub(crate) vehicle: &'static str,
     /// Keys of the scene's table `[trajectory]`.
     pub(crate) trajectory: &'static str,
@@ -45,8 +45,8 @@ pub(crate) struct Dived {
 }
 
 impl Dive {
-    /// A dive of ten seconds at 0.2 m/s with one head, in the mode MEDIUM with a range of 10 m, on the axis of a tunnel
-    /// 6 m wide and 5 m high.
+    /// A dive of ten seconds at 0.2 m/s on the axis of a tunnel 6 m wide and 5 m high. One head is in the mode MEDIUM
+    /// with a range of 10 m.
     pub(crate) fn with_head() -> Self {
         Self::with_heads(&[[0.0; 3]])
     }
@@ -119,7 +119,7 @@ impl Dive {
     /// Text of the error if the scene with these effects is refused.
     pub(crate) fn refusal(&self, effects: &str) -> String {
         match self.simulation(effects) {
-            Ok(_) => panic!("{effects} was taken"),
+            Ok(_) => panic!("{effects} was accepted"),
             Err(why) => why.to_string(),
         }
     }

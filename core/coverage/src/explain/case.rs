@@ -33,13 +33,13 @@ pub struct Case<'a> {
     pub none_alive: bool,
     /// Whether no head pinged in the section, and at least one head passed through it in silence.
     pub is_dark: bool,
-    /// Whether the section's samples come from unrelated stretches of navigation.
+    /// Whether the section's samples come from several navigation segments.
     pub is_torn: bool,
     /// Coverage target T, m.
     pub target_m: f64,
     /// Causes of the two neighbouring sections. Among equally small sets of causes, the search prefers these.
     pub beside: [Causes; 2],
-    /// Latest missing samples.
+    /// List of the most recent missing samples.
     pub lacks: &'a MissingSamples,
 }
 
@@ -85,8 +85,8 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole. For a hole larger than the target, only its central part of
-/// the target's size must have been swept.
+/// Whether every live head has swept the hole. If the hole is larger than the target, only a central part of the
+/// target's size has to be swept.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
@@ -117,7 +117,7 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
 
 /// Whether a missing sample lies in the central part of a hole.
 ///
-/// This part is at most as large as the target, because samples from ahead may still shrink the hole.
+/// This part is at most as large as the target, because samples that land later may still shrink the hole.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
@@ -141,8 +141,8 @@ impl Drive {
 
     /// Returns the driving figures as they would have been with some factors removed.
     ///
-    /// If speed is among the removed factors, the lower speed is computed for `margin_m`: the target less a
-    /// margin, m. With `all_turn`, no head is silent or stalled.
+    /// If speed is among the removed factors, the returned speed is low enough for holes of at most `margin_m`, m,
+    /// which is the target less a margin. `all_turn` means that no head is silent or stalled.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;
@@ -177,7 +177,7 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // The advised speed is lower if the vehicle hides wall from some heads.
+            // If the vehicle hides wall from some heads, the advised speed is lower, and replaces this speed.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

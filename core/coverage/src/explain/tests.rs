@@ -180,11 +180,11 @@ fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
     assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
 }
 
-/// A range setting with a longer turn leaves passes farther apart.
+/// A longer range or a finer step has a longer turn, which leaves the passes farther apart.
 ///
-/// If this distance exceeds the target, the setting alone does not explain the fail.
+/// If the section would fail with that setting too, the present setting is not the cause.
 #[test]
-fn head_setting_is_a_cause_only_if_its_longer_turn_meets_the_target() {
+fn head_setting_is_a_cause_only_if_another_setting_meets_the_target() {
     let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
     let drive = |turn: f64| Drive { other: other(turn), ..sound() };
     let far = |turn: f64| Wall {
@@ -203,7 +203,7 @@ fn head_setting_is_a_cause_only_if_its_longer_turn_meets_the_target() {
     assert_eq!(named(&coarse(3.0)), [Cause::Unknown]);
 }
 
-/// A stalled head leaves the passes equally far apart, however straight the vehicle moves.
+/// Even if the vehicle moves straight, a stalled head leaves the passes too far apart.
 #[test]
 fn stalled_head_and_swing_are_both_named_as_causes() {
     let why = Causes::of(Cause::HeadStalled);
@@ -212,7 +212,7 @@ fn stalled_head_and_swing_are_both_named_as_causes() {
     assert_eq!(named(&wall), [Cause::OffAxis, Cause::HeadStalled]);
 }
 
-/// If heads never pinged, nothing else is known about them, so speed is not named as a cause.
+/// If no head pinged, nothing else is known about the section, so speed is not named as a cause.
 #[test]
 fn silent_heads_are_the_only_named_cause_if_no_head_pinged() {
     let fast = || Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
@@ -253,7 +253,7 @@ fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
 
 /// Checks the expected time between passes for each set of removed factors.
 ///
-/// `drive` has this time as driven, as scheduled, without stalls, and at the planned speed.
+/// `drive` contains a different time for each case: as driven, as scheduled, without stalls, at the planned speed.
 #[test]
 fn expected_time_between_passes_depends_on_the_removed_causes() {
     let drive = Drive {
@@ -305,7 +305,7 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
     assert!(near(straight.swing_m, 0.0) && near(straight.t_y_m, 0.2) && near(straight.healthy_gap_s, 4.0));
 }
 
-/// With a target of 0.5 m and steps of 0.3 m along the wall, passes may be 0.4 m apart along the tunnel.
+/// With a target of 0.5 m and steps of 0.3 m around the perimeter, passes may be 0.4 m apart along the tunnel.
 #[test]
 fn removing_the_speed_cause_lowers_the_speed_until_the_target_is_met() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
@@ -329,9 +329,9 @@ fn removing_the_speed_cause_lowers_the_speed_until_the_target_is_met() {
 /// Passes 4 s apart at 0.1 m/s have the same distance along the tunnel as passes 2 s apart at the planned 0.2
 /// m/s.
 ///
-/// The planned speed helps only if it reduces this distance below the share `HELPS`.
+/// The planned speed helps only if it reduces this distance below the share `HELPS` of the actual distance.
 #[test]
-fn removing_the_phase_cause_sets_the_planned_speed_if_that_shortens_gaps() {
+fn removing_the_phase_cause_sets_the_planned_speed_only_if_passes_come_closer_together() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,

@@ -11,8 +11,8 @@ use headrace_geometry::math;
 use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
-/// Share of the target that a hole may take up in the trial that removes the speed factor. A plan keeps the
-/// rest as a margin.
+/// Largest hole that the lower speed may leave when the speed factor is removed, as a share of the target. Plans keep
+/// the rest as a margin.
 const MARGIN: f64 = 0.85;
 /// Limits of the factor by which the wall is compressed or stretched.
 ///
@@ -21,10 +21,10 @@ const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
 /// If the hole exceeds this multiple of the target with all present factors removed, its cause is unknown.
 const AT_MOST: f64 = 1.3;
-/// Maximum number of halvings in the search for the hole with all missing samples put back.
+/// Maximum number of bisection steps in the search for the hole's diameter with all missing samples put back.
 const SEARCHED: u32 = 5;
-/// Share of missing samples. If more than this share remains after some factors are removed, the remaining
-/// factors alone still cause a hole.
+/// Largest share of the missing samples that the remaining factors may cause after some factors are removed. If the
+/// share is larger, the remaining factors alone cause a hole.
 const STAYS: f64 = 0.15;
 /// Maximum number of causes in a set that explains a fail.
 const MOST_NAMED: u32 = 3;
@@ -38,11 +38,11 @@ pub(super) struct Trial<'a> {
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// Factors that were present in the section, and those of them that caused missing samples.
+    /// Factors that were present in the section, and the factors among them that caused missing samples.
     present: Causes,
     lacking: Causes,
     left: u32,
-    /// Bounds of the hole's diameter with all missing samples put back, m, and the number of halvings left.
+    /// Bounds of the hole's diameter with all missing samples put back, m, and the number of bisection steps left.
     full_m: [f64; 2],
     halvings: u32,
 }
@@ -67,7 +67,7 @@ impl<'a> Trial<'a> {
         let lacking: Causes = lacking.into_iter().filter(|cause| present.has(*cause)).collect();
         let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
         let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
-        // Samples outside the hole can't shrink it when they are put back.
+        // Samples outside the hole cannot shrink the hole when they are put back.
         let fills = |lack: &MissingSample| {
             lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
         };
@@ -113,7 +113,7 @@ impl<'a> Trial<'a> {
 
     /// Removes `occluded` from the set if the other causes nearly suffice and wall is out of range.
     ///
-    /// With a longer range, heads still hide wall from each other, but other heads see that wall.
+    /// With a longer range, wall stays hidden from some heads, but other heads see this wall.
     fn less_occluded(&mut self, set: Causes) -> Causes {
         let rest = set.without(Cause::Occluded);
         let is_far = set.has(Cause::Occluded) && set.has(Cause::OutOfRange);
@@ -132,7 +132,7 @@ impl<'a> Trial<'a> {
             (true, not_passed),
             // If some heads never pinged, nothing is known about any other factor.
             (is_unheard(self.case, self.seen), silent),
-            // If the planned speed would have met the target, phase is named first: the fix is a change of
+            // If the planned speed would have met the target, phase is named first: the remedy is a change of
             // speed, which is the easiest change.
             (!is_short && self.drive.is_slow_out_of_phase(1.0 / HELPS), phase),
         ];
@@ -164,7 +164,7 @@ impl<'a> Trial<'a> {
 
     /// Returns the factors that every set of causes must contain to explain the fail.
     ///
-    /// Without any one of them, all other factors together don't suffice.
+    /// If one of them stays, the section fails even if all other factors are removed.
     fn needed(&mut self, present: Causes) -> Causes {
         let mut is_needed = |cause: &Cause| !self.passes_without(present.without(*cause), 1.0);
         present.iter().filter(|cause| is_needed(cause)).collect()
@@ -203,7 +203,7 @@ impl<'a> Trial<'a> {
 
     /// Whether all wall counts as covered once some factors are removed.
     ///
-    /// True if the places of the missing samples of these factors are unknown.
+    /// True if it is unknown where these factors caused missing samples.
     fn covers(&self, removed: Causes) -> bool {
         let is_lost = self.case.is_torn || self.seen.unseen || self.seen.adrift;
         removed.has(Cause::PositionLost) && is_lost
@@ -258,7 +258,7 @@ impl<'a> Trial<'a> {
     /// Diameter of the hole with all missing samples put back, m. The remaining factors must explain a hole
     /// of this size.
     ///
-    /// The diameter is only as exact as the comparison with the two bounds requires.
+    /// The diameter is only as exact as a comparison with `least_m` and `most_m` requires.
     fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
         let matters = |[smaller_m, larger_m]: [f64; 2]| smaller_m < most_m && larger_m > least_m;
         if least_m < most_m && self.halvings > 0 && matters(self.full_m) {
@@ -307,8 +307,8 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // The driving figures are those of a single moment, so the size of the hole limits the effect
-        // computed from them.
+        // The driving figures are from a single moment, so the size of the hole limits the effect that is computed
+        // from them.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

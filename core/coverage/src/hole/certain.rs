@@ -1,5 +1,5 @@
-//! Early fail, before the hole is final. It needs a large empty circle that lies wholly where no more samples
-//! can land.
+//! Early fail of a section, before its hole is final. The fail requires a large empty circle that lies wholly where no
+//! more samples can land.
 
 use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
@@ -21,9 +21,9 @@ pub struct Needed<'a> {
 impl HoleFinder {
     /// Whether a circle of the required radius, centred between two chainages, is certain to remain empty.
     ///
-    /// The circle holds no sample and lies outside each of `reaches`: where samples may still land, or where
-    /// some heads have not been. The distance to the nearest sample or to the reach is 1-Lipschitz. As in the
-    /// search for holes, tiles whose bound is too small are dropped and the others are halved.
+    /// The circle contains no sample and lies outside all `reaches`, the stretches where samples may still land or
+    /// where some heads have not been. The distance to the nearest sample or reach changes by at most 1 m per metre. As
+    /// in the search for holes, tiles whose bound is too small are dropped and the other tiles are halved.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle(
@@ -106,10 +106,9 @@ mod tests {
             let most_m = radius_m(PERIMETER_M / 2.0);
             let needed = Needed { radius_m: &radius_m, most_m, slope };
             let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), [reach, None], &needed);
-            // The error of the brute-force grid is at most 5 mm in each direction, and that of the search 1
-            // mm.
-            prop_assert!(!found || best_m + 0.009 > 0.0, "found, there is {best_m}");
-            prop_assert!(found || best_m <= 0.0022, "not found, there is {best_m}");
+            // The grid of the brute force has an error of at most 5 mm in each direction, and the search of 1 mm.
+            prop_assert!(!found || best_m + 0.009 > 0.0, "a circle is found with a margin of {best_m} m");
+            prop_assert!(found || best_m <= 0.0022, "no circle is found with a margin of {best_m} m");
         }
     }
 }

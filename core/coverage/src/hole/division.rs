@@ -121,8 +121,8 @@ impl Division {
 
     /// Adds the share of a sample.
     ///
-    /// Returns false if the sample already has a share, or if there is no room for another. The tile must
-    /// then be halved.
+    /// Returns false if the sample already has a share, or if there is no room for another share. The tile must then
+    /// be halved.
     pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
         let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
         if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {

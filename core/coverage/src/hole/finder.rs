@@ -11,7 +11,7 @@ use headrace_geometry::tunnel::WallPoint;
 
 /// Maximum search radius, m. Wall farther than this from every sample counts as wall that no head has swept.
 pub const FARTHEST_M: f64 = 12.0;
-/// Half diagonal below which a tile isn't halved any further, m.
+/// Half diagonal below which a tile is not halved again, m.
 ///
 /// The bound of such a tile is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
@@ -19,7 +19,7 @@ const NO_FINER_M: f64 = 1e-10;
 const ROUNDING_M: f64 = 1e-9;
 /// Value of `owner` for a tile whose nearest sample isn't known.
 pub(super) const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
-/// Rounding tolerance with which a corner's bound counts as proven, m.
+/// Rounding tolerance for the proof that the bound at a corner is exact, m.
 const PROVEN_M: f64 = 1e-11;
 
 /// The largest empty circle with its centre in a section.
@@ -53,7 +53,7 @@ impl Hole {
             && arc_m >= 0.0
     }
 
-    /// Whether two holes differ by less than a centimetre in size and place.
+    /// Whether two holes differ by at most a centimetre in size and place.
     pub fn is_like(&self, other: &Self) -> bool {
         const LITTLE_M: f64 = 0.01;
         let grown_m = (self.diameter_m - other.diameter_m).abs();
@@ -71,10 +71,10 @@ pub(super) struct Tile {
     pub(super) half_arc_m: f64,
     /// Sample nearest to the tile's centre, relative to the centre, m.
     ///
-    /// The searches for an empty circle of given size use it differently. They store the chainage and arc
-    /// length of any nearby sample, with the chainage from the start of the section.
+    /// The searches for an empty circle of given size use this field differently. They store the chainage, from the
+    /// start of the section, and the arc length of any nearby sample.
     pub(super) owner: (f64, f64),
-    /// Upper bound of f, the distance to the nearest sample, in the tile, m.
+    /// Upper bound of f in the tile, m; f is the distance from a point to the nearest sample.
     pub(super) bound_m: f64,
 }
 
@@ -94,7 +94,7 @@ struct Beyond(WallPoint);
 pub(super) enum Near {
     /// No empty circle has its centre in the tile: one sample is within the radius of all points of the tile.
     Settled,
-    /// The sample nearest to the centre, or an equally near one.
+    /// The sample nearest to the centre, or any sample that is near enough.
     Sample(Nearest),
     /// No sample within the search radius.
     Nothing,
@@ -138,7 +138,7 @@ impl Tile {
     /// Searches for a sample near the tile's centre.
     ///
     /// If the known sample `owner` is within the radius of the whole tile, the function does not search.
-    /// Otherwise, it returns any sample that is near enough, or the nearest one.
+    /// Otherwise, it returns any sample that is near enough; if there is none, it returns the nearest sample.
     pub(super) fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
         // The margins are larger than the rounding errors of the distances.
         let enough_m = radius_m - self.half_m() - ROUNDING_M;
@@ -151,7 +151,7 @@ impl Tile {
         window.near_enough(self.centre(), within_m, enough_m).map_or(Near::Nothing, Near::Sample)
     }
 
-    /// Returns the halves of a tile. Their `owner` becomes the nearest sample, if one is within reach.
+    /// Returns the halves of a tile. Their `owner` becomes the nearest sample, if one was found.
     pub(super) fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
         if let Some(found) = nearest {
             self.owner = (found.x_m, found.arc_m + found.turns * perimeter_m);
@@ -161,7 +161,7 @@ impl Tile {
 
     /// Returns the sample's position relative to the tile's centre.
     ///
-    /// The position is bit-identical, whatever the point from which the search found the sample.
+    /// The result has the same bits for every point from which a search can find the sample.
     fn relative(&self, found: &Nearest, perimeter_m: f64) -> (f64, f64) {
         (found.x_m - self.x_m, (found.arc_m - self.arc_m) + found.turns * perimeter_m)
     }
@@ -186,7 +186,7 @@ pub(super) fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item
 #[derive(Debug)]
 pub struct HoleFinder {
     tolerance_m: f64,
-    /// Radius of the last hole found, m: the first guess for the next search.
+    /// Radius of the previous hole, m: the first guess for the next search.
     last_m: f64,
     /// Radius of the largest circle for which the changed wall was last laid out, m.
     pub(super) laid_m: f64,
@@ -204,7 +204,7 @@ impl Default for HoleFinder {
 stateful!(HoleFinder { state: last_m; fixed: tolerance_m, laid_m, window, tiles, division; });
 
 impl HoleFinder {
-    /// Creates a search that finds D to within a tolerance, m; zero means an exact search.
+    /// Creates a finder of D with a tolerance, m; zero means an exact search.
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(tolerance_m: f64) -> Self {
@@ -227,7 +227,7 @@ impl HoleFinder {
 
     /// Returns the largest hole among the samples of visits from `first_visit` on.
     ///
-    /// The `least_m` of the hole is no bound: full cells leave out samples near those of earlier visits.
+    /// Here, `least_m` is not a lower bound of D: full cells leave out samples near samples of earlier visits.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
@@ -259,7 +259,8 @@ impl HoleFinder {
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
-            // f is 1-Lipschitz, and the next tile's centre is one tile edge away. This bounds its search.
+            // The next tile's centre is one tile edge away, and f changes by at most 1 m per metre. This limits
+            // the radius of the next search.
             within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_arc_m + 1e-6;
             self.tiles.push(tile);
         }
@@ -321,7 +322,7 @@ impl HoleFinder {
         let from_m = self.window.chainage_m(-radius_m);
         let fidelity = store.fidelity(from_m, self.window.chainage_m(length_m + radius_m));
         let diameter_m = 2.0 * best.distance_m;
-        // Samples dropped because the window was full could only have reduced D.
+        // If the window was full, samples were dropped that could reduce D. The lower bound of D is then zero.
         let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
         let hole = Hole {
             diameter_m,
@@ -351,7 +352,7 @@ impl Best {
     }
 }
 
-/// Evaluates a tile's centre: sets its owner and bound, and updates the best point.
+/// Evaluates a tile's centre: sets the tile's owner and bound, and updates the best point.
 fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Result<Tile, Beyond> {
     let found = window.nearest(tile.centre(), within_m).ok_or(Beyond(tile.centre()))?;
     best.take(math::sqrt(found.distance2), tile.centre());

@@ -7,14 +7,14 @@ use crate::frontier::Reach;
 use crate::store::SampleStore;
 use headrace_geometry::tunnel::WallPoint;
 
-/// Search resolution as a share of the circle's radius. A circle whose radius exceeds the required one by
-/// less than this may be missed.
+/// Search resolution as a share of the required radius. A circle whose radius exceeds the required radius by less than
+/// this share may be missed.
 const FINE: f64 = 0.01;
 
 /// Hypothetical changes to the wall.
 #[derive(Debug, Clone, Copy)]
 pub struct WallChanges {
-    /// Factor by which distances along the tunnel are multiplied, above 0 and at most 1.
+    /// Factor by which distances along the tunnel are multiplied, above 0. A factor above 1 stretches the wall.
     pub along: f64,
     /// Factor by which distances around the perimeter are multiplied.
     pub around: f64,
@@ -30,7 +30,7 @@ impl WallChanges {
     /// Wall without any change.
     pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
-    /// Distance of a chainage from wall that counts as covered or where samples may still land, m.
+    /// Distance from a chainage to the nearest stretch that counts as covered or where samples may still land, m.
     fn clear_m(&self, x_m: f64) -> f64 {
         let off_m = |reach: &Reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0);
         let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn wall_is_mirrored_into_the_stretch_not_yet_sampled() {
-        // On a compressed wall, a circle at the end of the samples extends ahead, into wall where nothing has
+        // On a compressed wall, a circle at the end of the samples extends ahead, into wall where no sample has
         // landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn mirrored_stretch_and_original_exclude_the_gap_between_them() {
+    fn stretch_and_its_mirror_image_exclude_the_gap_between_them() {
         let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
             assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
         };

@@ -1,17 +1,17 @@
 //! The largest hole of a section: the largest empty circle on the unrolled wall with its centre in the section.
 //!
 //! Let f(c) be the distance from a point c to the nearest sample. D = 2 max f over the section
-//! (docs/reference/glossary.md). Branch and bound over tiles finds it:
+//! (docs/reference/glossary.md). Branch and bound over tiles finds D:
 //!
 //! 1. A tile is divided among a few samples. Each share is a convex polygon, on which the distance to its
 //!    sample is largest at a corner.
-//! 2. The farthest corner bounds the tile, since further samples only lower f.
-//! 3. The sample nearest to that corner either proves the bound, or gets a share and lowers it.
-//! 4. Tiles whose bound can't exceed the best point found are dropped, so only the worst areas are divided
+//! 2. The farthest corner gives an upper bound of f in the tile, since additional samples only lower f.
+//! 3. The sample nearest to that corner either proves the bound, or gets a share and lowers the bound.
+//! 4. Tiles whose bound cannot exceed f at the best point found are dropped, so only the worst areas are divided
 //!    finely.
 //!
-//! Clipping is exact except for rounding. Without a triangulation, lattices, lines and duplicate samples need
-//! no special handling.
+//! Clipping is exact except for rounding. The search uses no triangulation, so lattices, lines and duplicate samples
+//! need no special handling.
 
 mod certain;
 mod division;

@@ -36,7 +36,7 @@ pub(super) struct Window {
     per_m: [f64; 3],
     rows: usize,
     columns: usize,
-    /// Start index of each cell's samples, row by row, with an additional entry at the end.
+    /// Start index of each cell's samples, row by row, with two additional entries at the end.
     begins: Vec<u32>,
     /// Samples by cell, with the chainage from the window's origin.
     spots: Vec<WallPoint>,
@@ -65,8 +65,9 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Loads into the window the stored samples between two chainages relative to `origin_m`. Cells are about
-    /// `cell_m` long.
+    /// Loads the stored samples between two chainages into the window. Cells are about `cell_m` long.
+    ///
+    /// The chainages `from_m` and `to_m` are relative to `origin_m`.
     ///
     /// Samples of visits before `first_visit` are ignored.
     ///
@@ -131,8 +132,8 @@ impl Window {
 
     /// Sorts the samples by cell, with a counting sort.
     ///
-    /// Counts are stored at cell + 2. Their running sum at cell + 1 is the start index of the cell. It advances to
-    /// the start of the next cell while the samples are placed.
+    /// Counts are stored at cell + 2. Their running sum at cell + 1 is the start index of the cell. This index advances
+    /// to the start of the next cell while the samples are placed.
     pub(super) fn sort(&mut self) {
         let mut sum = 0;
         for begin in &mut self.begins {
@@ -295,7 +296,7 @@ struct Search {
 }
 
 impl Search {
-    /// Keeps a sample if it is nearer than the nearest one found so far, and returns whether it is.
+    /// Keeps a sample if it is nearer than all samples found so far. Returns true if it was kept.
     fn takes(&mut self, spot: &WallPoint, turns: f64, distance2: f64) -> bool {
         let is_nearer = distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none());
         if is_nearer {

@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs of failed sections under test, together with the section states that they must match.
+/// Missed stretches under test, and the states of the sections, which the stretches must match.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -49,7 +49,7 @@ impl Rig {
         runs.set(section, failing, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
-    /// Checks every run that isn't cleared against the states of its sections.
+    /// Checks every missed stretch that isn't cleared against the states of its sections.
     fn check(&self) {
         let failing = |index: i64| self.failing[usize::try_from(index + 5).unwrap()];
         let causes = |index: i64| failing(index).map(|failing| failing.causes);
@@ -103,17 +103,17 @@ impl Rig {
 }
 
 #[test]
-fn runs_of_failed_sections_grow_merge_and_are_cleared() {
+fn missed_stretches_grow_merge_and_are_cleared() {
     let mut rig = Rig::new();
     rig.say(10, Some(Cause::TooFast), 1.0);
     rig.say(11, Some(Cause::TooFast), 1.5);
     rig.say(16, Some(Cause::TooFast), 1.2);
-    // Section 14 is within half a metre of both runs.
+    // Section 14 is within half a metre of both missed stretches.
     rig.say(14, Some(Cause::Phase), 1.1);
     let first = *rig.runs.get(RunId(0)).unwrap();
     assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
-    // Sections 7 and 19 are the farthest that would still join the run. Sections 6 and 20 would not join it.
+    // Sections 7 and 19 are just near enough to join the missed stretch. Sections 6 and 20 are too far away.
     assert_eq!([6, 7, 19, 20].map(|section| rig.runs.is_beyond(&first, section)), [true, false, false, true]);
     for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);
@@ -123,7 +123,7 @@ fn runs_of_failed_sections_grow_merge_and_are_cleared() {
 }
 
 #[test]
-fn most_frequent_cause_of_a_run_is_its_main_cause() {
+fn most_frequent_cause_of_a_missed_stretch_is_its_main_cause() {
     let mut rig = Rig::new();
     let run = |rig: &Rig| *rig.runs.get(RunId(0)).unwrap();
     rig.say(0, Some(Cause::Occluded), 1.0);
@@ -146,7 +146,7 @@ fn most_frequent_cause_of_a_run_is_its_main_cause() {
 }
 
 #[test]
-fn run_splits_when_its_middle_sections_pass_and_the_first_part_keeps_the_number() {
+fn missed_stretch_splits_when_its_middle_sections_pass_and_the_first_part_keeps_the_number() {
     let mut rig = Rig::new();
     for section in 0..9 {
         rig.say(section, Some(Cause::MissingReturns), 0.6 + 0.1 * section as f64);
@@ -161,9 +161,9 @@ fn run_splits_when_its_middle_sections_pass_and_the_first_part_keeps_the_number(
 }
 
 proptest! {
-    /// Runs of failed sections match the section states after any sequence of updates.
+    /// Missed stretches match the states of the sections after any sequence of updates.
     #[test]
-    fn runs_match_the_section_states(
+    fn missed_stretches_match_the_section_states(
         said in proptest::collection::vec((-5..COUNT - 5, 0_u8..4, 0.1_f64..3.0), 1..300),
     ) {
         let mut rig = Rig::new();
@@ -173,7 +173,7 @@ proptest! {
             let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(lost)];
             rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
-        // Many changes may exhaust the run numbers, which leaves some sections without a run.
+        // Many changes may use up the numbers of missed stretches. Some sections then belong to no stretch.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
             rig.check();
         }

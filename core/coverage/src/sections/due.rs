@@ -11,7 +11,7 @@ use headrace_geometry::math;
 
 /// Distance travelled between two checks of sections left behind, m.
 ///
-/// This distance bounds the delay of a flag.
+/// A flag is late by at most this distance.
 const LOOK_M: f64 = 0.125;
 
 impl Sections {
@@ -22,10 +22,10 @@ impl Sections {
         !moved.is_nothing() || moved.to_come.is_some_and(is_due)
     }
 
-    /// Sets the chainages at which the heads' movement causes the next check.
+    /// Sets the chainages of the heads at which sections are checked next.
     ///
-    /// A check is due each time the heads have left a further part of a section. This part lies behind the
-    /// vehicle, or ahead of a vehicle that goes back.
+    /// Each section is divided into parts of at most [`LOOK_M`]. A check is due when the heads have left another part:
+    /// behind the vehicle, or ahead of it while it goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -40,8 +40,8 @@ impl Sections {
 
     /// Calls `ask` for every section of the coverage extent that is due after the heads have moved.
     ///
-    /// A section is due if it left the zone or was never in it, if its hole can get no more samples, or if a
-    /// part of it may already be certain to fail.
+    /// A section is due if it left the zone or was never in the zone, if its hole can get no more samples, or if a
+    /// part of the section may already be certain to fail.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -62,7 +62,7 @@ impl Sections {
             }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        // The heads may have moved past only a part of the sections at the zone's ends.
+        // Of each section at the zone's ends, the heads may have passed only a part.
         let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {
@@ -73,8 +73,8 @@ impl Sections {
                 let may_fail = !section.is_flagged() && section.verdict == Verdict::Open;
                 let is_out = index < moved.left_behind.end || index >= moved.left_ahead.start;
                 let Some(hole) = section.hole else {
-                    // Sections of the coverage extent without samples lie beside the heads, or where the vehicle set
-                    // out.
+                    // Sections of the coverage extent that were never judged lie beside the heads, or where the vehicle
+                    // set out.
                     let (from_m, to_m) = bounds_m;
                     let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
                     if !is_out {
@@ -144,7 +144,8 @@ impl Sections {
         most_clear_m > least_m && finder.has_circle(store, bounds_m, [to_come, not_passed], &needed)
     }
 
-    /// Calls `ask` for every section of the coverage extent that isn't settled, at the end of a dive.
+    /// At the end of a dive, calls `ask` for every section of the coverage extent, except settled passes without new
+    /// samples.
     pub fn unsettled(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
         let ask_for = Request::at(outlook);
         for index in self.sections_of(outlook.way) {
@@ -152,8 +153,7 @@ impl Sections {
                 debug_assert!(false, "section {index} of the coverage extent exists");
                 continue;
             };
-            // Samples too far away to change a pass may nevertheless have reduced the hole of a failed
-            // section.
+            // Samples that are too far away to change a pass may have reduced the hole of a failed section.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 ask(Request { ended: Some(Ended(outlook.through)), ..ask_for(index) });
@@ -175,17 +175,17 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sampling::Target;
 
-    /// Sections that the heads have passed only in part are checked every few centimetres of travel, behind
-    /// and ahead.
+    /// Sections that the heads have passed only in part are checked at least every 12.5 cm of travel, both behind and
+    /// ahead of the vehicle.
     #[test]
-    fn next_check_is_due_after_a_few_centimetres_of_travel() {
+    fn next_check_is_due_within_12_5_cm_of_travel() {
         let mut sections = Sections::new(0.25, Target::new(0.5), -1.0, 10.0);
         for k in 0..100 {
             let x_m = 4.0 + 0.013 * f64::from(k);
             sections.look_again(Some(Reach { from_m: x_m, to_m: x_m }));
             let [behind_m, ahead_m] = sections.next_look_m;
             for on_m in [behind_m - x_m, x_m - ahead_m] {
-                assert!(on_m > 0.0 && on_m <= LOOK_M + 1e-9, "{on_m} on from {x_m}");
+                assert!(on_m > 0.0 && on_m <= LOOK_M + 1e-9, "{on_m} m on from {x_m} m");
             }
         }
         sections.look_again(Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY }));
@@ -196,7 +196,7 @@ mod tests {
     ///
     /// Every other section is judged at each check, because it may have become certain to fail.
     #[test]
-    fn stationary_vehicle_judges_sections_with_new_samples() {
+    fn failed_section_at_a_stationary_vehicle_is_judged_again_only_after_new_samples() {
         let mut sections = Sections::new(0.25, Target::new(0.5), -1.0, 10.0);
         for (index, flagged, stale) in
             [(8, false, true), (9, false, false), (10, true, true), (11, true, false)]
@@ -220,13 +220,13 @@ mod tests {
             all
         };
         let way = Some(Reach { from_m: 0.1, to_m: 2.9 });
-        assert_eq!(asked(None, way), [], "it moves");
+        assert_eq!(asked(None, way), [], "the vehicle moves");
         assert_eq!(asked(Some(8..12), None), [], "the vehicle has no coverage extent");
         assert_eq!(asked(Some(8..12), way), [(8, true), (9, true), (10, false)]);
-        assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "no samples since");
+        assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "no samples came since");
     }
 
-    /// Returns the requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on.
+    /// Returns the requests after the heads have left the stretch from 2.5 to 3 m. Samples may land from 3.25 m on.
     ///
     /// Each request has the section's index, and whether it asks only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn section_left_without_a_verdict_is_judged() {
+    fn section_without_a_verdict_is_judged_when_the_heads_have_left_it() {
         let found = due(|_| {});
         // All sections behind the zone get a full judgement. At the zone's ends, sections may fail because of
         // the part that the heads have left. Sections ahead are not judged.
@@ -279,15 +279,15 @@ mod tests {
         assert_eq!(alone(10, |section| section.stale = true)[0], (10, false));
         assert_eq!(alone(10, |section| section.not_inspected = true)[0], (10, false));
         assert_eq!(alone(10, |section| section.hole = None), [(10, false)]);
-        assert_eq!(alone(9, |section| section.stale = true), [], "the section was left before");
+        assert_eq!(alone(9, |section| section.stale = true), [], "the heads left the section earlier");
     }
 
-    /// A hole may fail early because of its part out of reach.
+    /// A section may fail early because of the part of its hole that is out of the heads' reach.
     ///
-    /// The diameter of this part is twice the distance of the hole's centre from the heads' reach. A hole
-    /// that lies completely out of reach gets its final verdict.
+    /// The diameter of this part is twice the distance of the hole's centre from the reach. If the whole hole is out
+    /// of reach, the section gets its final verdict.
     #[test]
-    fn hole_is_judged_once_a_large_enough_part_is_beyond_the_heads_reach() {
+    fn hole_is_judged_when_a_large_enough_part_is_out_of_reach_of_the_heads() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
             alone(9, |section| {
                 (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);
@@ -300,16 +300,17 @@ mod tests {
         assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of the hole is out of reach");
         assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m is out of reach for certain");
         assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of the hole is out of reach");
-        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "no section is open");
+        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "the section is not open");
         assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "the section is already flagged");
     }
 
     const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
 
-    /// Whether a section with one empty circle of radius `circle_m` is certain to fail, in a pipe of 3 m radius.
+    /// Whether a section is certain to fail because of an empty circle of radius `circle_m`, in a pipe of 3 m radius.
     ///
-    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw, rad. New
-    /// samples may land from chainage `to_come_m` on. Some heads have not passed the wall up to 9 m.
+    /// The circle lies beside the vehicle (`is_beside`) or above it. `along_m` and `yaw_rad` are the standard
+    /// deviations of chainage and yaw from pass to pass. From the chainage `to_come_m` on, samples may still land.
+    /// Before 9 m, some heads have not passed the wall.
     fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -356,14 +357,14 @@ mod tests {
         let everywhere = Request { not_passed: None, ..request };
         assert!(
             !sections.fails_already(&everywhere, &mut judging),
-            "only wall that some heads missed counts"
+            "without a stretch that some heads have not passed, the section does not fail early"
         );
         sections.fails_already(&request, &mut judging)
     }
 
     /// The diameter of a circle must exceed the target of 0.5 m by three standard deviations.
     ///
-    /// The error of a hole is 1.2 times that of a pass.
+    /// The error of a hole is 1.2 times the error of a pass.
     #[test]
     fn size_limit_of_an_empty_circle_includes_the_position_error_at_its_place() {
         for is_beside in [true, false] {
@@ -380,7 +381,7 @@ mod tests {
             [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
         {
             // A yaw error doesn't move the wall above the vehicle, so a circle of 0.265 m radius suffices there. Beside
-            // the vehicle, it would have to be far larger.
+            // the vehicle, the circle would have to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
         assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in the circle");

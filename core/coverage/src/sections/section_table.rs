@@ -1,4 +1,4 @@
-//! The sections, how they are judged, and the runs of those that are flagged.
+//! The sections, how they are judged, and the missed stretches that flagged sections form.
 
 use core::ops::Range;
 
@@ -40,7 +40,7 @@ pub struct Request {
     pub ended: Option<Ended>,
     /// Whether to judge only a certain fail: a large empty circle in which no more samples can land.
     ///
-    /// The circle need not be the largest one.
+    /// The circle need not be the section's largest hole.
     pub only_fails: bool,
 }
 
@@ -87,21 +87,21 @@ struct Measured {
     filled_by_doubtful: bool,
 }
 
-/// Inputs of judging, and the callback for changed runs.
+/// Inputs of judging, and the callback for changed missed stretches.
 pub struct Judging<'a> {
     /// Store with all samples.
     pub store: &'a SampleStore,
-    /// Latest missing samples, for the causes of fails.
+    /// The most recent missing samples, for the causes of fails.
     pub lacks: &'a MissingSamples,
     /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
     /// Design profile of the tunnel.
     pub profile: &'a Profile,
-    /// Function that is called for every run that changes.
+    /// Function that is called for every missed stretch that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
-/// All sections of the stretch of tunnel that the store covers, and the runs of flagged sections.
+/// All sections of the part of the tunnel that the store covers, and the missed stretches.
 #[derive(Debug, Clone)]
 pub struct Sections {
     pub(super) section_m: f64,
@@ -115,9 +115,9 @@ pub struct Sections {
     judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
-    /// Ends of the heads' reach at which sections are checked next, as chainages, m.
+    /// Chainages that the ends of the heads' reach must get to before sections are checked again, m.
     ///
-    /// The first applies to sections behind the heads, the second to sections ahead.
+    /// The first chainage is for sections behind the heads, the second for sections ahead.
     pub(super) next_look_m: [f64; 2],
 }
 
@@ -144,7 +144,7 @@ impl Sections {
         }
     }
 
-    /// Sets how far the heads reach before or behind the vehicle's origin.
+    /// Sets how far the heads reach in front of or behind the vehicle's origin, m.
     #[must_use]
     pub fn with_heads_reach_m(self, reach_m: f64) -> Self {
         Self { run_up_m: reach_m + self.target.max_hole_m, ..self }
@@ -157,7 +157,7 @@ impl Sections {
         back_to_m(start_m, self.run_up_m)
     }
 
-    /// Returns the runs of flagged sections.
+    /// Returns the missed stretches.
     pub fn runs(&self) -> &Runs {
         &self.runs
     }
@@ -199,7 +199,7 @@ impl Sections {
         self.target
     }
 
-    /// Distance from the heads' reach at which a section is left, m.
+    /// Distance from the heads' reach at which the heads count as having left a section, m.
     ///
     /// Samples farther away don't change a pass.
     pub fn left_m(&self) -> f64 {
@@ -226,7 +226,7 @@ impl Sections {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Records a sample at `x_m`: every section within the target T of it is due for judging again.
+    /// Records a sample at `x_m`: every section within the target T of the sample is due for judging again.
     pub fn touch(&mut self, x_m: f64, visit: &Visit, profile: &Profile) {
         let (from, to) =
             (self.index_of(x_m - self.target.max_hole_m), self.index_of(x_m + self.target.max_hole_m));
@@ -238,7 +238,7 @@ impl Sections {
         }
     }
 
-    /// Measures a section's hole and updates its verdict, flag and run.
+    /// Measures a section's hole and updates its verdict, flag and missed stretch.
     ///
     /// Allocates: never.
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
@@ -262,7 +262,7 @@ impl Sections {
         let is_like = section.hole.is_some_and(|before| before.is_like(&measured.hole));
         let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
         self.decide(request, &measured, fails, judging)?;
-        // The evidence of an unchanged hole is kept, because its missing samples may no longer be stored.
+        // The evidence of an unchanged hole is kept, because the hole's missing samples may no longer be stored.
         if self.get(request.section)?.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&measured.hole, request, judging);
             let evidence = self.as_beside(request.section, evidence);
@@ -276,7 +276,7 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Updates a section's hole and verdict. `fails` says whether the section fails whatever its largest hole.
+    /// Updates a section's hole and verdict. `fails` means that the section fails, however large its largest hole is.
     fn decide(
         &mut self,
         request: &Request,
@@ -331,8 +331,8 @@ impl Sections {
 
     /// Returns the evidence of a section.
     ///
-    /// If its cause is unknown, the causes of a flagged neighbour replace it. The edge of a stretch thus has
-    /// the causes of the stretch.
+    /// If the section's cause is unknown, the causes of a flagged neighbour replace it. The edge of a missed stretch
+    /// thus has the causes of the stretch.
     fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {
         if evidence.cause != Cause::Unknown {
             return evidence;
@@ -352,7 +352,7 @@ impl Sections {
 
     /// Measures the hole that decides a section's verdict.
     ///
-    /// The hole is that of all visits, unless the newest visit alone shows that the section passes.
+    /// The samples of all visits count, unless the newest visit alone shows that the section passes.
     fn measure(&self, index: i64, judging: &mut Judging<'_>) -> Option<Measured> {
         let Judging { store, finder, profile, .. } = judging;
         let ((from_m, to_m), pass_error) = (self.bounds_m(index), self.pass_error(index));
@@ -394,7 +394,7 @@ impl Sections {
         }
     }
 
-    /// Returns the metres of the coverage extent by verdict; their sum is the total length of the sections.
+    /// Returns the metres of the coverage extent by verdict. Their sum is the total length of the extent's sections.
     pub fn metres(&self, way: Option<Reach>) -> Metres {
         let mut metres = Metres::default();
         let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
@@ -416,7 +416,7 @@ impl Sections {
 
     /// Returns the error of a section's passes.
     ///
-    /// If no head pinged in the section, the result is the largest error within half the target.
+    /// If no head pinged in the section, the result is the largest error of the sections within half the target of it.
     pub(super) fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
@@ -430,7 +430,7 @@ impl Sections {
         })
     }
 
-    /// Adds a flagged section to its run, or removes a section whose flag was cleared.
+    /// Adds a flagged section to its missed stretch, or removes a section whose flag was cleared.
     fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
         let Self { sections, runs, first, target, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
@@ -448,8 +448,8 @@ impl Sections {
         runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// Determines the causes of a hole from the heads' passages through all sections within the target T of
-    /// it.
+    /// Determines the causes of a section's hole from the heads' passages through all sections within the target T of
+    /// the section.
     ///
     /// If the heads have left only a part of the section, the largest hole in this part counts.
     fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
@@ -490,10 +490,10 @@ impl Sections {
         explain(&case, passages, judging.store, judging.finder)
     }
 
-    /// Returns the evidence for one cause of a run.
+    /// Returns the evidence for one cause of a missed stretch.
     ///
-    /// The evidence is that of the section with the largest hole if this section has the cause. Otherwise it is that
-    /// of the last section with the cause.
+    /// If the section with the largest hole has the cause, the evidence is from this section. Otherwise it is from the
+    /// section with the cause that is farthest along the tunnel.
     pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
         let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
         evidence(run.worst.0).or_else(|| (run.from..run.to).rev().find_map(evidence))
@@ -508,7 +508,7 @@ impl Sections {
 }
 
 impl Sections {
-    /// Returns the unsure stretch of a single section; `None` if the section isn't unsure.
+    /// Returns an unsure section as a stretch; `None` if the section isn't unsure.
     pub fn unsure(&self, index: i64) -> Option<Stretch> {
         let section = self.get(index)?;
         let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
@@ -517,9 +517,9 @@ impl Sections {
         Some(Stretch::one(section.unsure()?, index, [hole_m, error_m, section.hole_sd_m], driven))
     }
 
-    /// Returns the unsure stretches within a stretch such as the coverage extent, in order.
+    /// Returns the unsure stretches within a part of the tunnel such as the coverage extent, in order.
     ///
-    /// Allocates: for the end of a dive.
+    /// Allocates: the list. Called only at the end of a dive.
     pub fn unsure_stretches(&self, way: Option<Reach>) -> Vec<Stretch> {
         let mut all: Vec<Stretch> = Vec::new();
         for stretch in self.sections_of(way).filter_map(|index| self.unsure(index)) {
@@ -551,12 +551,12 @@ fn is_filled_by_doubtful(
     !finder.has_circle_otherwise((from_m, to_m), radius_m, &WallChanges::NOTHING)
 }
 
-/// Verdict on a hole whose centre is `clear_m` from where samples may still land.
+/// Verdict on a hole. Its centre is at the distance `clear_m` from the stretch where samples may still land.
 ///
-/// `sd_m` is the standard deviation of its diameter, and k the confidence.
+/// `sd_m` is the standard deviation of the hole's diameter, and k the confidence.
 /// - `pass` if D + k sd <= T: more samples won't enlarge D.
-/// - `fail` if D - k sd > T for any final D: samples come no nearer than `clear_m`. Wall without samples
-///   around it fails, too.
+/// - `fail` if D - k sd > T for any final D: samples come no nearer to the centre than `clear_m`. A hole without
+///   samples around it fails, too.
 /// - `open` otherwise while D may change, and `cannot_say` afterwards.
 ///
 /// A verdict holds for both bounds of D.

@@ -14,16 +14,17 @@ use headrace_geometry::tunnel::Profile;
 const LEAST_TARGETS: f64 = 2.0;
 /// Largest edge of a suggested opening as a multiple of the equivalent radius: an opening is no wider than the tunnel.
 const MOST_RADII: f64 = 2.0;
-/// Largest share of lost pings, as a multiple of the patch's share of the perimeter. If more are lost, the wall around the
-/// patch loses returns, too, and the gain is the likelier reason.
+/// Largest share of lost pings, as a multiple of the patch's share of the perimeter. If more pings are lost, the wall
+/// around the patch loses returns, too, and a low gain is the likelier reason.
 const MOST_LOST: f64 = 2.0;
 
 impl Sections {
-    /// Returns the opening that explains the lost returns of a run of flagged sections; `None` if they have another cause.
+    /// Returns the opening that explains the lost returns of a missed stretch; `None` if the losses have another cause.
     ///
-    /// It is the patch of wall that the run's empty circles cover. Every ping at the patch was lost, and few others were.
+    /// The opening is the patch of wall that the stretch's empty circles cover. Every ping at the patch was lost, and
+    /// few pings elsewhere.
     ///
-    /// Allocates: for the end of a dive.
+    /// Allocates: the opening's name. Called only at the end of a dive.
     pub fn suggested_opening(&self, run: &Run, profile: &Profile) -> Option<Opening> {
         let perimeter_m = profile.perimeter_m();
         let (_, worst) = run.worst;
@@ -50,7 +51,7 @@ impl Sections {
     }
 }
 
-/// Empty circle of a failed section that lost returns.
+/// Returns the empty circle of a section, if the section failed because of lost returns.
 fn hole_of_lost(section: &Section) -> Option<Hole> {
     let is_lost = section.evidence.is_some_and(|evidence| evidence.causes.has(Cause::MissingReturns));
     section.hole.filter(|hole| hole.bounded && is_lost && section.verdict == Verdict::Fail)

@@ -1,12 +1,12 @@
-//! Stretches of wall that is farther from the design than roughness explains.
+//! Stretches whose wall is farther from the design than roughness explains.
 
 use super::section_table::Sections;
 use crate::deviation::Deviation;
 use crate::frontier::Reach;
 use headrace_geometry::math;
 
-/// Least mean deviation of a stretch as a share of the equivalent radius. A wall that is 5 % wider, with its floor where the
-/// design has it, deviates by 4.5 %.
+/// Least mean deviation of a stretch as a share of the equivalent radius. A wall that is 5 % wider, with its floor at
+/// the design's height, deviates by 4.5 %.
 const LEAST_SHARE: f64 = 0.04;
 
 /// A stretch of wall whose mean deviation from the design is at least 4 % of the equivalent radius.
@@ -36,7 +36,9 @@ impl Candidate {
         self.deviation.mean_m().is_some_and(|mean_m| mean_m > 0.0)
     }
 
-    /// The stretch, if it is as long as the target and still deviates by `least_m` with the sections between.
+    /// Returns the stretch if it is at least as long as the target, and if its mean deviation is at least `least_m`.
+    ///
+    /// The mean deviation includes the sections between the deviating sections.
     fn stretch(&self, sections: &Sections, least_m: f64) -> Option<WallStretch> {
         let length_m = (self.to - self.from) as f64 * sections.section_m();
         let (mean_m, [inmost_m, outmost_m]) = self
@@ -50,12 +52,12 @@ impl Candidate {
 }
 
 impl Sections {
-    /// Returns the stretches of wall off the design within a stretch such as the coverage extent, in order.
+    /// Returns the stretches whose wall is off the design, within a part of the tunnel such as the coverage extent.
     ///
     /// A stretch is at least as long as the target T. Sections at most T apart form one stretch, because a single turn
     /// of a slow head is spread over several sections.
     ///
-    /// Allocates: for the end of a dive.
+    /// Allocates: the list. Called only at the end of a dive.
     pub fn wall_stretches(&self, extent: Option<Reach>, perimeter_m: f64) -> Vec<WallStretch> {
         let least_m = LEAST_SHARE * perimeter_m / math::TAU;
         let apart = math::floor_to_i64(self.target().max_hole_m / self.section_m());
@@ -88,8 +90,8 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sampling::Target;
 
-    /// Stretches of a circle of 3 m radius, of which each section of 0.25 m has the given deviation: start, end and mean
-    /// deviation, m. The limit is 0.12 m.
+    /// Returns start, end and mean deviation of each stretch, m, in a circular tunnel of 3 m radius. Each section of
+    /// 0.25 m has the given deviation. The limit is a mean deviation of 0.12 m.
     fn stretches(target_m: f64, off_m: &[f64]) -> Vec<[f64; 3]> {
         let profile = shapes::circle(3.0).unwrap();
         let mut sections = Sections::new(0.25, Target::new(target_m), 0.0, 10.0);
@@ -128,7 +130,8 @@ mod tests {
         assert_near(&stretches(0.5, &[0.0, 0.4, 0.4]), &[[0.25, 0.75, 0.4]]);
     }
 
-    /// A slow head sees a part of the wall in each section. Its stretch has the mean of all parts, and ends where they do.
+    /// A slow head sees only a part of the wall in each section. The stretch has the mean deviation of all these parts.
+    /// It begins and ends with a section that deviates.
     #[test]
     fn sections_of_one_slow_turn_form_a_stretch_if_their_mean_deviates() {
         let ditch = [0.0, 0.6, 0.0, 0.0, 0.6, 0.0, 0.0, 0.6, 0.0];

@@ -19,7 +19,7 @@ pub(super) struct Node {
     pub x_m: f64,
     /// Arc length of the sample, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without one.
+    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without a step.
     pub step_m: [f64; 2],
     /// Number of the visit that measured the sample.
     pub visit: u32,
@@ -118,7 +118,7 @@ impl OpenBricks {
         self.bricks.iter().position(Option::is_none)
     }
 
-    /// Returns slot and number of the open brick that is farthest from the brick `number`.
+    /// Returns slot and number of the open brick that is farthest from brick number `brick`.
     pub(super) fn farthest_from(&self, brick: u32) -> Option<(usize, u32)> {
         let held = self.bricks.iter().enumerate().filter_map(|(slot, held)| Some((slot, (*held)?)));
         held.filter(|(_, held)| *held != brick).max_by_key(|(_, held)| held.abs_diff(brick))
@@ -132,7 +132,7 @@ impl OpenBricks {
         }
     }
 
-    /// Whether a slot holds the brick `number`.
+    /// Whether a slot holds brick number `brick`.
     pub(super) fn holds(&self, slot: usize, brick: u32) -> bool {
         self.bricks.get(slot) == Some(&Some(brick))
     }

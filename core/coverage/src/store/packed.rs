@@ -1,9 +1,9 @@
-//! Packed samples away from the vehicle, four bytes each.
+//! Packed samples away from the vehicle; most of them take four bytes each.
 //!
 //! The samples of a brick lie in a chain of blocks, head by head in order of arrival. Most samples take one word: the
 //! difference from the previous sample, in quanta of 2^-17 m. Quanta are counted from chainage and arc length zero of
 //! the brick. All samples thus share one lattice, on which a step ends exactly where the next step begins. If an
-//! unpacked sample is packed again, there is no further loss.
+//! unpacked sample is packed again, it does not move again.
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -26,7 +26,7 @@ const PLACE: u16 = 0;
 const STEPPED: u16 = 1;
 /// Tag: the next word is the visit number of the samples that follow.
 const VISIT: u16 = u16::MAX;
-/// Tags from this value on switch heads: `HEAD` plus the head's number.
+/// Tag that switches to another head: `HEAD` plus the head's number.
 const HEAD: u16 = 2;
 
 /// Lattice point in quanta: along the tunnel from the start of the brick, and along the perimeter.
@@ -51,7 +51,7 @@ pub(super) struct Packed {
     pub x_m: f64,
     /// Arc length of the sample, m.
     pub arc_m: f64,
-    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without one.
+    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without a step.
     pub step_m: [f64; 2],
     /// Number of the visit that measured the sample.
     pub visit: u32,
@@ -59,7 +59,7 @@ pub(super) struct Packed {
 
 impl Lattice {
     pub(super) fn new(from_m: f64, perimeter_m: f64) -> Self {
-        // Returns the last quantum whose centre is below the perimeter.
+        // This is the last quantum whose centre is below the perimeter.
         let last_arc = math::floor_to_i64(perimeter_m * QUANTA_PER_M - 0.5 - 1e-6).max(0);
         Self { origin: math::floor_to_i64(from_m * QUANTA_PER_M), perimeter_m, last_arc }
     }
@@ -77,7 +77,7 @@ impl Lattice {
     }
 }
 
-/// Returns the difference word for a sample close to the previous one.
+/// Returns the difference word for a sample close to the previous sample.
 ///
 /// `None` if the sample is too far away.
 fn difference(from: Spot, to: Spot, stepped: bool) -> Option<u32> {
@@ -224,7 +224,7 @@ impl<'a> Writer<'a> {
         let [along_m, around_m] = sample.step_m;
         let stepped = along_m.abs() + around_m.abs() > 0.0;
         let start_m = (sample.x_m - along_m, math::wrap(sample.arc_m - around_m, self.lattice.perimeter_m));
-        // Except for rounding, the step began at the previous sample of the head.
+        // True if the step began at the head's previous sample, except for rounding.
         let follows = |before: &Packed| {
             (before.x_m - start_m.0).abs() < 1e-9 && (before.arc_m - start_m.1).abs() < 1e-9
         };

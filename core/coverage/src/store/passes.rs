@@ -37,7 +37,7 @@ impl Place {
 
 /// State of a pass search on one side of the query point.
 ///
-/// The search has reached this brick, a group of cell rows.
+/// `brick` is the brick (a group of rows of cells) that the search has reached.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,

@@ -82,10 +82,10 @@ pub enum StoreError {
     Full,
 }
 
-/// Bounds on the difference between the samples stored for a stretch and those inserted there.
+/// Limits of the difference between the samples that a stretch stores and the samples that were inserted there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fidelity {
-    /// Maximum distance of a dropped sample from a stored one, m.
+    /// Maximum distance of a dropped sample from the nearest stored sample, m.
     pub thinned_m: f64,
     /// Maximum displacement of a stored sample, m.
     pub moved_m: f64,
@@ -213,7 +213,7 @@ impl SampleStore {
 
     /// Stores a sample, unless its cell is full and holds a nearby sample.
     ///
-    /// Errors: the sample lies outside, or the store is full.
+    /// Errors: the sample lies outside the store's extent, or the store is full.
     /// Allocates: never.
     pub fn insert(&mut self, sample: WallSample) -> Result<Kept, StoreError> {
         let row = self.row(sample.x_m).filter(|_| sample.arc_m.is_finite()).ok_or(StoreError::Outside)?;
@@ -336,7 +336,7 @@ impl SampleStore {
 
     /// Returns the slot of a brick.
     ///
-    /// The function opens the brick if it is packed, or if it is empty and `wanted`.
+    /// The function opens the brick if it is packed, or if it is empty and `wanted` is true.
     pub(super) fn opened(&mut self, number: u32, wanted: bool) -> Option<usize> {
         let brick = *self.bricks.get(number as usize)?;
         if brick.slot > 0 || (brick.count == 0 && !wanted) {

@@ -1,20 +1,20 @@
-//! Thinning of full cells: samples close enough to a stored sample are dropped.
+//! Thinning of full cells: samples within a small distance of a stored sample are dropped.
 //!
-//! A hole is overestimated by at most twice this distance. Thinning gets coarser while a cell fills, up to a
-//! sixteenth of the cell's edge, so a cell holds at most some hundreds of samples.
+//! A hole is overestimated by at most twice this distance. The distance grows while a cell fills, up to a sixteenth of
+//! the cell's edge, so a cell holds at most some hundreds of samples.
 
 use super::open::{CellAt, OpenBricks};
 
 /// Thinning tiers: a number of samples in the cell, and a share of the cell's edge.
 ///
-/// A tier applies from its number of samples on. It drops samples closer than its share to a stored sample.
+/// A tier applies from its number of samples on. A sample is then dropped if a stored sample is nearer than the tier's
+/// share of the edge.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
-/// Samples at the end of a step are thinned only once a cell holds this many samples beyond the tier's
-/// number.
+/// A sample at the end of a step is dropped only if its cell holds this many samples more than the tier requires.
 const PASSES: u32 = 64;
 
-/// Maximum distance of a dropped sample from a stored one after thinning up to a tier, m.
+/// Maximum distance of a dropped sample from the nearest stored sample, after thinning up to a tier, m.
 ///
 /// Zero for tier 0.
 pub(super) fn delta_m(tier: u8, edge_m: f64) -> f64 {

@@ -118,7 +118,7 @@ fn boulders_and_niches_are_wall_once_a_second_pass_has_met_them() {
     }
 }
 
-/// A cloud of bubbles gives five successive returns far from the wall that agree, in one turn only.
+/// In one turn only, a cloud of bubbles gives five successive returns that agree and are far from the wall.
 ///
 /// A pole at the same place is met again in later turns, and is wall from the fourth turn on at the latest.
 #[test]
@@ -214,7 +214,7 @@ fn random_ranges_make_a_head_distrusted() {
 }
 
 #[test]
-fn outvoted_head_is_distrusted_until_it_agrees_with_the_others() {
+fn outvoted_head_is_distrusted_until_it_agrees_with_the_other_heads() {
     for wrong in 0..3 {
         let mut turning = Turning::new(1.0, 3);
         let frozen = |head: usize, _: f64, _: f64, _: [u32; 2]| Some(if head == wrong { 0.55 } else { 1.0 });
@@ -268,10 +268,10 @@ fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_the_centre() {
     }
 }
 
-/// Heads that are frozen at one range in the centre of a pipe seem to find the same wall, 22 % outside the design. A vehicle
-/// beside the centre of such a wall shows it by ranges that vary with the direction.
+/// Heads that are frozen at one range in the centre of a pipe seem to find the same wall, 22 % outside the design. At a
+/// true wall of this size, the vehicle is beside the centre, and the ranges vary with the direction.
 #[test]
-fn frozen_heads_confirm_no_wall_with_any_noise_and_heads_at_a_true_wall_do() {
+fn frozen_heads_never_confirm_wall_but_heads_at_a_true_wall_do() {
     let confirming_share = |beside_m: f64, noise_m: f64| {
         let heard = |head: usize, _: f64, angle: f64, [turn, step]: [u32; 2]| {
             let noise = noise(turn * STEPS + step, u32::try_from(head).unwrap());
@@ -315,11 +315,11 @@ fn stuck_head_is_distrusted_until_its_range_varies() {
             stuck_wall += usize::from(sticks && sorted.this == Taken::Wall);
             named.extend(sorted.distrusted);
             if step == 4 * STEPS {
-                assert_eq!(turning.heads[0].distrusted(), None, "the range moves again");
+                assert_eq!(turning.heads[0].distrusted(), None, "the range varies again");
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
-        // All wall samples since the head got stuck are withdrawn. Samples from before that are kept.
+        // All wall samples since the head got stuck are withdrawn. Earlier samples are kept.
         let begun_m = 0.001 * f64::from(2 * STEPS);
         assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
         assert!(

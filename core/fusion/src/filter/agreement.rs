@@ -8,11 +8,11 @@ use super::measure::ScalarUpdate;
 use super::state::{ATTITUDE, Errors, HEADING, POSITION, RANGES, VELOCITY};
 use headrace_sensor::device::SensorKind;
 
-/// Number of measurements of one kind over which the share within the gate is averaged.
+/// Number of recent measurements of one kind from which the share within the gate is computed.
 const MEMORY: u32 = 40;
 /// Minimum share of measurements within the gate. Below it, the measured quantity counts as lost and is reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// Standard deviations by which the uncertainty of a lost quantity is increased: m, m/s, radians.
+/// Standard deviations that are added, as variances, to those of a lost quantity: m, m/s, radians, a ratio.
 ///
 /// `LOST_M` and `LOST_MPS` apply to position and velocity across the tunnel. `LOST_WAY_M` and `LOST_WAY_MPS` apply to
 /// position and velocity along it. The others apply to the attitude and to the scale of ranges.
@@ -67,7 +67,7 @@ impl Agreement {
     pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
-            // Of an attitude, only the tilt is checked, because a compass may stay disturbed for long.
+            // For attitudes, only the tilt is checked, because a compass may stay disturbed for long.
             SensorKind::Imu if row.h.get(HEADING) == Some(&0.0) => self.tilt.note(agrees),
             _ => {}
         }
@@ -82,7 +82,7 @@ impl Agreement {
             add(variances, POSITION + 1..POSITION + 3, LOST_M);
             add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
             // A tilt error also moves the estimate, through gravity. The cause of the tilt error has probably also
-            // caused a yaw error, and the compass deviation may have absorbed it.
+            // caused a yaw error, and the estimated compass deviation may have absorbed it.
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);

@@ -133,13 +133,13 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // After a silence, the other sensors may also have begun to send only now. So the alignment restarts at
-            // this echo.
+            // After the silence in which the estimate was lost, other sensors may also have begun to send only now. So
+            // the alignment restarts at this echo.
             self.since = Some(at);
         }
     }
 
-    /// Creates an alignment after an estimate was lost; `before` is its last chainage with standard deviation, m.
+    /// Creates an alignment after an estimate was lost; `before` is the lost chainage and its standard deviation, m.
     pub fn after(before: Option<(f64, f64)>) -> Self {
         Self { before, ..Self::default() }
     }
@@ -194,8 +194,8 @@ impl Listening {
 
     /// Builds the initial covariance.
     ///
-    /// Chainage and yaw errors are correlated with the errors of cable and compass. So later readings of cable and
-    /// compass add no information about the same errors. Slack is correlated with its rate.
+    /// Chainage and yaw errors are correlated with the errors of cable and compass. So repeated readings of cable and
+    /// compass do not reduce the uncertainty below these errors. Slack is correlated with its rate.
     fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
         let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
@@ -216,11 +216,11 @@ impl Listening {
             }
         }
         let ones = [
-            // Part of the slack variance that is not correlated with the slack rate.
+            // Standard deviation of the part of the slack that is not correlated with the slack rate.
             (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
             (SLACK_RATE, settings.slack.drive()),
-            // Chainage error that the cable's scale has caused between the counter's zero and the present position.
-            // Later scale errors add to it.
+            // Standard deviation of the chainage error that the cable's scale has caused between the counter's zero and
+            // the present position. Later scale errors add to it.
             (CREEP, settings.scale_sd * self.told.map_or(0.0, |told| told.way_m.abs())),
             (SCALE, SCALE_SD),
             (DEPTH, settings.depth_offset_sd_m),
@@ -286,12 +286,12 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sensor::reading::{Level, TetherLength};
 
-    /// Repeated readings of cable and compass add no information.
+    /// Repeated readings of cable and compass have the same errors, so they do not make the estimate more certain.
     ///
     /// The chainage stays as uncertain as slack and scale make it. The yaw stays as uncertain as the compass
     /// deviation makes it.
     #[test]
-    fn repeated_readings_after_alignment_add_no_information() {
+    fn repeated_readings_do_not_reduce_systematic_errors_of_cable_and_compass() {
         let context = Context {
             profile: shapes::ceran().unwrap(),
             site: Site::default(),

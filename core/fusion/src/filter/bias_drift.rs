@@ -11,11 +11,12 @@ use headrace_geometry::math;
 
 /// Averaging time of the ratio of squared corrections to expected squares, s.
 const MEMORY_S: f64 = 10.0;
-/// Mean ratio above which the process noise is raised. Per second, it is multiplied by the ratio to the power
-/// `RAISES_PER_S`.
+/// The process noise is raised if the mean ratio is above this. Each second, the noise is multiplied by the ratio to
+/// the power `RAISES_PER_S`.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// Mean ratio below which a raised process noise decays, and the time constant of this decay, s.
+/// A raised process noise decays if the mean ratio is below this. The second value is the time constant of the decay,
+/// s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
 /// Initial noise factor: biases of an inertial unit are assumed to drift fast until its readings show otherwise.
@@ -43,7 +44,7 @@ impl Default for BiasDrift {
     }
 }
 
-/// Returns the largest noise factor of a bias, at which the bias drifts as fast as in the worst supported unit.
+/// Returns the largest noise factor of a bias. With it, the bias drifts as fast as in the worst supported unit.
 fn most(wander: GaussMarkov, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)
@@ -52,8 +53,8 @@ fn most(wander: GaussMarkov, worst: f64) -> f64 {
 impl BiasDrift {
     /// Records the correction of the biases by a measurement.
     ///
-    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the variance of the
-    /// innovation, and its normalised square.
+    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the innovation's variance, and the
+    /// normalised squared innovation.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
             // The expected square is (P h / s)^2 s, summed over the axes. P h is a covariance, and s is the

@@ -1,9 +1,9 @@
 //! Decides whether cable counter and estimate agree.
 //!
-//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are kept.
-//! The counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the
-//! chainage equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
-//! estimate disagree".
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement, both stay possible. The
+//! counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the chainage
+//! equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and estimate
+//! disagree".
 
 use serde::{Deserialize, Serialize};
 
@@ -14,29 +14,31 @@ use headrace_sensor::reading::SourceId;
 
 /// Averaging time of the cable counter's innovations, s.
 const RECENT_S: f64 = 1.0;
-/// Mean innovation at which counter and estimate disagree, as a multiple of the mean's sd for white innovations.
+/// Mean innovation at which counter and estimate disagree, in units of the sd that it would have if innovations were
+/// white.
 ///
 /// For limits from 3 to 6, about the same number of seeded dives has an unreported error. With 4, a slack of seven
 /// times the declared size makes a sound counter disagree.
 const DISPUTED_SDS: f64 = 5.0;
-/// Limit at which each innovation is clipped, in standard deviations.
+/// Each innovation is clipped at this many standard deviations.
 const MOST_SDS: f64 = 6.0;
-/// Smallest innovation at which counter and estimate disagree, m.
+/// A mean innovation over its limit starts a disagreement only if the latest innovation is larger than this, m.
 const LEAST_M: f64 = 0.01;
-/// Time after which an unchanged count means a stuck counter, if slack has moved the counter constantly before.
+/// If slack has moved the counter constantly before, a count that is unchanged for this time means a stuck counter.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
 /// Counts that differ by less than this are equal, m.
 const SAME_COUNT_M: f64 = 1e-6;
 /// Time after which a disagreement is reported, and time for which readings must agree with the estimate to end it.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum sd of the innovation at which an agreeing reading proves that the counter has lost no length, m.
+/// An agreeing reading proves that the counter has lost no length only if the innovation's sd is at most this, m.
 const SURE_M: f64 = 0.3;
-/// Maximum difference at which the counter has caught up with the vehicle, m: a share of the vehicle's distance since
-/// the disagreement began, plus a length.
+/// The counter has caught up with the vehicle if both differ by at most this, m: a share of the vehicle's distance
+/// since the disagreement began, plus a length.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// Maximum difference at which the counter follows the vehicle's motion, m: a share of the distance, plus a length.
+/// The counter follows the vehicle if their distances differ by at most this, m: a share of the distance, plus a
+/// length.
 ///
 /// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
@@ -45,9 +47,10 @@ const SAME_M: f64 = 0.01;
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// Difference between counter and estimate at which the estimate is given up, m; includes the innovation's sd.
+/// The estimate is given up if counter and estimate differ by more than this, m. The difference is the root sum square
+/// of the innovation and its sd.
 ///
-/// The counter must also have counted `ALIVE_M` since the difference was reached, which shows that its wheel turns.
+/// The counter must also have counted `ALIVE_M` since the limit was exceeded, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
@@ -277,9 +280,8 @@ mod tests {
         CableReading { at, shown_m, off_m, sd_m, agrees, is_usual: true, is_lively: false }
     }
 
-    /// Returns the time at which counter and estimate begin to disagree, s. The vehicle moves at 0.1 m/s; from 10 s
-    /// on, the counter shows
-    /// `share` of the motion.
+    /// Returns the time at which counter and estimate begin to disagree, s. The vehicle moves at 0.1 m/s. From 10 s on,
+    /// the counter shows `share` of the motion.
     fn disputed_at(share: f64, change: impl Fn(f64, &mut CableReading)) -> Option<f64> {
         let mut cable = Cable::default();
         (0..200).map(|k| f64::from(k) / 10.0).find(|t| {
@@ -299,9 +301,9 @@ mod tests {
         assert_eq!(disputed_at(1.0, |_, _| {}), None);
     }
 
-    /// The running mean of white innovations has a standard deviation of 0.22. A constant innovation of 1.5 standard
-    /// deviations brings the mean to five times this value after 1.4 s. A constant innovation of 1 standard deviation
-    /// never does.
+    /// The running mean of white innovations has a standard deviation of 0.22, in units of an innovation's sd. A
+    /// constant innovation of 1.5 sd brings the mean to five times this value after 1.4 s. A constant innovation of 1
+    /// sd never does.
     #[test]
     fn persistently_biased_innovations_start_a_cable_disagreement() {
         let off = |sds: f64, sd_m: f64| {
@@ -350,13 +352,13 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // Ten equal corrections a second are summed, and the sum decays over a second. The sum tends to 1 / (e^0.1 -
-        // 1) corrections.
+        // The sum gets ten equal corrections a second and decays with a time constant of a second. It tends to
+        // 1 / (e^0.1 - 1) corrections.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
     #[test]
-    fn cable_disagreement_is_reported_after_1_s_with_the_last_innovation() {
+    fn cable_disagreement_is_reported_after_1_s_with_the_largest_difference() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -388,9 +390,9 @@ mod tests {
         times.map(|t| (t, dispute.take(&reading(t)))).find(|(_, used)| *used != Use::Withhold)
     }
 
-    /// A counter follows the vehicle if the difference is within a tenth of the distance plus a centimetre.
+    /// A counter follows the vehicle if their distances differ by at most a tenth plus a centimetre.
     ///
-    /// While the estimated distance is uncertain, the tolerance is four tenths of the distance plus a centimetre.
+    /// While the estimated distance is uncertain, the tolerance is four tenths plus a centimetre.
     #[test]
     fn counter_counts_as_slipped_once_its_speed_matches_the_vehicle_again() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [

@@ -21,7 +21,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Number of clones kept. Together they cover over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// Ratio of the new to the old variance of the chainage below which the chainage counts as suddenly more certain.
+/// The chainage counts as suddenly more certain if its variance falls below this share of the old variance.
 ///
 /// This happens, for instance, when the cable counter sends again after a silence.
 const SURE_SHARE: f64 = 0.1;
@@ -95,7 +95,7 @@ impl ErrorClones {
         }
     }
 
-    /// Adds a clone if the newest one is old enough, or if the chainage has suddenly become more certain since.
+    /// Adds a clone if the newest one is old enough, or if the chainage has suddenly become more certain since then.
     pub fn note(&mut self, at: MonoNs, factors: &Factors<ERRORS>) {
         let is_enough = |newest: &Moment| {
             at.since(newest.at).0 < STEP.0 && !newest.is_unsure_beside(factors.variance(POSITION))
@@ -151,8 +151,8 @@ impl ErrorClones {
 
     /// Computes the covariance of each older clone relative to the newest one.
     ///
-    /// It goes back through the clones and updates the matrix that maps a clone's errors to those of the newest
-    /// clone.
+    /// The method goes back through the clones. At each clone, it updates the matrix that maps the clone's errors to
+    /// those of the newest clone.
     fn compare(&mut self) {
         let Some(now) = self.newest().copied() else {
             debug_assert!(false, "there is a clone to compare with: {} so far", self.count);

@@ -1,8 +1,8 @@
 //! Recent corrections of the estimate by the cable counter, and the error they cause if the counter's wheel has
 //! stuck.
 //!
-//! A count that does not change means either that the vehicle is stationary or that the wheel has stuck. A filter
-//! that trusts the count stops the vehicle in both cases. So the filter also keeps the alternative hypothesis: the
+//! A count that does not change means either that the vehicle is stationary or that the wheel has stuck. A filter that
+//! trusts the count estimates a speed of zero in both cases. So the filter also keeps the alternative hypothesis: the
 //! estimate without these corrections. Derivation: `docs/why/navigation.md`, "When cable and estimate disagree".
 
 use serde::{Deserialize, Serialize};
@@ -23,10 +23,11 @@ const STANDS_S: f64 = 2.0;
 const STUCK_SHARE: f64 = 0.3;
 /// A sum of corrections up to this many of its predicted standard deviations counts as chance.
 ///
-/// With a limit of 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %.
-/// With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, instead of 6.
+/// With a limit of 0, stops make positions uncertain: 24 % of all epochs of the seeded dives are `cannot_say`, instead
+/// of 19 %. With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, instead of 6.
 const CHANCE_SDS: f64 = 0.5;
-/// Time for which a possibly lost length adds to the relative error between head passes, s: about one head turn.
+/// Time constant with which a possibly lost length fades from the relative error between head passes, s: about one head
+/// turn.
 ///
 /// Only the corrections in the first such period of a stationary count are added up. Later corrections of a
 /// hovering vehicle say nothing about the wheel.
@@ -87,7 +88,7 @@ impl CounterCorrections {
 
     fn stand(&mut self, dt_s: f64) {
         self.stood_s += dt_s;
-        // A wrong correction of the speed causes an error of the distance that grows with time.
+        // A wrong correction of the speed causes an error of the distance, and this error grows with time.
         for [way_m, speed_mps] in [&mut self.sums, &mut self.by_chance] {
             *way_m += *speed_mps * dt_s;
         }

@@ -1,16 +1,16 @@
 //! Resolution step of a tether counter, recognised from its counts.
 //!
-//! A vehicle file may state a smaller step than the counter has, for instance the step of the converter instead of
-//! that of the wheel. If a counter pauses between changes, its smallest change is the step. If all changes are
-//! multiples of one length, this length is the step.
+//! A vehicle file may state a smaller step than the counter has, for instance the converter's step instead of the
+//! wheel's. If a counter pauses between changes, its smallest change is the step. If all changes are multiples of one
+//! length, this length is the step.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of changes per block. The larger step of the last two blocks counts, because a garbled reading spoils only
-/// one block.
+/// Number of changes per block. The step is the larger of those found in the last two blocks, because a garbled reading
+/// spoils only one block.
 const BLOCK: u32 = 50;
 /// Assumed step of a counter that has not moved yet, m; common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;

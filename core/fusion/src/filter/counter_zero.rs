@@ -42,7 +42,8 @@ impl CounterZero {
         self.silence = DurNs(0);
         let Some(heard) = self.heard.replace(received) else { return };
         let was_away = length.restart.is_some_and(|restart| restart.was_away);
-        // If the whole vehicle or the log stops, all sensors are silent for about the same time.
+        // If the whole vehicle or the log stops, all sensors are silent for about the same time. So only a silence that
+        // is over twice as long as that of the others is the counter's own.
         let is_alone = others.0.saturating_mul(2) < received.since(heard).0;
         self.is_lost |= number != before && !(was_away && is_alone && is_sure);
     }
@@ -79,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn restart_before_the_first_reading_keeps_the_zero() {
+    fn counter_restart_before_the_first_reading_keeps_the_zero() {
         let mut zero = CounterZero::default();
         let restart = Some(CountRestart { number: 3, was_away: false });
         for ms in 0..3 {

@@ -1,12 +1,12 @@
 //! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
 //!
-//! The comparison detects differences between the distances that the data sheets do not explain. It uses only
-//! readings and the estimated chainage, and never the filter's covariance, gates or learnt noise. So it still works
-//! when the filter has settled on a wrong speed. The inertial unit is not compared here, because it only measures
-//! changes of speed; `slack_level.rs` compares it with the counter.
+//! The comparison detects differences that the data sheets do not explain. It uses only readings and the estimated
+//! chainage, and never the filter's covariance, gates or learnt noise. So it still works when the filter has settled
+//! on a wrong speed. The inertial unit is not compared here, because it only measures changes of speed;
+//! `slack_level.rs` compares it with the counter.
 //!
-//! Over a window W, a difference counts if it exceeds this limit, with n the variance of the counter and v the noise
-//! of the log:
+//! Over a window W in s, a difference in m counts if it exceeds this limit. Here n is the variance of the counter,
+//! m^2, and v the noise of the log, m/s:
 //!
 //! ```text
 //! 2 max(0.15 m, 3 slack_sd) + 5 sqrt(2 n + (scale distance)^2 + v^2 0.25 s W)
@@ -39,8 +39,8 @@ const NEAR: DurNs = DurNs(20_000_000);
 const SILENT: DurNs = DurNs(3_000_000_000);
 /// Time by which the comparison lags behind the present, because some readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
-/// Maximum difference between two distances, in standard deviations, and the time for which a larger one must last to
-/// count.
+/// Maximum difference between two distances, in standard deviations. A larger difference counts once it has lasted for
+/// `LASTS`.
 const MOST_SDS: f64 = 5.0;
 const LASTS: DurNs = DurNs(1_000_000_000);
 /// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, plus the error of its mounting angle.
@@ -56,7 +56,7 @@ const ESTIMATE: usize = 2;
 /// Recent distances by each source, and the doubt about the cable counter if the distances differ.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceComparison {
-    /// Last chainages by the counter, distances by the velocity log, and chainages by the estimate, m.
+    /// Recent chainages by the counter, distances by the velocity log, and chainages by the estimate, m.
     cable: Vec<(MonoNs, [f64; 1])>,
     log: Vec<(MonoNs, [f64; 1])>,
     estimate: Vec<(MonoNs, [f64; 1])>,
@@ -164,8 +164,8 @@ impl DistanceComparison {
         self.judge(at, settings);
     }
 
-    /// Updates since when the cable differs from each other source, and the doubt with the largest lasting
-    /// difference.
+    /// Updates the times since which the cable has differed from the log and from the estimate, and the doubt. The
+    /// doubt is about the largest difference that has lasted.
     fn judge(&mut self, at: MonoNs, settings: &Settings) {
         let mut doubt: Option<CableDoubt> = None;
         for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
@@ -235,7 +235,7 @@ impl DistanceComparison {
         let of_scale_m = math::hypot(settings.scale_sd, log_scale) * f64::max(cable_m.abs(), other_m.abs());
         let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
         let variance_m2 = counter_m2 + of_scale_m * of_scale_m + log_mps * log_mps * LOG_TIME_S * window_s;
-        // Slack is limited, so its effect on a distance is limited in both directions.
+        // Slack may change from one of its limits to the other, so a distance may be wrong by twice the limit.
         let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
         (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
     }
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_with_errors_within_the_data_sheets_agree() {
+    fn distances_agree_if_their_errors_are_within_the_data_sheets() {
         for period_s in [3.0, 20.0, 60.0] {
             let cable_m = |t: f64| 1.002 * way_m(t) + 0.15 * math::sin(t * math::TAU / period_s);
             let none = compared(300, cable_m, |t| Some(1.01 * speed_mps(t) + 0.002), |t| Some(way_m(t)));

@@ -42,28 +42,28 @@ const REST_SD_MPS: f64 = 0.02;
 const REST_SD_RADPS: f64 = 1e-3;
 /// Gate for zero-velocity updates (chi-square). A vehicle at rest exceeds the gate once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// Standard deviation of a predicted range up to which the wall counts as flat, m.
+/// The wall counts as flat if the standard deviation of a predicted range is below this, m.
 ///
 /// If the standard deviation of the range noise is smaller, it is the limit instead.
 const NEAR_M: f64 = 0.03;
 /// Standard deviation of the prior for the vehicle's speed, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// Standard deviation by which the position uncertainty of an estimate beyond the wall is increased, m.
+/// Standard deviation that is added, as a variance, to the position of an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
 /// Standard deviation below which the gyro bias counts as known, rad/s.
 ///
-/// With this bias, the attitude is wrong by a milliradian after a head pass of 3 s. A longer stop would gain little.
+/// An error of this size turns the attitude by a milliradian in a head pass of 3 s. A longer stop would gain little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
-/// Maximum normalised squared innovation of a range at which the learnt smoothness of the wall applies.
+/// The learnt smoothness of the wall applies to a range if its normalised squared innovation is at most this.
 const SMOOTH: f64 = 4.0;
-/// Maximum step of a counter, as a share of its noise, at which the rounding is negligible.
+/// The rounding of a counter is negligible if the counter's step is at most this share of its noise.
 const FINE_SHARE: f64 = 0.2;
-/// Time after its start within which an estimate settles, as its yaw becomes certain.
+/// Time after the start of an estimate within which the estimate settles: its yaw becomes certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
-/// Standard deviation of yaw below which the estimate counts as settled.
+/// An estimate counts as settled if the standard deviation of its yaw is at most this.
 ///
-/// A yaw error of this size moves a sounding at 6 m by 5 cm. A further restart of the relation between earlier and
+/// A yaw error of this size moves a sounding at 6 m by 5 cm. One more restart of the relation between earlier and
 /// later soundings would cost more than it gains.
 const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
@@ -83,7 +83,7 @@ pub struct Eskf {
     pub clones: ErrorClones,
     /// Time at which the filter last reacquired a lost chainage.
     pub way_sought: Option<MonoNs>,
-    /// Variance of the length that the counter may have lost during motion, m^2.
+    /// Variance of the length that the counter may have lost permanently, m^2.
     slipped_m2: f64,
     /// Number of times that the relative position of later and earlier soundings has become unknown.
     pub ties: u32,
@@ -103,7 +103,7 @@ pub struct Eskf {
     seen_again: RepeatedBumps,
     /// Share of the declared variance that applies to ranges of heads until the gyro bias is known.
     ///
-    /// The share is the largest among the heads.
+    /// It is the largest such share among the heads.
     smoothness: f64,
     /// Whether the vehicle is known to be at rest. Its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
@@ -151,7 +151,7 @@ impl Default for Eskf {
     }
 }
 
-/// Innovation of an update, with the variances that it is weighed by.
+/// Innovation of an update, with the variances that determine its weight.
 struct Weighed {
     innovation: f64,
     /// Variance of the estimate.
@@ -188,7 +188,7 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// Records that earlier samples are unrelated to later ones whenever the standard deviation of yaw has halved.
+    /// Each time the standard deviation of yaw has halved, records that earlier samples are unrelated to later ones.
     ///
     /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
     /// about the errors between later passes.
@@ -287,7 +287,7 @@ impl Eskf {
         }
     }
 
-    /// Adds the speed change of an implausible force to the uncertainty, because the force may have been real.
+    /// Adds the speed change by an implausible force to the uncertainty, because the force may have been real.
     fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
         let way = variance * epoch_s * epoch_s;
@@ -378,7 +378,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Fuses a scalar update whose residual refers to the estimate corrected by the errors in `known`.
+    /// Fuses a scalar update. The residual of `row` refers to the estimate corrected by the errors in `known`.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
@@ -488,7 +488,7 @@ impl Eskf {
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
     }
 
-    /// Returns the noise to use for one of many pings that see the same bump, m^2.
+    /// Returns the noise variance of a ping, m^2, if many pings see the same bump.
     ///
     /// Also records the ping for learning the roughness of the wall.
     fn spread_over_looks(
@@ -608,8 +608,8 @@ impl Eskf {
 
     /// Corrects by a range to the wall, with only a share of the computed correction of attitude and related errors.
     ///
-    /// The covariance is Joseph's for the smaller gain. This covariance equals the optimal covariance plus a dyad of
-    /// the omitted gain.
+    /// The covariance has Joseph's form with the smaller gain. It equals the optimal covariance plus a dyad of the
+    /// omitted gain.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {

@@ -6,11 +6,11 @@ use headrace_geometry::math;
 
 /// Maximum number of range sources whose settings are checked.
 pub(super) const FOLLOWED: usize = 12;
-/// One reading in this many is compared with alternative mounts, because each comparison costs a ray.
+/// One reading in this many is compared with alternative mounts, because each comparison costs a ray cast.
 pub(super) const COMPARED: u32 = 4;
-/// Minimum number of blocks of distance for computing the uncertainty of a parameter.
+/// Minimum number of blocks for computing the uncertainty of a parameter. A block covers a distance of at least 3 m.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// Number of standard deviations from zero above which a fitted parameter counts as certainly non-zero.
+/// A fitted parameter is certainly not zero if it is at least this many standard deviations from zero.
 ///
 /// The limit for an alternative mount is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;
@@ -21,15 +21,15 @@ pub(super) const SURE_GAIN: f64 = 3.0;
 const EXPLAINS: f64 = 0.02;
 /// Unknowns of the vehicle's pose within a pose window of a few seconds: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// Limit at which residuals are clipped in a comparison of mounts, m, because some echoes come from objects other
-/// than the wall.
+/// Residuals are clipped at this limit in a comparison of mounts, m, because some echoes come from objects other than
+/// the wall.
 const MOST_MISSED_M: f64 = 0.5;
-/// Minimum mean square residual of a source whose mount is doubted, m^2. Maximum ratio of the squared residuals with
-/// the alternative mount to those with the configured mount.
+/// A mount is doubted if the mean square residual is at least the first value, m^2, and if the alternative mount leaves
+/// at most the second value, as a share of the squared residuals.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Least-squares sums of one parameter within a pose window, and its products with the vehicle's pose.
+/// Least-squares sums of one parameter within a pose window, and the cross sums of parameter and pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) by_pose: [f64; POSE],
@@ -49,7 +49,8 @@ pub(super) struct Fit {
     values_2: f64,
 }
 
-/// Comparison of a sonar's residuals at its configured mount with those at another mount or turned by half a turn.
+/// Comparison of a sonar's residuals at its configured mount with those at an alternative. The alternative is the mount
+/// of another sonar, or the sonar's own mount turned by half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Alternative {
     pub(super) source: u16,
@@ -123,11 +124,12 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// Returns the estimated parameter and its distance from zero in sd, if it certainly exceeds `least`.
+    /// Returns the estimated parameter and its distance from zero in sd, if its size is at least `least` and it is
+    /// certainly not zero.
     ///
-    /// The standard deviation is computed from the scatter of blocks and from the noise of ranges, and the larger
-    /// result counts, because blocks alone may hardly scatter. `None` if the parameter hardly changes any range:
-    /// changes of millimetres only show errors of the wall and beam models.
+    /// The standard deviation is the larger of two: one from the scatter of blocks, and one from the noise of ranges.
+    /// Blocks alone may hardly scatter. `None` if the parameter hardly changes any range: changes of millimetres only
+    /// show errors of the wall and beam models.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
@@ -209,7 +211,7 @@ mod tests {
     /// The gain of an alternative mount varies between blocks. The mount is only as certain as the mean of these
     /// gains.
     #[test]
-    fn alternative_setting_is_less_certain_if_its_gain_scatters_between_blocks() {
+    fn alternative_mount_is_less_certain_if_its_gain_scatters_between_blocks() {
         let sure_sd = |scatter_m2: f64| {
             let mut alternative = Alternative::default();
             for k in 0..8 {
@@ -230,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn setting_with_negligible_effect_is_not_certain_despite_low_scatter() {
+    fn setting_that_hardly_changes_the_ranges_is_never_certain() {
         assert!(alike(1.0, 0.05).certain(0.03).is_some());
         assert!(alike(0.2, 0.2).certain(0.03).is_some(), "ranges change by 6 mm, noise 3 cm");
         assert_eq!(alike(0.1, 0.2).certain(0.03), None, "ranges change by 3 mm");

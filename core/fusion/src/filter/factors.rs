@@ -335,7 +335,7 @@ impl Noise {
     }
 }
 
-/// Adds noise to column `j` of the factors. Columns with a higher index come first.
+/// Adds noise to column `j` of the factors. The caller goes from the highest column to the lowest.
 ///
 /// Changes `variance` and `a` to the noise that remains for the columns with a lower index.
 ///

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
 use headrace_geometry::math;
 
-/// Minimum share of a tilt's weight that remains after the constant excess of the ranges is eliminated.
+/// Minimum share of a tilt's weight that must remain after the constant excess of the ranges is eliminated.
 ///
 /// If less weight remains, the vehicle has not turned to both sides enough.
 const LEAST_LEFT: f64 = 0.05;
@@ -19,7 +19,7 @@ const LEAST_LEFT: f64 = 0.05;
 /// A smaller lean is mostly error of the heading, so the window shows nothing.
 const LEAST_LEAN_RAD: f64 = 0.012;
 
-/// Minimum size of the smallest reported tilt, in standard deviations caused by range noise.
+/// Minimum ratio of the smallest reported tilt to the sd that declared range noise causes in the tilt.
 const SHOWS: f64 = 3.0;
 /// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
@@ -28,7 +28,7 @@ const MOST_RAD: f64 = 0.3;
 /// residual.
 const SUMS: usize = 5;
 
-/// Tilt sums of one head about one axis within a pose window, and their products with the vehicle's pose.
+/// Tilt sums of one head about one axis within a pose window, and the cross sums with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltSums {
     pattern_by_pose: [f64; POSE],
@@ -77,8 +77,8 @@ impl TiltSums {
 
     /// Returns the tilt sums after the vehicle's pose is eliminated.
     ///
-    /// `residuals` are the sums of residuals times pose. `factor` is the Cholesky factor of the information on the
-    /// pose.
+    /// `residuals` are the sums of each residual times its derivatives with respect to the pose. `factor` is the
+    /// Cholesky factor of the information on the pose.
     pub(super) fn freed(&self, residuals: [f64; POSE], factor: &[[f64; POSE]; POSE]) -> [f64; SUMS] {
         let [pattern, tilt, residuals] =
             [self.pattern_by_pose, self.tilt_by_pose, residuals].map(|sums| solved(factor, sums));
@@ -100,9 +100,9 @@ impl TiltSums {
 impl TiltFit {
     /// Adds the tilt sums of a pose window to the fit.
     ///
-    /// Unlike other settings, a tilt needs no blocks of distance: its effect changes sign as the vehicle swings, and
-    /// that of the wall's shape does not. The vehicle must move on between windows, because bumps that are seen again in
-    /// every swing do not average out.
+    /// Unlike other settings, a tilt needs no blocks of distance. Its effect changes sign as the vehicle swings, and
+    /// the effect of the wall's shape does not. The vehicle must move on between windows, because bumps that are seen
+    /// again in every swing do not average out.
     pub(super) fn add(&mut self, window: [f64; SUMS]) {
         let [pattern_2, _, tilt_2, ..] = window;
         if pattern_2 <= 0.0 || tilt_2 < LEAST_LEAN_RAD * LEAST_LEAN_RAD * pattern_2 {
@@ -134,8 +134,8 @@ impl TiltFit {
 
     /// Returns the standard deviation of the head's tilt, radians; `None` if the vehicle has not turned enough.
     ///
-    /// It comes from the scatter of pose windows, and is at least the one caused by range noise, whose variance is
-    /// `level` times the declared variance.
+    /// The value comes from the scatter of pose windows, but range noise sets a lower limit. The variance of this noise
+    /// is `level` times the declared variance.
     pub(super) fn sd_rad(&self, level: f64) -> Option<f64> {
         let (rad, weight) = self.estimate()?;
         let [pattern_2, both, _, pattern_off, _] = self.sums;
@@ -149,8 +149,8 @@ impl TiltFit {
         Some(sd_rad.max(math::sqrt(level / weight)))
     }
 
-    /// Returns the head's tilt and its distance from zero in standard deviations, if it certainly exceeds
-    /// `least_rad`.
+    /// Returns the head's tilt and its distance from zero in standard deviations, if its size is at least `least_rad`
+    /// and it is certainly not zero.
     ///
     /// `None` if declared noise would hide a tilt of `least_rad`, or if the tilt is too large for the linear model.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {

@@ -242,8 +242,8 @@ impl Leg {
         let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
         for k in 0..3 {
             factors.add_all([
-                // White force noise over the leg causes a displacement that is correlated with velocity, plus an
-                // independent part with a variance factor of dt^2 / 12.
+                // White force noise over the leg causes a displacement in two parts. One is correlated with the
+                // velocity. The other is independent and has a variance factor of dt^2 / 12.
                 Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
                 Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
                 Noise::of_one(ATTITUDE + k, rate),
@@ -280,8 +280,8 @@ impl Leg {
     }
 }
 
-/// Minimum decay factor of an error over a leg, which avoids a division by zero. A smaller factor would leave a
-/// negligible error anyway.
+/// Minimum decay factor of an error over a leg. It avoids a division by zero, and an error with a smaller factor would
+/// be negligible anyway.
 const LEAST_FADING: f64 = 1e-3;
 
 /// Transition of errors between two times: e' = F e.

@@ -10,7 +10,7 @@ use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// Minimum cosine of the incidence at which a head's range may get more weight than declared.
+/// A head's range may get more weight than declared only if the cosine of its incidence is above this.
 ///
 /// If the hull is pitched steeply, the beams look along the tunnel, and only few of them determine the attitude.
 const SQUARE: f64 = 0.8;
@@ -92,7 +92,7 @@ impl ScalarUpdate {
         vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
-    /// Returns the part of the residual that comes from errors found since the errors in `known`.
+    /// Returns the part of the residual that the corrections from `known` to `errors` explain.
     pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
         self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
     }
@@ -110,13 +110,13 @@ impl ScalarUpdate {
     }
 }
 
-/// Minimum cosine of the incidence.
+/// Minimum cosine of the angle between a beam and the wall's normal.
 ///
 /// The range of a beam at a more grazing angle shows the wall's roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
 /// Minimum distance to the wall that is assumed when its curvature is computed, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// Number of standard deviations from zero above which the side of a beam's inclination counts as certain.
+/// The side of a beam's inclination is certain if the inclination is at least this many sds from zero.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.
@@ -158,8 +158,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // The slope is d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The true range may be as short as the nearest ray of the wider cone. The true range is assumed to be uniformly
-    // distributed between both values.
+    // The true range may be as short as the nearest ray of the wider cone. It is assumed to be uniformly distributed
+    // between this value and the expected one.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);

@@ -69,19 +69,19 @@ use headrace_sensor::reading::{MAX_SOURCES, Reading};
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
 /// If the clock goes back by more than this, the clock has been reset.
 ///
-/// Readings stamped further than this in the future are rejected.
+/// Readings whose timestamp is more than this ahead of their receive time are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// Standard deviations of the estimate above which it is restarted, because linearised updates would not converge.
+/// An estimate with larger standard deviations is restarted, because linearised updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
-/// Duration of silence of all sensors after which the estimate is restarted.
+/// The estimate is restarted after all sensors have been silent for this time.
 const SILENCE: DurNs = DurNs(5_000_000_000);
 /// Largest plausible turn rate and specific force of an inertial sample. A unit that exceeds them is saturated or
 /// faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
-/// Maximum number of estimates after the last epoch: an inertial unit at 600 Hz over the longest window plus epoch,
-/// 1.5 s.
+/// Maximum number of estimates after the last epoch. An inertial unit at 600 Hz needs 720 for the longest window plus
+/// the longest epoch, 1.2 s.
 const AHEAD: usize = 1024;
 /// Assumed time between two passes of the heads over the same position if no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
@@ -99,7 +99,7 @@ pub struct FilterNavigation {
     zero: CounterZero,
     running: Eskf,
     is_running: bool,
-    /// Start of the first epoch. Later epochs begin at whole multiples of the epoch length after it.
+    /// Start of the first epoch. Each later epoch begins a whole number of epoch lengths after this time.
     epoch_zero: MonoNs,
     /// Latest receive time of any reading.
     received: MonoNs,
@@ -205,7 +205,7 @@ impl FilterNavigation {
         self.after_epochs();
     }
 
-    /// Returns the doubt about the cable counter that the filter itself has.
+    /// Returns the filter's own doubt about the cable counter.
     fn dispute(&self) -> Option<CableDoubt> {
         self.running().and_then(|running| running.cable.doubt(running.at))
     }
@@ -385,8 +385,8 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // Either the clock was reset, or the previous timestamp was wrong. Waiting until the clock catches up
-            // would not be better.
+            // Either the clock was reset, or the previous timestamp was wrong. In both cases, a restart is better than
+            // to wait until the clock catches up.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();

@@ -9,16 +9,16 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
 
-/// Change of the noise level's logarithm by a measurement whose squared normalised innovation is one too large.
+/// The noise level's natural logarithm changes by this times the excess of a normalised squared difference over 1.
 const GAIN: f64 = 0.01;
-/// Limit at which squared normalised innovations are clipped, because one outlier does not show the noise.
+/// Squared normalised innovations are clipped at this limit, because one outlier does not show the noise.
 const MOST: f64 = 9.0;
-/// Minimum share of a head's declared range variance to which learning may lower it.
+/// Smallest share of a head's declared range variance that may be learnt.
 ///
 /// The declared 3 cm suit a rough wall. On a smooth wall, a range step of 2 cm and noise of 1 cm still cause this
 /// share.
 const LEAST_OF_HEAD: f64 = 0.15;
-/// Limit at which the square of a rejected innovation is clipped, as a share of the declared variance.
+/// The square of a rejected innovation is clipped at this share of the declared variance.
 ///
 /// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, many innovations are
 /// rejected.
@@ -28,7 +28,7 @@ const MEMORY: u32 = 200;
 const FEW: u32 = 30;
 /// Number of used returns in a turn of a head, one every three degrees. Fewer returns do not cover the whole wall.
 const TURN: u32 = 120;
-/// Mean squared normalised innovation above which the innovations are too large to be noise.
+/// Innovations are too large to be noise if their mean normalised square is above this.
 const UNUSUAL: f64 = 1.8;
 
 /// Learnt noise level of a source.
@@ -55,10 +55,10 @@ impl Default for NoiseLevel {
 
 /// Returns the limits of the noise level, as factors of the declared variance; `None` if the level is not learnt.
 ///
-/// The declared tilt noise of an inertial unit covers its slow errors, which differences between successive
-/// innovations do not show. The declared range noise of a head also covers bumps and shape of the wall, which a
-/// leaning beam would confuse with yaw. So differences can only raise a head's level. Only the square of the total
-/// residual can lower it ([`NoiseLevel::smoothness`]).
+/// The declared tilt noise of an inertial unit covers its slow errors, which differences between successive innovations
+/// do not show. The declared range noise of a head also covers bumps and shape of the wall, which could be mistaken for
+/// yaw if beams lean. So differences can only raise a head's level. Only the square of the total residual can lower it
+/// ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
         SensorKind::Head => Some([1.0, 9.0]),
@@ -84,7 +84,7 @@ impl NoiseLevel {
 
     /// Processes the squared normalised innovation of any measurement, whether fused or rejected.
     ///
-    /// Returns the square divided by the earlier mean, if this mean exceeds its expected value of 1.
+    /// Returns the square divided by the earlier mean. A mean below its expected value of 1 counts as 1.
     pub fn relative(&mut self, nis: f64) -> f64 {
         let usual = if self.seen >= FEW { self.nis.max(1.0) } else { 1.0 };
         self.seen = (self.seen + 1).min(MEMORY);

@@ -82,7 +82,8 @@ mod tests {
         let freed = |spell: &PoseWindow, line: &Line| spell.freed(line, &spell.factor().unwrap());
         let alone = freed(&spell(1.0), &line([0.0; POSE]));
         assert!((alone[0] - 3.0).abs() < 1e-12 && (alone[1] - 6.0).abs() < 1e-12, "{alone:?}");
-        // Three readings have an information of 3, and the prior of 0.3 m has 11.1. The share 1 - 3 / 14.1 remains.
+        // The three readings give an information of 3 / m^2 on the pose, and the prior of 0.3 m gives 11.1 / m^2. The
+        // pose explains the share 3 / 14.1 of the sums. The rest remains for the parameter.
         let like_it = freed(&spell(1.0), &line([3.0, 0.0, 0.0, 0.0, 0.0]));
         let left = 1.0 - 3.0 / (3.0 + 1.0 / 0.09);
         assert!(

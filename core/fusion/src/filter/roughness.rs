@@ -10,19 +10,18 @@ use super::settings::Settings;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Maximum number of bumps in the running mean, and the weight of the declared roughness in it, as a number of bumps.
+/// Maximum number of bumps in the running mean, and the number of bumps for which the declared roughness counts.
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
-/// Limit at which the squared sum of two residuals is clipped, in variances of the sum, because one outlier is no
-/// bump.
+/// The squared sum of two residuals is clipped at this many variances of the sum, because one outlier is no bump.
 const MOST: f64 = 9.0;
-/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to bumps of 6 cm.
+/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to bumps with an sd of 6 cm.
 const ROUGHEST: f64 = 4.0;
 /// Minimum speed along the wall that is assumed, m/s. A slower vehicle drifts sideways at about this speed.
 const STILL_MPS: f64 = 0.05;
 /// Number of echosounders whose last pings are kept.
 const ECHOSOUNDERS: usize = 8;
-/// Maximum cosine of the angle between the range gradients of two echosounders that count as facing opposite walls.
+/// Two echosounders face opposite walls if the cosine of the angle between their range gradients is below this.
 const FACING: f64 = -0.95;
 /// Maximum time between two opposite pings whose ranges are added, s.
 const AT_ONCE_S: f64 = 0.25;
@@ -118,7 +117,7 @@ mod tests {
         sd_m * (math::sin((19.0 + 2.0 * side) * along_m) + math::sin((31.7 + 4.0 * side) * along_m))
     }
 
-    /// Returns the roughness found by two opposite echosounders in a drive at 0.1 m/s, m.
+    /// Returns the roughness that two opposite echosounders find while the vehicle moves at 0.1 m/s, m.
     ///
     /// The vehicle sways between the walls.
     fn found_m(rough_m: f64, white_m: f64, scale_m2: f64, end_s: f64) -> f64 {

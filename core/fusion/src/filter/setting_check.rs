@@ -6,7 +6,8 @@
 //! uncertainty of a parameter. For a head's tilt, each pose window is a block. Summary: `docs/why/navigation.md`,
 //! "Settings in doubt".
 //!
-//! A residual is r = x b, with x the error of the setting and b as follows (t, A, p: as in the range's derivatives):
+//! A residual is r = x b, with x the error of the setting and b as follows. The vectors t, A and p belong to the
+//! range: its derivative by rotation, the sonar's lever arm, and its derivative by position.
 //!
 //! - speed of sound, or a wider wall: b is the expected range
 //! - head turned about its axis a: b = (t - A x p) . a
@@ -32,12 +33,12 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Length of a pose window: about the time for which a filter with wrong ranges keeps its position.
+/// Length of a pose window. For about this time, a filter keeps its position although ranges are wrong.
 const SPELL: DurNs = DurNs(5_000_000_000);
 /// Minimum distance between two pose windows that count for the tilt of a head, m. Bumps of the wall are about as long.
 const MOVES_ON_M: f64 = 0.2;
-/// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that is too short by
-/// then is dropped.
+/// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that has not covered the
+/// minimum distance by then is dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
@@ -46,16 +47,16 @@ const FEWEST_READINGS: u32 = 100;
 /// Smallest setting errors that are reported: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
-/// Largest standard deviation of a head's pitch and yaw with which its mount counts as verified, radians.
+/// A mount counts as verified if the standard deviations of the head's pitch and yaw are at most this, radians.
 ///
 /// The smallest angle that is reported then differs from zero by two standard deviations.
 const VERIFIED_RAD: f64 = LEAST_ANGLE_RAD / 2.0;
-/// Residual above which a range loses weight, and residual above which a range is ignored, m.
+/// A range loses weight if its residual exceeds the first value, and is ignored if it exceeds the second value, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
 /// Maximum number of pairs of a sonar and an alternative mount for it.
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
-/// Mean square residual above which an echosounder counts as wrongly configured, m^2.
+/// An echosounder counts as wrongly configured if its mean square residual is above this, m^2.
 ///
 /// Such an echosounder pulls the estimate away and makes correct heads look turned.
 const ASTRAY_M2: f64 = 0.04;
@@ -170,8 +171,8 @@ struct Look {
     sd_m: f64,
 }
 
-/// A range's derivatives by the vehicle's pose and by a rotation about the head, its expected value, its residual, and its
-/// weight in the fits.
+/// A range in the fits: its derivatives with respect to the vehicle's pose and to a rotation of the head, its
+/// expected value, residual and weight.
 struct Seen {
     by_pose: [f64; POSE],
     own_turn: Vec3<Tunnel>,
@@ -250,18 +251,18 @@ impl SettingChecks {
         self.doubt.or_else(|| is_scaled.then_some(SettingDoubt { setting, source: None, sure_sd }))
     }
 
-    /// Whether the ranges have not shown yet that all heads point along their mounts.
+    /// Whether the ranges have not yet verified the pitch and yaw of all heads on their mounts.
     ///
-    /// They show it while the vehicle swings from side to side. A single head needs no check: a tilt moves all of its
-    /// samples alike.
+    /// Ranges verify them while the vehicle swings from side to side. A single head needs no check, because a tilt
+    /// moves all of its samples alike.
     pub fn has_unverified_mounts(&self) -> bool {
         self.compared_heads().flatten().any(|sd_rad| *sd_rad > VERIFIED_RAD)
     }
 
-    /// Returns the covariance between samples of two heads that is due to their mounts.
+    /// Returns the relative covariance that mount errors cause between samples of two heads.
     ///
-    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. A swing does not reduce
-    /// it, because each head is compared with others whose mounts are just as uncertain.
+    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. A swing of the vehicle
+    /// does not reduce the covariance: each head is compared with others whose mounts are just as uncertain.
     pub fn mount_error(&self, declared_rad: f64) -> Relative {
         let is_compared = self.compared_heads().next().is_some();
         let variance = if is_compared { 2.0 * declared_rad * declared_rad } else { 0.0 };
@@ -320,8 +321,8 @@ impl SettingChecks {
         let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
         let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
-        // A known scale error makes no range an outlier: of the residuals with and without it, the smaller one
-        // counts.
+        // A known scale error must not make a range an outlier. Of the residuals with and without this error, the
+        // smaller one counts.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;

@@ -22,13 +22,13 @@ pub struct GaussMarkov {
 impl GaussMarkov {
     /// Creates the process of a bias that has a constant part and a drifting part.
     ///
-    /// The variance is the sum of both parts, and the process gains variance as fast as the drifting part.
+    /// The variance is the sum of both parts' variances. The process gains variance as fast as the drifting part.
     pub fn of_bias(bias: &BiasSpec) -> Self {
         let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance that white noise adds to a process with a single lag per second.
+    /// Variance per second that white noise adds to a process with a single lag.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }
@@ -41,17 +41,16 @@ impl GaussMarkov {
     }
 }
 
-/// Noise settings of the sensors. Every number is positive, `mount_sd_rad` may be zero.
+/// Noise settings of the sensors. Numbers are positive; only `mount_sd_rad` and `wall_share` may also be zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// White noise of the gyros, rad/s/sqrt(Hz).
     pub rate_noise: f64,
     /// White noise of the accelerometers, m/s^2/sqrt(Hz).
     pub force_noise: f64,
-    /// White noise assumed without gyro or accelerometer data: the vehicle's own turning, rad/s/sqrt(Hz), and
-    /// acceleration, m/s^2/sqrt(Hz).
+    /// White noise assumed for the vehicle's own turning without gyro data, rad/s/sqrt(Hz).
     pub blind_rate_noise: f64,
-    /// White noise without accelerometer data; see `blind_rate_noise`.
+    /// White noise assumed for the vehicle's own acceleration without accelerometer data, m/s^2/sqrt(Hz).
     pub blind_force_noise: f64,
     /// Bias of the gyros, rad/s.
     pub rate_bias: GaussMarkov,
@@ -61,17 +60,17 @@ pub struct Settings {
     pub tether_sd_m: f64,
     /// Slack of the cable, m: a smooth process of two lags in series. The default suits slack with periods of 16 s.
     pub slack: GaussMarkov,
-    /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
+    /// Initial standard deviation of the cable's scale error, a ratio.
     pub scale_sd: f64,
-    /// Random walk of the cable's scale error; see `scale_sd`.
+    /// Random walk of the cable's scale error, per root of a second.
     pub scale_noise: f64,
     /// Noise of a depth sensor without the rounding to its quantum, m.
     pub depth_sd_m: f64,
-    /// Initial offset of a depth sensor, m, and its random walk, m per root of a second.
+    /// Initial standard deviation of the depth sensor's offset, m.
     ///
     /// The offset contains errors of water level, density and surface pressure.
     pub depth_offset_sd_m: f64,
-    /// Random walk of the depth sensor's offset; see `depth_offset_sd_m`.
+    /// Random walk of the depth sensor's offset, m per root of a second.
     pub depth_noise: f64,
     /// Noise of a measured attitude about the vertical axis, radians.
     pub heading_sd_rad: f64,
@@ -89,9 +88,9 @@ pub struct Settings {
     pub seen_again_m: f64,
     /// Full width of an echosounder's beam, radians. Any part of the wall within the beam may echo.
     pub echo_beam_rad: f64,
-    /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
+    /// Initial standard deviation of the scale error of all ranges against the design, a ratio.
     pub range_scale_sd: f64,
-    /// Random walk of the scale error of ranges; see `range_scale_sd`.
+    /// Random walk of the scale error of ranges, per root of a second.
     pub range_scale_noise: f64,
     /// Noise of the range of a head's return, m, wall roughness included.
     pub return_sd_m: f64,
@@ -112,10 +111,10 @@ pub struct Settings {
     ///
     /// Readings are fused, and errors propagated, once per epoch. Epochs begin at whole multiples of this length.
     pub epoch: DurNs,
-    /// Whether noise levels of the sources are learnt. Without learning, likelihoods of different settings can be
-    /// compared.
+    /// Whether noise levels of the sources are learnt. Likelihoods of different settings can be compared only without
+    /// learning.
     pub learns: bool,
-    /// Share of the computed correction of attitude and related errors that a wall range applies.
+    /// Share of a wall range's computed correction that is applied to the attitude and related errors.
     ///
     /// With 0, ranges do not correct the attitude; 1 is the optimal estimate. Coverage depends on the attitude of one
     /// pass relative to the next. Gyros measure this relative attitude more accurately than ranges do, because walls
@@ -184,7 +183,7 @@ impl Settings {
         }
     }
 
-    /// Measurement variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
+    /// Declared noise variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
     /// compared with it.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {

@@ -2,10 +2,10 @@
 //!
 //! The difference between counter and inertial motion contains the slack. It also contains the effect of the inertial
 //! unit's constant errors, which is a polynomial of second degree in time. So its third differences show the slack
-//! alone. At several lags, these are compared with the third differences of the slack model. If the measured ones are
-//! larger, the slack is larger or faster than declared. A single third difference far above the usual size means that
-//! the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it uses
-//! only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
+//! alone. At several lags, they are compared with the third differences of the slack model. If they are larger than the
+//! model's, the slack is larger or faster than declared. A single third difference far above the usual size means that
+//! the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it uses only
+//! the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
 //!
 //! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant
 //! T:
@@ -36,9 +36,9 @@ const ROOM: usize = 256;
 const KNOTS: usize = 256;
 /// Averaging time for the mean squares of third differences, s.
 const MEMORY_S: f64 = 40.0;
-/// Limit at which a third difference is clipped, as a multiple of the rms. Faults are rare and large; slack is not.
+/// A third difference is clipped at this multiple of the rms. Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Margin by which the noise is raised before it is subtracted from a mean square, in sds of the mean square.
+/// The noise is raised by this margin before it is subtracted from a mean square, in sds of the mean square.
 ///
 /// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
@@ -51,7 +51,7 @@ const FORGETS_S: f64 = 1000.0;
 const LEVELS_S: f64 = 100.0;
 /// Largest difference between the integrated and the estimated attitude, rad. If exceeded, the integration restarts.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Largest third difference at which counter and inertial motion agree, in multiples of the usual size.
+/// Counter and inertial motion agree up to this third difference, in multiples of the usual size.
 ///
 /// Agreement is judged once there are `FEW` differences. Once there are `ENOUGH`, their usual size counts as known.
 const AGREES_SDS: f64 = 4.0;
@@ -64,7 +64,8 @@ const AT_FIRST: f64 = 2.0;
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Rms third difference at a lag of 1 s, in counter steps, above which slack is taken to move the counter constantly.
+/// Slack is taken to move the counter constantly if the rms third difference at a lag of 1 s exceeds this many steps of
+/// the counter.
 const LIVELY_STEPS: f64 = 4.0;
 /// Time between two comparisons of the averaged third differences with the slack model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
@@ -165,7 +166,7 @@ impl SlackEstimate {
         let gain = up.x - self.speed_mps / FORGETS_S;
         self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
         self.speed_mps += gain * dt_s;
-        // On average, the specific force points up. So a lean of its mean is an attitude error, which is removed
+        // On average, the specific force points up. So if its mean leans, the attitude is wrong. This error is removed
         // slowly.
         let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
         let back = rotation(back.scaled(dt_s / LEVELS_S));
@@ -214,7 +215,8 @@ impl SlackEstimate {
 
     /// Returns the third difference of counter minus inertial position, m.
     ///
-    /// The second value is the difference between the counter's longest and shortest distance in the three lags, m.
+    /// The second value is the difference between the longest and the shortest of the counter's distances in the three
+    /// lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
@@ -298,7 +300,7 @@ fn third_square(x: f64) -> f64 {
 pub(super) struct Noises {
     /// Variance of the counter's noise and rounding, m^2.
     pub counter_m2: f64,
-    /// Variance of the change of a gyro bias error within [`MEMORY_S`], rad^2/s^2. Such a change tilts gravity.
+    /// Variance of the change of a gyro bias within [`MEMORY_S`], rad^2/s^2. The change tilts the direction of gravity.
     pub rate_bias_rad2ps2: f64,
 }
 
@@ -379,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn taut_or_slow_cable_has_the_declared_slack() {
+    fn taut_cable_and_slowly_varying_slack_keep_the_declared_slack() {
         let declared = Settings::default().slack;
         for slack_m in [0.0, 0.02] {
             let (level, unusual) = level_after(|t| slack_m * math::sin(t / 6.0));
@@ -391,7 +393,7 @@ mod tests {
     ///
     /// Three standard deviations of the slack model's rate are compared with this speed.
     #[test]
-    fn strongly_varying_cable_gets_larger_and_faster_slack_than_declared() {
+    fn estimated_slack_covers_slack_larger_and_faster_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
             let omega = math::TAU / period_s;
             let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));

@@ -14,12 +14,13 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 /// Limits at which a head's range counts as stuck.
 ///
 /// At least this many returns have the same range although the expected range varies by more than `VARIES_M`. The
-/// standard deviation of the expected ranges must be at most `SURE_M`. A low limit is safe, because a return that is
-/// dropped by mistake costs nothing.
+/// standard deviation of the expected ranges must be at most `SURE_M`. The limit of three returns is safe, because a
+/// return that is dropped by mistake costs nothing.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Minimum time between two attitude readings that are used. Their errors stay correlated for longer than this.
+/// Minimum time between two attitude readings that are used. Their errors stay correlated for longer than this, so more
+/// readings would add little.
 ///
 /// The periods for cable, depth and velocity readings have the same reason.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
@@ -29,8 +30,7 @@ pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
 pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
 /// Minimum time between two used velocity readings; see [`ATTITUDE_PERIOD`].
 pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
-/// Number of velocity readings that share one error: errors of the log's scale, mount and bottom track last for 10
-/// s.
+/// Number of velocity readings that share one error. Errors of the log's scale, mount and bottom track last for 10 s.
 ///
 /// If errors lasted for only 3 s, a log that shows a fifth too much would pull the estimate away
 /// (`docs/why/navigation.md`, "Seeded dives").
@@ -84,7 +84,7 @@ pub struct Source {
     pub sensor: SensorInfo,
     /// Innovation statistics of the sensor.
     pub consistency: Consistency,
-    /// Time of the last reading that was put into the reordering window.
+    /// Time of the last used reading, for sensors whose readings are used once per period.
     pub taken: Option<MonoNs>,
     /// Rotation of the sensor if it is a head.
     pub turning: Turning,
@@ -143,8 +143,8 @@ impl Source {
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since the source's last reading that was put into the window. If so, this reading
-    /// is recorded as the last one.
+    /// Whether `period` has passed since the last used reading of the source. If so, the present reading becomes the
+    /// last used one.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {

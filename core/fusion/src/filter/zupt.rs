@@ -9,17 +9,17 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// Averaging window, and the number of equal successive means that show rest. A floating vehicle never reaches it.
+/// Averaging window, and the number of equal successive means that show rest. A floating vehicle has fewer of them.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
 /// Number of mean turn rates at rest after which the gyro bias is known.
 const ENOUGH: u32 = 25;
-/// Time after which a vehicle on a stationary cable counts as floating if it has not been at rest, s.
+/// A vehicle on a stationary cable counts as floating if it has not been at rest for this time, s.
 const FLOATS: u32 = 15;
 /// Time after the first estimate during which the pilot is asked to keep the vehicle still.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
-/// Number of remembered pauses of the cable, and the multiple of the longest pause after which the cable is at
-/// rest.
+/// Number of remembered pauses of the cable. The cable is at rest once it has been still for the longest of them times
+/// the second value.
 ///
 /// The pauses matter if a winch operator winds the cable in half a metre at a time. The cable is then stationary
 /// between pulls while the vehicle moves on.
@@ -51,7 +51,7 @@ pub struct RestDetector {
     asks_from: Option<MonoNs>,
 }
 
-/// Means over successive averaging windows. Each mean is compared with the first mean of a steady run.
+/// Means over successive averaging windows. Each mean is compared with the first mean of a steady series.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Means {
     since: Option<MonoNs>,
@@ -153,12 +153,12 @@ impl RestDetector {
         Some(Vec3::new(x, y, z))
     }
 
-    /// Records the time of an estimate, which counts if it is the first; the request to keep still begins then.
+    /// Records the time of the first estimate, when the request to keep still begins. Later calls have no effect.
     pub fn ask_from(&mut self, at: MonoNs) {
         self.asks_from.get_or_insert(at);
     }
 
-    /// Returns how much longer the vehicle should stand still for its gyro bias to become known, s.
+    /// Returns how much longer the vehicle should stand still, s, until the gyro bias is known.
     ///
     /// 0 if the vehicle floats or its inertial unit is too noisy, because then no stop counts as rest. Also 0 later
     /// in a dive, because by then the gyros seldom cause uncertain passes.

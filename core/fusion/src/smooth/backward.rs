@@ -70,7 +70,7 @@ impl Backward {
         self.now = Some((placed.piece, now));
     }
 
-    /// Returns the last smoothed estimate, which is the earliest in time so far.
+    /// Returns the estimate that was smoothed most recently. Its time is the earliest so far.
     pub fn now(&self) -> Option<&Estimate> {
         self.now.as_ref().map(|(_, now)| now)
     }

@@ -37,7 +37,7 @@ impl Journal {
         (Self { queue: Arc::clone(&queue), piece: 0, clock: 0 }, JournalReader { queue })
     }
 
-    /// Begins a new piece of the track, whose first estimate is unrelated to earlier estimates.
+    /// Begins a new piece of the track. Its first estimate is unrelated to earlier estimates.
     pub fn begin(&mut self) {
         self.piece = self.piece.saturating_add(1);
     }

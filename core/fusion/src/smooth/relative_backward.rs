@@ -1,7 +1,7 @@
 //! Relative error covariance between a smoothed epoch and the epoch of the previous head pass.
 //!
-//! The backward pass reaches the later epoch first. This epoch then waits until the pass reaches the epoch one gap
-//! earlier.
+//! The backward pass goes back in time, so it reaches the later epoch first. That epoch waits until the backward pass
+//! reaches the epoch of the previous head pass, one pass gap earlier.
 
 use super::rts_step::Gain;
 use crate::filter::clones::{CLONES, MOVING, STEP};
@@ -10,7 +10,7 @@ use crate::filter::state::{ERRORS, Errors};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Gap to the previous head pass of an epoch that no earlier pass is related to, because the cable has slipped since.
+/// Value of the pass gap if no earlier head pass is related to the epoch, because the cable has slipped since.
 pub const UNTIED: DurNs = DurNs(i64::MAX);
 /// Standard deviation of the relative chainage error of an epoch without a related earlier pass, m.
 const UNTIED_M: f64 = 1e3;
@@ -27,12 +27,12 @@ struct Moment {
     own: [Errors; 3],
     /// Cross-covariances of these errors with all errors at the current epoch of the backward pass.
     with: [Errors; 3],
-    /// Time from the backward pass's current epoch to this epoch, s, and the relative covariance of both.
+    /// Time from the current epoch of the backward pass to this epoch, s, and the relative covariance of both epochs.
     age_s: f64,
     relative: Relative,
 }
 
-/// Epochs that wait for the backward pass to reach their previous head pass, the latest first.
+/// Epochs that wait until the backward pass reaches their previous head pass, the latest first.
 #[derive(Debug, Clone, Default)]
 pub struct Later {
     waiting: Vec<Moment>,
@@ -43,7 +43,8 @@ pub struct Later {
 pub type Answer = (usize, Relative);
 
 impl Later {
-    /// Whether the time `at` is at least one step before the epoch that was added last.
+    /// Whether an epoch at the time `at` is to be added: it is the first, or at least [`STEP`] before the last one
+    /// added.
     pub fn is_due(&self, at: MonoNs) -> bool {
         self.newest.is_none_or(|newest| newest.since(at).0 >= STEP.0)
     }
@@ -90,7 +91,7 @@ impl Later {
         });
     }
 
-    /// Ends a piece of the track, and returns the relative covariances of all epochs still waiting.
+    /// Ends a piece of the track, and returns the relative covariances of all epochs that still wait.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;
@@ -126,9 +127,9 @@ fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relat
 mod tests {
     use super::*;
 
-    /// Epochs arrive latest first. An epoch is due if it is at least one step before the epoch that was added last.
+    /// Epochs arrive latest first. An epoch is due if it is at least [`STEP`] before the last one added.
     #[test]
-    fn backward_pass_adds_an_earlier_epoch_once_it_is_one_step_away() {
+    fn epoch_is_due_once_it_is_2_s_before_the_last_added_epoch() {
         let at = |s: u64| MonoNs(1_000_000_000 * s);
         let mut later = Later::default();
         assert!(later.is_due(at(100)));

@@ -12,7 +12,7 @@ use crate::filter::factors::Factors;
 pub struct Gain<const N: usize> {
     /// Rows of C = P F^T (F P F^T + Q)^-1.
     rows: [[f64; N]; N],
-    /// Rows of I - C F, for the part of the error that the end of the step does not determine.
+    /// Rows of I - C F. They apply to the part of the error that the end of the step does not determine.
     rest: [[f64; N]; N],
 }
 

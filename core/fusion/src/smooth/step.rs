@@ -14,10 +14,10 @@ const HEADER: usize = 6;
 /// Number of 64-bit words in the record of a step.
 pub const WORDS: usize = HEADER + 3 + 2 * STATE_NUMBERS + FACTOR_NUMBERS + LEG_NUMBERS;
 
-/// The record of a step. Words are integers, or floats as their bits. Words that a step does not need are unused.
+/// The record of a step. Words are integers, or floats as their bits. Words that a step does not need are zero.
 pub type Words = [u64; WORDS];
 
-/// Change between two estimates for other reasons than a measurement.
+/// Change from one estimate to the next that is not caused by a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most are legs, and few are kept at a time")]
 pub enum Move {
@@ -29,7 +29,7 @@ pub enum Move {
     End,
 }
 
-/// A step from an estimate that includes its measurements to the prediction for the next measurements.
+/// A step of the filter. It begins with an estimate after its measurements, and ends before the next measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Start time of the step.
@@ -55,7 +55,7 @@ pub struct Placed {
     pub unit_at: Vec3<Body>,
     /// Time between two passes of the heads over the same position.
     pub gap: DurNs,
-    /// Number of the track's piece; a piece is a run of contiguous steps.
+    /// Number of the piece of the track; a piece consists of contiguous steps.
     pub piece: u32,
     /// Number of times the clock has been set back.
     pub clock: u32,

@@ -25,7 +25,7 @@ pub(super) struct Point {
     sd: PoseSd,
 }
 
-/// A part of the track in which no estimate is missing.
+/// A part of the track without a missing estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piece {
     clock: u32,
@@ -52,8 +52,7 @@ impl Point {
 }
 
 impl Piece {
-    /// Begins a piece that starts after this many of the track's points and relative covariances, both in reverse
-    /// order.
+    /// Begins a piece of a track in reverse order, which has this many points and relative covariances so far.
     pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
         Self {
             clock: placed.clock,
@@ -111,7 +110,7 @@ impl Track {
         self.points.is_empty()
     }
 
-    /// Returns the fix at time `at` of the clock that has been set back `clock` times.
+    /// Returns the fix at time `at`. The clock has been set back `clock` times before that time.
     ///
     /// Errors: the part of the fix that is too uncertain or missing at time `at`.
     pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {
@@ -204,8 +203,8 @@ impl Navigation for TrackNavigation {
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        // After a clock reset, the first ping needs a fix before this navigation has received a reading with the new
-        // time.
+        // After a clock reset, a ping may need a fix before a reading with the new time has arrived. Such a ping gets
+        // no fix.
         if self.received.since(at) > CLOCK_JUMP {
             return Err(NoFix::Heading);
         }
@@ -233,8 +232,8 @@ mod tests {
         turn * Rot::identity()
     }
 
-    /// Point on the track of a drive, `t` seconds after its start. The speed along the tunnel is 0.5 m/s, and the
-    /// vehicle turns left by 0.2 rad/s.
+    /// Point on a piece of the track, `t` seconds after the start of the piece. The speed along the tunnel is 0.5 m/s,
+    /// and the vehicle turns left by 0.2 rad/s.
     ///
     /// The speed stored in the point grows by 0.1 m/s per second, to test its interpolation.
     fn point(t: f64, from_x_m: f64) -> Point {
@@ -243,9 +242,10 @@ mod tests {
         Point::of(at(t), &state, &PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 })
     }
 
-    /// Track of three drives: from 0 s and from 10 s on the first clock, and from 1 s on the clock after a reset.
+    /// Track of three pieces. Two are on the first clock, from 0 s and from 10 s on. The third is on the clock after a
+    /// reset, from 1 s on.
     ///
-    /// In the first drive, the relative covariance is known at 0 s and at 2 s.
+    /// In the first piece, the relative covariance is known at 0 s and at 2 s.
     fn track() -> Track {
         let drives =
             [(0, 0.0, vec![0.0, 1.0, 2.0]), (0, 100.0, vec![10.0, 11.0, 14.0]), (1, 200.0, vec![1.0, 2.0])];
@@ -278,7 +278,7 @@ mod tests {
             let off_m = [place.x() - (0.5 * t - ahead_m), place.y() - (1.0 - aside_m), place.z() - 2.0];
             assert!(off_m.iter().all(|off_m| off_m.abs() < 1e-9), "{t}: {place:?}");
             assert!(rotation_vector(fix.pose.attitude * turned(0.2 * t).inverse()).norm() < 1e-9, "{t}");
-            // In the first drive, the relative variance grows from 0.01 to 0.04 m^2.
+            // In the first piece, the relative variance grows from 0.01 to 0.04 m^2.
             let variance_m2 = 0.01 + 0.015 * t.min(2.0);
             assert!((fix.relative.sd_m(Vec3::zero()) - math::sqrt(variance_m2)).abs() < 1e-9, "{t}");
             // At the inertial unit's position, the errors of the two visits are independent.
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn fix_at_a_time_outside_every_drive_fails() {
+    fn time_outside_every_piece_of_the_track_has_no_fix() {
         let track = track();
         let lacks = |clock: u32, t: f64| track.fix(clock, at(t)).err();
         for (clock, t) in
@@ -309,10 +309,10 @@ mod tests {
         assert_eq!((none.pieces(), none.len(), none.is_empty()), (0, 0, true));
     }
 
-    /// If the clock goes back by 10 s or more, the drive after the reset is used. Times before then belong to the
-    /// old clock.
+    /// A reading over 10 s older than the newest one means that the clock was set back. From then on, fixes come from
+    /// the piece on the new clock.
     #[test]
-    fn track_navigation_uses_the_drive_after_a_clock_reset() {
+    fn track_navigation_uses_the_new_piece_after_a_clock_reset() {
         let mut navigation = TrackNavigation::new(track(), [None; MAX_SOURCES]);
         let mut hear = |t: f64| {
             let times = Times { received: at(t), valid: at(t) };

@@ -1,4 +1,4 @@
-//! A second filter beside the navigation filter, whose steps are recorded for smoothing.
+//! Navigation with two filters. The steps of the second filter are recorded for smoothing.
 //!
 //! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigation filter applies only a share of each
 //! wall correction and so discards some correlation on purpose. A backward pass over the navigation filter's steps

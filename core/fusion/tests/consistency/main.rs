@@ -43,7 +43,7 @@ fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     all
 }
 
-/// Whether a dive without faults declares slack of up to 6 cm and has counter steps of 4 mm or more.
+/// Whether a dive has no fault, declared settings, slack of up to 6 cm, and counter steps of 4 mm or more.
 fn is_lively_and_stepped(recipe: &Recipe) -> bool {
     recipe.fault == Fault::None && recipe.is_declared && recipe.slack_m <= 0.06 && recipe.quantum_m >= 0.004
 }
@@ -137,7 +137,7 @@ fn wrong_velocity_log_causes_no_unreported_error() {
     assert!(unsure < 0.15, "a sound log leaves too many epochs uncertain: {unsure}");
 }
 
-/// If a count is stationary for minutes, the vehicle is mostly hovering.
+/// A count that stays constant for minutes usually means that the vehicle hovers, not that the wheel is stuck.
 #[test]
 fn hovering_vehicle_keeps_a_small_position_uncertainty() {
     let all = dives(HOVERING, Recipe::hovering);

@@ -40,7 +40,7 @@ pub(crate) struct Tally {
     /// Largest chainage errors in standard deviations: absolute, and between head passes.
     pub(crate) worst: f64,
     pub(crate) worst_pass: f64,
-    /// Largest errors of chainage and speed while there is a fix, m, m/s.
+    /// Largest errors of chainage and speed while there is a fix, m and m/s.
     pub(crate) error_m: f64,
     pub(crate) speed_off_mps: f64,
 }

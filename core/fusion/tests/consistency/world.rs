@@ -182,7 +182,8 @@ impl Recipe {
         }
     }
 
-    /// Returns the dive parameters for a seed, with a velocity log that is sound or has one of three faults, in turn.
+    /// Returns the dive parameters for a seed, with a velocity log. In turn, the log is sound or has one of three
+    /// faults.
     pub(crate) fn with_log(seed: u64) -> Self {
         Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
@@ -230,7 +231,7 @@ impl Recipe {
     }
 }
 
-/// Function that adds the readings of a source. Inputs: period, s, phase, s, source, and its reading at a time, s.
+/// Function that adds the readings of a source. Inputs: period and phase, s, source, and its reading at a time in s.
 type Every<'a> = dyn FnMut(f64, f64, usize, &mut dyn FnMut(f64) -> Option<Reading>) + 'a;
 
 /// A sum of sine functions of time, each with amplitude, angular frequency and phase.

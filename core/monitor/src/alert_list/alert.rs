@@ -79,7 +79,7 @@ pub enum Figures {
     CannotSay(Stretch),
     /// Present speed and speed advice.
     Advice(AdviceFigures),
-    /// Requirements that are missing for a position.
+    /// Requirement of a position that is not met, such as a heading.
     MissingRequirement(NoFix),
     /// Position error, m, and whether staying stationary would reduce it.
     Error(f64, bool),
@@ -123,7 +123,7 @@ pub struct ListedAlert {
     /// Number of times that the alert was raised. For missed stretches: number of stretches that the alert
     /// represents.
     pub count: u32,
-    /// Number of the alert's runs of flagged sections that aren't cleared yet.
+    /// Count of the alert's missed stretches that aren't cleared yet.
     pub(super) open_runs: u32,
     /// Number of the alert into which this alert was merged.
     pub merged_into: Option<u32>,

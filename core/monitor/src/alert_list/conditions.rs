@@ -1,4 +1,4 @@
-//! Conditions checked at each advice update, by situation.
+//! Checks the conditions of all alerts at each advice update.
 
 use super::alert::{AlertChange, AlertState, Figures};
 use super::kind::{ListKind, Priority};
@@ -21,15 +21,15 @@ use headrace_sensor::reading::SourceId;
 const GRACE: DurNs = DurNs(30_000_000_000);
 /// Time for which the alerts `CannotSay` and `ComputerStalled` stay active after their situation last occurred.
 const GROWS: DurNs = DurNs(10_000_000_000);
-/// Thresholds for the remaining cable, time and charge, percent, at which a warning, an alarm and an
-/// emergency alarm are raised.
+/// Limits of the remaining cable, time and charge, percent: at or below them, a warning, an alarm or an
+/// emergency alarm is raised.
 ///
-/// A negative share means that the limit is exceeded.
+/// A negative limit means that more than the whole cable or time is used up.
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
 const TIME_PCT: [f64; 3] = [10.0, 0.0, -1.0];
 const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
-/// Dead band: before the alert ends, the remaining amount must rise by this much above the limit of the
-/// warning, percent.
+/// Dead band, percent. The alert ends only if the remaining amount rises by more than this above the warning's
+/// limit.
 const MORE_PCT: f64 = 2.0;
 
 /// An advice update, with the live state at that time.
@@ -118,7 +118,7 @@ impl AlertList {
         self.observe(at, &seen, to);
     }
 
-    /// Whether data or positions that never arrived are overdue.
+    /// Whether data or positions that have not arrived yet are overdue.
     fn is_late(&self, at: MonoNs) -> bool {
         self.begun.is_some_and(|begun| at.since(begun).0 >= GRACE.0)
     }
@@ -295,7 +295,7 @@ impl AlertList {
         }
     }
 
-    /// Length of cable left beyond the vehicle's chainage, m; `None` if the length of the cable is unknown.
+    /// Length of cable left beyond the vehicle's chainage, m; `None` if the cable's length or the chainage is unknown.
     pub(super) fn cable_left_m(&self, x_m: Option<f64>) -> Option<f64> {
         self.limits.cable_m.zip(x_m).map(|(cable_m, x_m)| cable_m - x_m.max(0.0))
     }
@@ -310,7 +310,7 @@ impl AlertList {
         self.timers.get(timer::place(kind, source)).is_some_and(|timer| timer.number != 0)
     }
 
-    /// Updates the timer of a condition's situation, and raises or ends the alert when that is due.
+    /// Updates the timer of a situation, and raises or ends its alert when that is due.
     pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);

@@ -59,7 +59,7 @@ pub struct ListedAlertJson {
     pub to_m: Option<f64>,
     /// Place to go back to in order to pass the missed stretch again, m.
     pub back_to_m: Option<f64>,
-    /// Largest speed for passing the alert's stretch again, m/s.
+    /// Largest speed for passing the missed stretch again or, in an alert about speed, v_max; m/s.
     pub at_most_mps: Option<f64>,
     /// Id of the sensor that the alert names.
     pub sensor: Option<String>,
@@ -88,9 +88,9 @@ pub struct SettingJson {
     pub source: Option<String>,
     /// Name of the other sensor, if two sensors are swapped.
     pub other: Option<String>,
-    /// Ratio of measured ranges to the ranges that the design predicts; `None` for other settings.
+    /// Ratio of measured ranges to the ranges that the design predicts; `None` unless the range scale is doubtful.
     pub range_ratio: Option<f64>,
-    /// Angle to be added to the angle in the vehicle file, degrees; `None` for other settings.
+    /// Angle to be added to the angle in the vehicle file, degrees; `None` unless an angle is doubtful.
     ///
     /// It is an angle about the head's axis, a pitch or a yaw.
     pub angle_deg: Option<f64>,

@@ -82,7 +82,7 @@ pub enum ListKind {
     SensorDeaf,
     /// A sensor repeats its last reading.
     SensorHung,
-    /// The ranges have not shown yet that all heads point along their mounts.
+    /// The measured ranges have not confirmed the pitch and yaw of all heads yet.
     MountsUnverified,
     /// The program got no computing time, so data arrived late or were lost.
     ComputerStalled,

@@ -18,7 +18,7 @@ pub(crate) struct Telling<'a> {
 impl Telling<'_> {
     /// Publishes a change of an alert. Allocates: never.
     ///
-    /// The digest includes a notice even if the queue has no room for it.
+    /// The digest includes the change even if the list of notices is full.
     pub(super) fn tell(&mut self, alert: &ListedAlert, change: AlertChange, at: MonoNs) {
         digest(self.stream, alert, change, at);
         if self.notices.len() < self.notices.capacity() {
@@ -103,8 +103,8 @@ impl AlertList {
         alert.number
     }
 
-    /// Drops the oldest cleared alert if the list is full. If no alert is cleared, two missed stretches then
-    /// share one alert.
+    /// Makes room in a full list: drops the oldest cleared alert. If no alert is cleared, first merges the newest
+    /// missed stretch into another alert.
     fn make_room(&mut self, at: MonoNs, to: &mut Telling<'_>) {
         if self.alerts.len() < MOST_LISTED {
             return;
@@ -113,8 +113,8 @@ impl AlertList {
             self.share_one(at, to);
         }
         let oldest = self.alerts.iter().position(|alert| !alert.is_live());
-        // If all alerts in a full list are live, most of them are missed stretches, because there are far
-        // fewer other situations.
+        // If the list has fewer than two missed stretches, nothing can be merged. Then the oldest caution is
+        // dropped, because cautions are the least urgent alerts.
         let oldest =
             oldest.or_else(|| self.alerts.iter().position(|alert| alert.priority == Priority::Caution));
         if let Some(oldest) = oldest {
@@ -123,8 +123,8 @@ impl AlertList {
         }
     }
 
-    /// Reactivates an alert whose condition holds again before anybody has acknowledged it, or updates its
-    /// figures while the condition continues.
+    /// Reactivates an alert whose condition holds again before anybody has acknowledged it, and counts the
+    /// occurrence.
     pub(super) fn hold_again(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         (alert.state, alert.rectified) = (AlertState::Active, None);

@@ -23,7 +23,7 @@ pub(super) struct Had {
     pub(super) sure_position: bool,
     pub(super) sonar: bool,
     pub(super) turning: u64,
-    /// The last stretch without a verdict, and the time at which it last grew.
+    /// Most recent stretch without a verdict, and the time at which it grew most recently.
     pub(super) unsure: Option<(Stretch, MonoNs)>,
 }
 
@@ -36,7 +36,7 @@ pub struct AlertList {
     pub(super) raised: u32,
     /// Number of cleared alerts no longer kept.
     pub(super) dropped: u64,
-    /// For each run of flagged sections: number of its alert, or zero.
+    /// Alert number of each missed stretch, by the stretch's number; zero if it has no alert.
     pub(super) by_run: Vec<u32>,
     /// Timers that raise and end alerts, by situation.
     pub(super) timers: Vec<Timer>,
@@ -65,7 +65,7 @@ stateful!(AlertList {
 
 impl AlertList {
     /// Creates an empty list. `sections` is the number of sections, and so the largest possible number of
-    /// runs.
+    /// missed stretches.
     ///
     /// Allocates: at startup, all memory of the list.
     pub(crate) fn new(timing: AlertTiming, limits: LimitsConfig, sections: usize) -> Self {

@@ -1,4 +1,4 @@
-//! Alerts for missed stretches: one per run of flagged sections. If two runs merge, their alerts merge, too.
+//! Alerts for missed stretches, one for each. If two stretches merge, their alerts merge, too.
 
 use super::alert::{AlertChange, AlertState, Figures, ListedAlert};
 use super::kind::ListKind;
@@ -8,27 +8,25 @@ use crate::pilot_text::CauseFigures;
 use headrace_coverage::{RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;
 
-/// A changed run of neighbouring sections that are flagged as missed, with its figures at the time of the
-/// change.
+/// A missed stretch that a judgement has changed, with its figures after the change.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunInput {
-    /// Index of the event at which the run was judged. If it was judged at an advice update: index of the
+    /// Index of the event at which the stretch was judged. If it was judged at an advice update: index of the
     /// event after the update.
     pub(crate) event: usize,
-    /// Whether the run was judged at an advice update before the event with the index `event`.
+    /// Whether the stretch was judged at an advice update before the event with the index `event`.
     pub(crate) at_beat: bool,
     pub(crate) at: MonoNs,
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
     pub(super) stretch: (i64, i64),
-    /// Causes for which the run of sections was missed, and arc length of the run's largest hole, m.
+    /// Causes of the miss, and arc length of the stretch's largest hole, m.
     pub(super) causes: Option<(CauseFigures, f64)>,
     pub(super) merged_into: Option<RunId>,
 }
 
 impl RunInput {
-    /// Alert input for a run of flagged sections that a judgement has changed; `None` if there is no such
-    /// run.
+    /// Alert input for a missed stretch that a judgement has changed; `None` if there is no such stretch.
     pub(crate) fn of(
         (event, at_beat): (usize, bool),
         at: MonoNs,
@@ -43,7 +41,7 @@ impl RunInput {
 }
 
 impl AlertList {
-    /// Applies a changed run of flagged sections to the alert list.
+    /// Applies a changed missed stretch to the alert list.
     pub(crate) fn take_run(&mut self, input: &RunInput, to: &mut Telling<'_>) {
         let at = input.at;
         match input.change {
@@ -66,7 +64,7 @@ impl AlertList {
     }
 
     fn set_alert_of(&mut self, id: RunId, number: u32) {
-        // The capacity of `by_run` suffices, because there are no more runs than sections.
+        // The capacity of `by_run` suffices, because there are no more missed stretches than sections.
         while self.by_run.len() <= id.0 as usize && self.by_run.len() < self.by_run.capacity() {
             self.by_run.push(0);
         }
@@ -79,8 +77,8 @@ impl AlertList {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
-        // If a later pass has split this run off from a missed stretch of sections, the alert of that stretch
-        // covers it.
+        // If a later pass has split this stretch off from a longer one, the alert of the longer stretch covers
+        // it.
         let (from, until) = input.stretch;
         let has = |alert: &&ListedAlert| {
             alert.kind == ListKind::Missed
@@ -101,10 +99,10 @@ impl AlertList {
         self.set_alert_of(input.id, number);
     }
 
-    /// Adapts an alert to a run of flagged sections that has grown, or that has shrunk if it is the alert's
-    /// only run.
+    /// Adapts an alert to a missed stretch that has grown. If the stretch is the alert's only one, the alert also
+    /// shrinks with it.
     ///
-    /// If a later pass splits a run in two, one alert covers both runs.
+    /// If a later pass splits a stretch in two, one alert covers both parts.
     fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         let (from, until) = alert.stretch.unwrap_or(input.stretch);
@@ -134,14 +132,14 @@ impl AlertList {
         }
     }
 
-    /// Merges the alerts of two runs of flagged sections that have been merged. The alert with the lower
-    /// number represents both runs.
+    /// Merges the alerts of two missed stretches that have merged. The alert with the lower number represents
+    /// both stretches.
     fn merge_runs(&mut self, input: &RunInput, to: &mut Telling<'_>) {
         let Some(into) = input.merged_into else { return };
         let (other, kept) = (self.alert_of(input.id), self.alert_of(into));
         self.set_alert_of(input.id, 0);
         if other == kept {
-            // Both runs of flagged sections already had the same alert.
+            // Both stretches already had the same alert.
             if let Some(alert) = self.get_mut(kept) {
                 alert.open_runs = alert.open_runs.saturating_sub(1);
             }

@@ -73,8 +73,8 @@ enum Happens {
 const KINDS: [ListKind; 3] = [ListKind::TooFast, ListKind::NotRecorded, ListKind::TurnFails];
 const BEAT_MS: u64 = 200;
 
-/// Life cycle of one situation's alerts by the table of MSC.302(87), derived from the history of the
-/// condition.
+/// Expected life cycle of one situation's alerts, from the condition's history and the table of
+/// MSC.302(87).
 #[derive(Debug, Clone, Default)]
 struct Oracle {
     history: Vec<(u64, bool)>,
@@ -84,7 +84,7 @@ struct Oracle {
 }
 
 impl Oracle {
-    /// Durations for which the condition has held, and for which it hasn't, up to now.
+    /// Returns for how long the condition has held, and for how long it has been absent, ms.
     ///
     /// Breaks shorter than `least_ms` count as time for which the condition held.
     fn spells_ms(&self, least_ms: u64) -> (Option<u64>, Option<u64>) {
@@ -289,7 +289,7 @@ fn stall_of_the_computer_is_listed_for_a_while() {
 
 /// The dive's time begins with its data, however long the program waits for them.
 #[test]
-fn sensors_never_heard_are_one_alert_and_do_not_begin_the_dive() {
+fn silence_of_all_sensors_raises_one_alert_and_does_not_begin_the_dive_time() {
     let mut bench = Bench::new(0.0, 0.0);
     let heard = [None; headrace_sensor::reading::MAX_SOURCES];
     for minutes in 0..90 {
@@ -326,7 +326,7 @@ fn higher_priority_needs_a_new_acknowledgement() {
     beat(&mut bench, 4, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, true)));
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(5), to));
-    // The battery charge varies within the dead band of its alert.
+    // The charge rises a little above the alarm's limit and falls back to it.
     beat(&mut bench, 6, 11.0);
     beat(&mut bench, 7, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, false)));
@@ -403,7 +403,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
     bench.run(0, RunChange::Changed, (40, 64), None);
     bench.run(0, RunChange::Changed, (40, 52), None);
     assert_eq!(stretch(&bench), Some((40, 52)), "the far end was passed again");
-    // A second pass covers the middle of the missed stretch. The alert then has two runs of missed sections.
+    // A second pass covers the middle of the missed stretch. The alert then covers two missed stretches.
     bench.run(1, RunChange::Raised, (48, 52), None);
     bench.run(0, RunChange::Changed, (40, 44), None);
     assert_eq!((stretch(&bench), bench.list.iter().count()), (Some((40, 52)), 1));
@@ -413,7 +413,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
 }
 
 #[test]
-fn alert_of_merged_runs_keeps_the_lower_number_and_stays_unacknowledged() {
+fn merged_stretches_keep_the_lower_alert_number_and_need_acknowledgement() {
     let mut bench = Bench::new(0.0, 0.0);
     bench.run(0, RunChange::Raised, (10, 11), None);
     bench.run(1, RunChange::Raised, (14, 15), None);
@@ -423,8 +423,8 @@ fn alert_of_merged_runs_keeps_the_lower_number_and_stays_unacknowledged() {
     let [kept, gone] = [1, 2].map(|number| *bench.list.get(number).unwrap());
     assert_eq!((kept.stretch, kept.count, kept.needs_acknowledgement()), (Some((10, 15)), 2, true));
     assert_eq!((gone.state, gone.merged_into), (AlertState::Cleared, Some(1)));
-    // A later pass covers the middle of the missed stretch, so its alert has two runs of missed sections.
-    // Then a pass covers both runs.
+    // A later pass covers the middle of the missed stretch and so splits it in two. One alert covers both
+    // parts. Then a pass covers both parts.
     bench.run(2, RunChange::Raised, (13, 15), None);
     bench.run(0, RunChange::Changed, (10, 12), None);
     assert_eq!(bench.list.raised(), 2);
@@ -439,9 +439,9 @@ fn alert_of_merged_runs_keeps_the_lower_number_and_stays_unacknowledged() {
 }
 
 proptest! {
-    /// Runs of missed sections in a tunnel of 7 km are flagged and cleared at random. Every unacknowledged
+    /// Missed stretches in a tunnel of 7 km are flagged and cleared at random. Every unacknowledged
     /// missed stretch stays in an alert, and the list never exceeds its capacity. No alert is active once
-    /// every run is cleared.
+    /// every stretch is cleared.
     #[test]
     fn full_list_loses_no_missed_stretch(
         events in proptest::collection::vec((0u8..10, 0u32..2000), 800..2500),

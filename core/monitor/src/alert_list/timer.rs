@@ -6,8 +6,8 @@ use super::kind::ListKind;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 
-/// Number of situations that can raise an alert: one of each kind, and one per sensor for kinds that name a
-/// sensor.
+/// Number of timers: one for each kind of alert and each sensor. Kinds that name no sensor use the timer of the
+/// first sensor.
 pub(super) const COUNT: usize = ListKind::ALL.len() * MAX_SOURCES;
 
 /// Index of the timer for a situation that can raise an alert.

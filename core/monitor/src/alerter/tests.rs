@@ -71,7 +71,7 @@ fn position_is_doubtful_if_the_pass_error_is_large_or_the_cable_counter_is_distr
 
 const NOW: MonoNs = MonoNs(9_000_000_000);
 
-/// Run of missed sections that consists of a single section without samples. It is flagged at the event with
+/// Missed stretch that consists of a single section without samples. It is flagged at the event with
 /// the index `event` or, if `at_beat` is true, at the advice update before that event.
 fn run(event: usize, at_beat: bool) -> RunInput {
     let profile = shapes::circle(3.0).unwrap();
@@ -100,7 +100,7 @@ fn run(event: usize, at_beat: bool) -> RunInput {
     RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
 }
 
-/// Alerter with its inputs in one tick: a changed run of flagged sections, a command that acknowledges all
+/// Alerter with its inputs in one tick: a changed missed stretch, a command that acknowledges all
 /// alerts, and ten events, each with one reading.
 struct Bench {
     alerter: Alerter,
@@ -127,7 +127,7 @@ impl Bench {
         }
     }
 
-    /// Applies the inputs up to the advice update before event number `beat`, or those of the whole tick.
+    /// Applies the inputs up to the advice update before event number `beat`, or all inputs of the tick if `None`.
     ///
     /// Returns the number of alerts raised, the number of those acknowledged, the number of commands
     /// without effect, and the last reading's time.

@@ -63,7 +63,7 @@ pub enum Command {
     },
     /// Sent by the program: it got no computing time for a while, or did not run.
     Stalled {
-        /// Duration, rounded up to whole seconds, 1 to [`MAX_STALL_S`]; longer ones count as that.
+        /// Duration in seconds, rounded up: 1 to [`MAX_STALL_S`]. A longer stall counts as the maximum.
         seconds: u32,
     },
     /// Sent by other equipment: remaining battery charge of the vehicle.

@@ -132,7 +132,7 @@ proptest! {
     }
 
     #[test]
-    fn random_console_packets_are_parsed_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+    fn accepted_random_packet_is_valid_json(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
         if Command::parse(&bytes).is_ok() {
             prop_assert!(serde_json::from_slice::<serde_json::Value>(&bytes).is_ok());
         }

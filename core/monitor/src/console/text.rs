@@ -38,7 +38,7 @@ impl<const BYTES: usize> ShortText<BYTES> {
         let room = self.bytes.get_mut(from..from + char.len_utf8()).filter(|_| !char.is_control());
         let Some(room) = room else { return false };
         char.encode_utf8(room);
-        // The length is at most BYTES, which is far below the limit.
+        // The length is at most BYTES, which is far below the largest u16.
         self.len += u16::try_from(char.len_utf8()).unwrap_or(0);
         true
     }

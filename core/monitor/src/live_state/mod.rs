@@ -1,5 +1,5 @@
-//! The live state: the present state of the dive, as one structure by value. `docs/reference/live-state.md`
-//! describes it.
+//! The live state: the present state of the dive, as one plain value. `docs/reference/live-state.md` describes
+//! it.
 //!
 //! Every advice update makes a live state, and every tick publishes the latest one. The terminal and the
 //! lines of `--json-lines` show it. All fields except [`LiveState::now`] are as of the last update, in data

@@ -25,7 +25,7 @@ pub enum SpeedBand {
 }
 
 impl SpeedBand {
-    /// Band of a ratio of speed to v_max, after `before`.
+    /// Band for a ratio of speed to v_max. `before` is the previous band.
     pub(super) fn after(before: Self, share: f64) -> Self {
         let begins = |band: Self, at: f64| share > if before >= band { at - HOLD } else { at };
         if begins(Self::TooFast, TOO_FAST) {
@@ -42,7 +42,7 @@ impl SpeedBand {
 mod tests {
     use super::*;
 
-    /// A speed that varies by one percent about either ratio stays in its band.
+    /// A speed that varies by one percent around the limit of a band stays in one band.
     #[test]
     fn steady_speed_stays_in_one_band() {
         for about in [OVER, TOO_FAST] {

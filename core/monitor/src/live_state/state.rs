@@ -146,7 +146,7 @@ pub struct LiveState {
     pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,
-    /// Band of the speed at the update before.
+    /// Band of the speed at the previous update.
     pub last_band: SpeedBand,
     /// Speed advice at the last update; `None` before the first.
     pub advice: Option<Advice>,
@@ -156,7 +156,7 @@ pub struct LiveState {
     pub target: Target,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// Largest distance of a head before or behind the vehicle's origin, m.
+    /// Largest distance of a head ahead of or behind the vehicle's origin, m.
     pub heads_reach_m: f64,
     /// Metres of the coverage extent by verdict.
     pub metres: Metres,

@@ -16,7 +16,7 @@ pub struct SpeedTexts {
     pub speed: Option<String>,
     /// Largest advised speed; `None` if no limit applies here and now.
     pub limit: Option<String>,
-    /// Difference between both, in words; `None` without one of them.
+    /// Difference between speed and limit, in words; `None` if either is missing.
     pub margin: Option<String>,
 }
 
@@ -43,8 +43,8 @@ impl LiveState {
 
     /// Texts of the speed and its limit.
     ///
-    /// Both have the same number of decimals. The limit is rounded down. The speed is rounded up if it is over the
-    /// limit, and is otherwise shown as at most the limit, so that the figures agree with the condition.
+    /// Both have the same number of decimals. The limit is rounded down. A speed over the limit is rounded up. Any
+    /// other speed is shown as at most the limit. The figures therefore agree with the condition.
     pub fn speed_texts(&self) -> SpeedTexts {
         let is_now = !matches!(self.condition(), Condition::NoData | Condition::Old(_));
         let speed_mps = self.speed_mps.filter(|_| is_now).map(f64::abs);
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn no_limit_is_shown_where_none_applies() {
+    fn speed_limit_is_shown_only_if_one_applies() {
         let state = test_state();
         let back = LiveState { back_to_m: Some(8.2), speed_mps: Some(-0.3), ..state }.speed_texts();
         assert_eq!((back.speed.as_deref(), back.limit, back.margin), (Some("0.30"), None, None));

@@ -189,5 +189,5 @@ fn narrow_screen_keeps_the_action_and_drops_the_reason() {
     assert!(line.cut(200).contains("missed 1.00 m  -> go 0.10 m/s"));
     assert_eq!(line.cut(60), "0+039.06   THIS TURN MAY MISS  -> go 0.10 m/s");
     let remedy = PilotLine { action: String::new(), ..line };
-    assert!(remedy.cut(40).contains("THIS TURN MAY MISS: heads"), "the instruction stays");
+    assert!(remedy.cut(40).contains("THIS TURN MAY MISS: heads"), "without an action, the reason stays");
 }

@@ -308,7 +308,7 @@ mod tests {
             assert!(math::wrap_signed(off_rad, math::TAU).abs() < 1e-6, "{from_s}: {off_rad}");
             assert!((motion.rate_radps - rate_radps).abs() < 1e-6);
         }
-        assert!(found.heads[2..].iter().all(Option::is_none), "the last ping of the third was at 8.48 s");
+        assert!(found.heads[2..].iter().all(Option::is_none), "the third head's last ping was at 8.48 s");
         assert_eq!((found.configured, found.pose.is_none()), (3, true));
     }
 }

@@ -53,7 +53,7 @@ pub(super) fn navigate(
     let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
-        // Time may stall or go back. Each advice update is emitted once. After a gap, only the last update is
+        // Time may stall or go back. Each advice update is emitted once. After a gap, only the latest update is
         // emitted.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);

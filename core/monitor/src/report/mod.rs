@@ -67,7 +67,7 @@ pub struct Report {
     pub summary: SummaryReport,
     /// Every section of the coverage extent, in the order of chainage.
     pub sections: Vec<SectionRow>,
-    /// Runs of neighbouring flagged sections, in the order of their numbers.
+    /// Missed stretches, in the order of their numbers.
     pub runs: Vec<RunReport>,
     /// Stretches that neither pass nor fail although no more samples will come, in the order of chainage.
     pub no_verdict: Vec<NoVerdictReport>,
@@ -77,7 +77,7 @@ pub struct Report {
     pub position_gaps: Vec<PositionGapReport>,
     /// Stretches of wall off the design profile, in the order of chainage.
     pub wall_stretches: Vec<WallStretchReport>,
-    /// Openings not declared that explain missed stretches, by number of the run.
+    /// Undeclared openings that would explain missed stretches, in the order of the stretches' numbers.
     pub suggested_openings: Vec<SuggestedOpeningReport>,
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,

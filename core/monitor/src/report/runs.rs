@@ -1,4 +1,4 @@
-//! Runs of flagged sections in the report, and the stretches to pass again.
+//! Missed stretches in the report, and the stretches to pass again.
 
 use serde::Serialize;
 
@@ -9,14 +9,14 @@ use headrace_coverage::{Action, Again, Cause, Run, RunId, Runs, Sections, Verdic
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
-/// A run of neighbouring sections that are flagged as missed.
+/// A missed stretch: neighbouring sections that are flagged as missed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
-    /// Number of the run of missed sections, which never changes.
+    /// Number of the stretch, which never changes.
     pub id: u32,
-    /// Main cause: the one that applies to most sections of the run.
+    /// Main cause: the one that applies to most sections of the stretch.
     pub cause: Cause,
-    /// All causes of the run's sections: first the main one, then the others by frequency.
+    /// All causes of the stretch's sections: first the main one, then the others by frequency.
     pub causes: Vec<Cause>,
     /// Figures for the causes that the text names. Each comes from a section with that cause.
     #[serde(skip)]
@@ -24,30 +24,30 @@ pub struct RunReport {
     /// Source ids of the heads that were silent in the section with the largest hole, or in the section that
     /// represents silence as a cause.
     pub silent_sources: Vec<String>,
-    /// Beginning of the run of missed sections, m.
+    /// Beginning of the missed stretch, m.
     pub start_m: f64,
-    /// End of the run of missed sections, m.
+    /// End of the missed stretch, m.
     pub end_m: f64,
-    /// Metres of the run's sections that fail at present.
+    /// Metres of the stretch that fail at present.
     pub failed_m: f64,
-    /// Diameter of the run's largest hole, m. For a cleared run, the diameter before it was cleared.
+    /// Diameter of the stretch's largest hole, m. For a cleared stretch, the diameter before it was cleared.
     pub hole_m: f64,
     /// Chainage of that hole's centre, m.
     pub hole_x_m: f64,
     /// Clock position of the hole's centre, looking along the tunnel.
     pub hole_clock: String,
-    /// Time at which the run was first flagged, seconds on the log's clock.
+    /// Time at which the stretch was first flagged, seconds on the log's clock.
     pub raised_s: f64,
-    /// Time at which the last section of the run ceased to fail, seconds on the log's clock.
+    /// Time at which the stretch was cleared or merged into another one, seconds on the log's clock; `None` before.
     pub cleared_s: Option<f64>,
-    /// Number of the run into which this run was merged.
+    /// Number of the stretch into which this stretch was merged.
     pub merged_into: Option<u32>,
 }
 
 /// A stretch that the vehicle should pass again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReturnReport {
-    /// Number of the run that makes up this stretch.
+    /// Number of the missed stretch.
     pub run: u32,
     /// Chainage of the stretch's far end, m.
     pub from_m: f64,
@@ -57,9 +57,9 @@ pub struct ReturnReport {
     ///
     /// On the way from there, all heads pass the whole stretch.
     pub back_to_m: f64,
-    /// Action against the run's main cause.
+    /// Action against the stretch's main cause.
     pub action: Action,
-    /// All actions against the run's causes, in the order of the causes.
+    /// All actions against the stretch's causes, in the order of the causes.
     pub actions: Vec<Action>,
     /// Maximum speed for passing the stretch again, m/s.
     ///
@@ -101,7 +101,7 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
         .collect()
 }
 
-/// Metres of a run's sections that fail at present.
+/// Metres of a missed stretch that fail at present.
 ///
 /// A section may keep its flag although it no longer has a verdict. Such sections don't count.
 fn failed_m(sections: &Sections, run: &Run) -> f64 {
@@ -115,7 +115,7 @@ fn head_ids(dive: &Loop) -> Vec<String> {
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// Stretches to pass again according to the present verdicts: all runs of missed sections not yet cleared,
+/// Stretches to pass again according to the present verdicts: all missed stretches that are not cleared yet,
 /// from the far end to the portal.
 pub fn go_back(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();

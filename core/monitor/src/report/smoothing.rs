@@ -42,7 +42,7 @@ pub struct ChangeReport {
     pub start_m: f64,
     /// End of the section, m.
     pub end_m: f64,
-    /// Verdict with the navigation filter alone; `None` if no head passed the section on its trajectory.
+    /// Verdict with the navigation filter alone; `None` if no head passed the section on the filter's trajectory.
     pub before: Option<JudgedReport>,
     /// Verdict after smoothing; `None` if no head passed the section on the smoothed trajectory.
     pub after: Option<JudgedReport>,

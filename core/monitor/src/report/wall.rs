@@ -1,4 +1,4 @@
-//! Wall that differs from the vehicle file, in the report: stretches off the design profile, and openings not declared.
+//! Wall that differs from the vehicle file, in the report: stretches off the design profile, undeclared openings.
 
 use serde::Serialize;
 

@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_position_follows_the_vehicle_and_marks_sections_as_silent() {
+    fn silent_head_is_assumed_to_move_with_the_vehicle_and_marks_its_sections() {
         // The second head is silent from 1 s on. The first one keeps pinging.
         let mut bench = Bench::new([Some(9), Some(1)]);
         assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");
@@ -151,7 +151,7 @@ mod tests {
         for seconds in 11..=20 {
             bench.beat(seconds, Some(5.0 + 0.3 * (seconds - 10) as f64));
         }
-        // The extent begins at 4.5 m, with the rear head. The sections end a quarter of a metre before the
+        // The extent begins at 4.5 m, with the rear head. The judged sections end a quarter of a metre before the
         // rear head's place at 7.5 m.
         let whole = bench.requests.0.iter().filter(|request| !request.only_fails);
         let mut left: Vec<i64> = whole.map(|request| request.section).collect();

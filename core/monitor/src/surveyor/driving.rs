@@ -20,8 +20,8 @@ use headrace_sampling::swing::Looks;
 
 /// Longest time between neighbouring passes over which the rotation of the vehicle is computed, seconds.
 const LONGEST_S: f64 = 50.0;
-/// Relative change of the time between passes above which the fitting speed, the largest one that meets the
-/// target, is computed again.
+/// Relative change of an input above which the fitting speed is computed again. The fitting speed is the largest
+/// speed that meets the target.
 const SAME_PASSES: f64 = 0.01;
 /// Search for the fitting speed: number of speeds tried, and ratio of each speed to the previous one.
 const SLOWER: u32 = 80;
@@ -32,7 +32,7 @@ const RAYS: u32 = 72;
 const MOVED_M: f64 = 0.05;
 /// Heads are in phase if the time between passes is at most this multiple of the scheduled time.
 const IN_STEP: f64 = 1.05;
-/// Number of classes into which the places in a sector are divided by the wait until the next pass.
+/// Number of classes of the places in a sector. The classes differ in the wait until the head's next pass.
 ///
 /// At an end of the sector, this wait is a whole sweep there and back. In the middle it is half of that.
 const WAITS: usize = 4;
@@ -292,12 +292,12 @@ mod tests {
     fn stalled_head_counts_as_stalled_until_it_is_back_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
-        assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
+        assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "no head has stalled");
         driving.lacking.stalled = HeadSet::default().with(1);
         // The restored head is a sixteenth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
-        assert!(near(late.even_gap_s, 2.0), "if they were evenly spread");
+        assert!(near(late.even_gap_s, 2.0), "as if the heads were evenly spread");
         assert!(driving.lacking.stalled.has(1));
         let again = noted(&mut driving, EVEN, 0.2, 0.2);
         assert!(near(again.left_at_plan_s, 4.0) && near(again.gap_s, 2.0));

@@ -7,7 +7,7 @@ use crate::resources::Coverage;
 use headrace_coverage::{HeadReach, Request};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Interval between checks of the sections around a vehicle that has not moved on.
+/// Interval at which the sections around the vehicle are judged even if the vehicle has not moved.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 
 /// Once a second, requests judging of the sections around the vehicle.

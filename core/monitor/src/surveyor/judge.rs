@@ -1,4 +1,4 @@
-//! Judges the sections that are due: updates the verdict, flag and run of missed sections of each.
+//! Judges the sections that are due: updates the verdict and flag of each section, and its missed stretch.
 
 use bevy_ecs::prelude::{Res, ResMut};
 
@@ -67,10 +67,10 @@ fn judge_one(
     }
 }
 
-/// Records changed runs of flagged sections for the list of alerts.
+/// Records changed missed stretches for the list of alerts.
 ///
-/// Cleared runs come last. The runs that remain of a cleared run take over its alert, so the list must have
-/// these runs first.
+/// Cleared stretches come last. A remaining part of a cleared stretch takes over the stretch's alert, so the list
+/// must get the part first.
 fn note_runs(notices: &[Notice], stop: (usize, bool), sections: &Sections, runs: &mut Vec<RunInput>) {
     for cleared in [false, true] {
         for notice in notices {
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn fail_publishes_its_run_and_unsure_section_publishes_its_stretch() {
+    fn fail_raises_a_missed_stretch_and_unsure_section_joins_a_stretch_without_verdict() {
         let mut coverage = coverage();
         let (notices, runs) = judged(&mut coverage, 40, -20.0);
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
@@ -151,9 +151,9 @@ mod tests {
         }
     }
 
-    /// The runs that remain of a cleared run take over its alert, so the list must have these runs first.
+    /// A remaining part of a cleared stretch takes over the stretch's alert, so the list must get the part first.
     #[test]
-    fn cleared_runs_come_last_and_runs_beyond_the_capacity_are_dropped() {
+    fn cleared_stretches_come_last_and_stretches_beyond_the_capacity_are_dropped() {
         let mut coverage = coverage();
         for section in [20, 40, 60] {
             judged(&mut coverage, section, -20.0);

@@ -22,8 +22,8 @@ use headrace_sampling::passes::Situation;
 
 /// Time without a ping at a new angle after which a head's samples count as missing.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);
-/// Number of latest pings at presumably occluded angles that decide on occlusion, and the share of lost pings
-/// that confirms it.
+/// Some angles are assumed to be occluded. This number of latest pings at these angles decides whether they are,
+/// and this share of lost pings confirms it.
 const HIDDEN_PINGS: u16 = 600;
 const HIDDEN_SHARE: f64 = 0.7;
 /// Maximum number of pings without a fix that are kept. It suffices for over two minutes of four heads.
@@ -80,14 +80,14 @@ impl Turning {
     }
 }
 
-/// A ping without a fix, either real or simulated for a silent head.
+/// A ping to be placed: a real ping without a fix, or a simulated ping of a silent or stalled head.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Away {
     at: MonoNs,
     head: u8,
     angle_rad: f64,
-    /// Causes other than the missing position. A ping without a return gets further causes once the point is
-    /// known at which its beam meets the design.
+    /// Causes known so far, including a missing position. A ping without a return gets further causes once the
+    /// point is known at which its beam meets the design.
     why: Causes,
     is_lost: bool,
 }
@@ -181,7 +181,7 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
                 Loss::Occluded if heard => Cause::MissingReturns,
                 loss => Cause::of_loss(loss),
             };
-            // Even with a longer range setting the vehicle would occlude this wall.
+            // The vehicle would occlude this wall even with a longer range setting, so occlusion is a further cause.
             let stays = loss == Loss::OutOfRange && ping.hidden == Hidden::Yes && head.is_hidden();
             let why = if stays { Causes::of(cause).with(Cause::Occluded) } else { Causes::of(cause) };
             lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why, may_be_wall: false });

@@ -14,8 +14,8 @@ use headrace_sensor::reading::SourceId;
 
 /// Records the doubts reported at an advice update.
 ///
-/// Returns the chainages whose samples come from a head with a wrong mount, m, if there are any. When the doubt
-/// begins, these are all chainages so far.
+/// Returns the range of chainages, m, in which samples come from a head with a wrong mount; `None` if there is no
+/// such head. When the doubt begins, the range is the whole coverage extent.
 pub(super) fn note(
     (at, situation, doubts): (MonoNs, &Situation, &Doubts),
     (coverage, heads): (&Coverage, &Heads<'_, '_>),
@@ -61,8 +61,8 @@ mod tests {
     use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
     use headrace_sensor::device::{SensorInfo, SensorKind};
 
-    /// Chainages that are suspected twice in a row because of a setting of `source`. The heads are sources 0 and up, at
-    /// 9 to 10 m now; the coverage extent begins at 2 m.
+    /// Chainages suspected at two successive updates because of a setting of `source`. The heads are sources 0 and up,
+    /// at 9 to 10 m now; the coverage extent begins at 2 m.
     fn suspected(heads: u16, setting: Setting, source: Option<u16>) -> [Option<[f64; 2]>; 2] {
         let (mut world, mut coverage) = (World::new(), coverage());
         let reach = |from_m: f64, to_m: f64| Reach { from_m, to_m };

@@ -1,7 +1,7 @@
 //! Position gaps: stretches of the dive in which the heads pinged, but the vehicle had no position.
 //!
-//! Their returns have no place on the wall, so the coverage extent excludes them. The list tells how long they lasted
-//! and where the vehicle probably was.
+//! The heads' returns in a gap have no place on the wall, so the coverage extent excludes the gap. The list tells how
+//! long each gap lasted and where the vehicle probably was.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};

@@ -122,7 +122,7 @@ mod tests {
         assert_eq!((samples, steps), (5, 3));
     }
 
-    /// The new sample comes a turn later, 0.2 m further on, half way between two samples of the first turn.
+    /// The new sample comes a turn later, 0.2 m farther in, half way between two samples of the first turn.
     #[test]
     fn distance_to_the_previous_pass_is_along_the_tunnel() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
@@ -130,8 +130,8 @@ mod tests {
             note_sample(&mut coverage, &mut sweep, &tunnel, &ping, false).unwrap();
         }
         let section = coverage.sections.get(20).unwrap();
-        // At the new sample's arc length, the first turn's pass was at 5.055 m. Each sample of that turn ends
-        // a step.
+        // At the new sample's arc length, the first turn's pass was at 5.055 m. The second and the third sample of
+        // that turn each end a step.
         assert!((section.t_x_m.max - 0.18).abs() < 1e-9, "{:?}", section.t_x_m);
         assert_eq!((section.samples, section.t_y_m.count), (4, 2));
     }

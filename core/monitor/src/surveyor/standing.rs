@@ -113,7 +113,7 @@ mod tests {
     use headrace_coverage::{HeadReach, HoleFinder, Judging, MissingSamples, Reach, Request};
     use headrace_sensor::device::{SensorInfo, SensorKind};
 
-    /// Test sections of which those with the indices in `failed` have failed.
+    /// Test sections. The sections with the indices in `failed` have failed.
     fn missed(failed: &[i64]) -> Sections {
         let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
         let mut judging = Judging {
@@ -152,7 +152,7 @@ mod tests {
         assert_eq!(
             turns_m(&two, -0.1, Some(9.4)),
             Some(4.5),
-            "the vehicle is past one, and the other remains"
+            "the vehicle has passed one, and the other remains"
         );
         assert_eq!(turns_m(&two, -0.1, Some(4.4)), None, "past both");
         assert_eq!(turns_m(&[], -0.1, Some(12.0)), None, "no section is missed");
@@ -163,7 +163,7 @@ mod tests {
     /// At 0.4 m/s, 2 m are covered in five seconds. The checked wall extends from a quarter of a metre behind
     /// the rear head to a quarter of a metre ahead of the front head's future place.
     #[test]
-    fn passed_condition_requires_that_all_wall_in_view_and_ahead_passes() {
+    fn passed_condition_holds_only_if_all_wall_in_view_and_ahead_has_passed() {
         let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
             let mut coverage = coverage();
             for index in between {

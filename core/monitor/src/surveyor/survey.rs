@@ -12,11 +12,11 @@ use crate::observations::Observations;
 use crate::resources::{Coverage, Digests, Plan, Tally};
 use headrace_coverage::Request;
 
-/// Maximum number of runs of flagged sections that change when one section is judged: its own run and two
+/// Maximum number of missed stretches that change when one section is judged: its own stretch and two
 /// neighbours.
 const RUNS_EACH: usize = 3;
-/// Maximum number of notices per judged section: one for the section, and one for each changed run of missed
-/// sections.
+/// Maximum number of notices per judged section: one for the section, and one for each changed missed
+/// stretch.
 const NOTICES_EACH: usize = 1 + RUNS_EACH;
 
 /// Position of the surveyor in the tick's list of georeferenced pings and advice updates.
@@ -38,9 +38,9 @@ pub(super) struct Requests(pub(super) Vec<Request>);
 pub struct Found {
     /// Metres by verdict and observations that hold, at each advice update, in order.
     pub standings: Vec<Standing>,
-    /// Changed runs of flagged sections, in order.
+    /// Changed missed stretches, in order.
     pub(crate) runs: Vec<RunInput>,
-    /// Notices of changed sections and runs, in order.
+    /// Notices of changed sections and missed stretches, in order.
     pub notices: Vec<Notice>,
 }
 

@@ -78,8 +78,8 @@ type End<'w, 's> = (
     Outputs<'w>,
 );
 
-/// At the end of a dive, applies the returns that still wait as doubtful, because no more returns will come.
-/// Allocates: outside a tick only.
+/// At the end of a dive, treats the returns that still wait for classification as doubtful, because no more
+/// returns will come. Allocates: outside a tick only.
 pub(super) fn end_returns(world: &mut World) {
     let mut state = SystemState::<End<'_, '_>>::new(world);
     let Ok((mut sweeps, entities, mut coverage, tunnel, mut tally, mut outputs)) = state.get_mut(world)

@@ -14,7 +14,7 @@ const MODE_NAME_BYTES: usize = 15;
 pub enum Reason {
     /// The distance between passes is the limit, so a lower speed helps.
     HelixPitch,
-    /// A lower speed does not help, but another mode or position, or a steadier vehicle would.
+    /// A lower speed does not help. Another mode, another position or a steadier vehicle may help.
     ///
     /// The cause is the distance between neighbouring samples of one turn, the width of a strip that no head sees, or
     /// the swing of the beams.
@@ -126,7 +126,7 @@ pub struct Alternative {
     pub mode: ModeName,
     /// The largest speed that meets the target with the heads started in phase, m/s.
     ///
-    /// Zero if no speed meets it.
+    /// Zero if no speed meets the target.
     pub v_max_mps: f64,
 }
 
@@ -170,9 +170,9 @@ pub struct Advice {
     ///
     /// At lower speeds, heads that are apart along the hull run out of phase.
     pub from_mps: f64,
-    /// Speed nearest to the present one that meets the target, m/s.
+    /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
     ///
-    /// `None` if the present speed meets the target, or if no speed near the present one meets it.
+    /// `None` if the present speed meets the target, or if no speed near the present speed meets it.
     pub nearest_mps: Option<f64>,
     /// The limiting factor of the advice.
     pub reason: Reason,

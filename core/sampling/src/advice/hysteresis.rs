@@ -9,10 +9,10 @@ use headrace_geometry::time::{DurNs, MonoNs};
 const HOLD: DurNs = DurNs(1_000_000_000);
 /// Time for which a higher advised speed must last before it is displayed.
 ///
-/// The higher speed must exceed the displayed one by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
+/// The higher speed must exceed the displayed speed by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
-/// A lower advised speed is displayed at once if it is lower than the displayed one by this share.
+/// A lower advised speed is displayed at once if it is lower than the displayed speed by this share.
 ///
 /// Smaller differences are within half of the speed margin.
 const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
@@ -44,7 +44,7 @@ pub struct Hysteresis {
     may_exceed: bool,
     /// Displayed speed, m/s, and the time of the latest advice.
     shown: Option<(MonoNs, f64)>,
-    /// Time since which all advised speeds exceed the displayed one, and the lowest of these speeds, m/s.
+    /// Time since which all advised speeds exceed the displayed speed, and the lowest of the advised speeds, m/s.
     rising: Option<(MonoNs, f64)>,
 }
 
@@ -193,7 +193,7 @@ mod tests {
             let [lesser, graver] = [0, 1].map(|k| Advice::nothing(pair[k]));
             let given = [vec![speed(0.2)], vec![lesser; 10], vec![graver], vec![lesser; 8]].concat();
             let reasons: Vec<_> = shown(given).iter().map(|advice| advice.reason).collect();
-            assert_eq!(reasons[10], pair[0], "before");
+            assert_eq!(reasons[10], pair[0], "before the severe reason");
             assert_eq!(reasons[11..17], [pair[1]; 6], "the severe reason appears at once, for a second");
             assert_eq!(reasons[17..], [pair[0]; 3], "the lesser reason appears after that");
         }
@@ -252,7 +252,7 @@ mod tests {
         assert_eq!(exceed[..3], [false; 3]);
         assert_eq!(exceed[3..19], [true; 16]);
         assert_eq!(exceed[19..22], [false; 3]);
-        assert!(exceed[22], "an unseen strip is above any limit");
+        assert!(exceed[22], "the spacing at an unseen strip exceeds any limit");
         let nothing = shown(vec![Advice::nothing(Reason::NoHeadingOrFix)]);
         assert!(!nothing[0].will_exceed);
     }

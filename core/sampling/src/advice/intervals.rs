@@ -50,7 +50,7 @@ impl Driving<'_> {
 
     /// Checks whether a speed meets the target when the target is enlarged by the share `more`.
     ///
-    /// The error is a lower or equal speed, m/s; no speed between that one and the tested one meets the target.
+    /// The error is a lower or equal speed, m/s. No speed between this speed and the tested speed meets the target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
@@ -64,7 +64,7 @@ impl Driving<'_> {
             return Err(speed_mps);
         }
         let Some(unmet) = self.strips.unmet(0, &then, speed_mps, target_m, self.going) else { return Ok(()) };
-        // If a strip is narrower than the target, the samples on either side of it may meet the target.
+        // If a strip is narrower than the target, the samples on its two sides together may meet the target.
         let stays = unmet.width_m > most_m;
         let below_mps = |along_m| self.below_mps(speed_mps, unmet.gap_s, along_m).min(speed_mps);
         Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })
@@ -130,8 +130,9 @@ impl Driving<'_> {
         less_mps.min(search::kept_back_mps(fastest_mps, 1.0 - edge_mps / fastest_mps / (1.0 + STEEP), meets))
     }
 
-    /// Returns the best speed near the previous result; `None` if the spacing T there exceeds the target by over
-    /// [`EASE`].
+    /// Returns the speed with the smallest spacing T near the previous result.
+    ///
+    /// `None` if this T exceeds the target by more than [`EASE`].
     fn kept_mps(&self, last_mps: f64) -> Option<f64> {
         let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
         let best =
@@ -162,7 +163,7 @@ impl Driving<'_> {
 
     /// Returns the speed nearest to `speed_mps` that meets the target, m/s, within a factor of two.
     ///
-    /// `None` if `speed_mps` itself meets the target, or no speed within that factor does.
+    /// `None` if `speed_mps` itself meets the target, or if no speed within this factor meets it.
     pub(super) fn nearest_mps(&self, speed_mps: f64) -> Option<f64> {
         const STEPS: i32 = 70;
         const STEP: f64 = 0.01;

@@ -78,7 +78,7 @@ impl AdvisedHead {
 
     /// Recasts the head's ring.
     ///
-    /// After an error `cast_at` is `None`, and the caller keeps the last view.
+    /// After an error, `cast_at` is `None`, and the caller keeps the previous view.
     pub(super) fn cast(&mut self, profile: &Profile, pose: &Pose, ring: u32) -> Result<(), SamplingError> {
         self.cast_at = None;
         let standing = Standing::new(profile, pose, &self.spec.mount)?;

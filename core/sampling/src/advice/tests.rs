@@ -179,7 +179,7 @@ fn backward_travel_has_its_own_phases_and_remaining_length() {
 }
 
 #[test]
-fn alternative_modes_give_speed_and_duration_and_check_the_remaining_time() {
+fn advice_has_the_speed_of_each_mode_and_says_whether_the_remaining_time_suffices() {
     let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     assert_eq!(case.advice().left.suffices_at(1.0), None);
     case.left_s = Some(3000.0);
@@ -217,7 +217,8 @@ fn remedy_is_advised_if_a_lower_speed_does_not_help() {
     assert_eq!(advice.left.hours_at(advice.v_max_mps), None);
     assert!(advice.alternatives[0].unwrap().v_max_mps > 0.0);
 
-    // In this mode, samples of a turn are too far apart near the floor's corner, but not in the tunnel's centre.
+    // Near the floor's corner, the vehicle gets samples of a turn that are too far apart in this mode. In the tunnel's
+    // centre, the samples are close enough.
     case = Case::new(&[0.0], &[0.0], 0.2, 0.25);
     assert_eq!(case.advice().reason, Reason::HelixPitch);
     case.situation.pose =
@@ -241,7 +242,7 @@ fn mutual_occlusion_lowers_the_speed() {
     let mut advisor = case.advisor();
     let hidden = advisor.advise(&case.situation, Swing::default(), None);
     assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
-    // Each head has one wall hidden by its neighbour. On that wall, half of the passes are missing.
+    // From each head, its neighbour hides a strip of wall. Over these strips, half of the passes are missing.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
     // On the hidden strips, neighbouring samples of a turn are close together.
@@ -349,12 +350,12 @@ fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
     let still = advise(Swing::default());
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01, history: None };
     let swung = advise(swing);
-    // The advised speed is reduced by the speed of the swinging beams along the wall at that range.
+    // The advised speed is reduced by the speed at which the swinging beams move along the wall.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
     assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
     assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
-    // A fast swing of small extent reduces the pass distance by no more than its extent.
+    // A fast swing of small extent adds no more than this extent to the distance between passes.
     let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01, apart_rate_radps: 0.05, history: None });
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
     let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0, apart_rate_radps: 0.2, history: None });
@@ -383,8 +384,8 @@ fn vehicle_swing_widens_pass_distances_of_heads_apart_along_the_hull() {
 fn position_error_lowers_the_speed_by_its_margin() {
     let mut case = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let sure = case.advice();
-    // The first 2 mm of the standard deviation of 17 mm need no margin. Twice the other 15 mm takes 3 cm of the half
-    // metre.
+    // The first 2 mm of the standard deviation of 17 mm need no margin. Twice the other 15 mm, which is 3 cm, is
+    // subtracted from the target of 0.5 m.
     case.situation.pass_error_m = 0.017;
     let unsure = case.advice();
     let meets_m = |advice: &Advice, v_mps: f64| {
@@ -404,7 +405,7 @@ fn position_error_lowers_the_speed_by_its_margin() {
 
 /// A previously advised speed is kept only if T exceeds the target by at most `EASE`, whatever the phases become.
 #[test]
-fn retained_speed_exceeds_the_target_by_at_most_the_hysteresis() {
+fn spacing_at_a_retained_speed_exceeds_the_target_by_at_most_the_hysteresis() {
     let mut advisor = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0).advisor();
     let mut kept = 0;
     for k in 0..72 {
@@ -446,7 +447,7 @@ fn target_is_met_in_the_speed_interval_and_missed_below_it() {
 
 /// Each failed test of a speed rules out a range of speeds, and no speed in that range meets the target.
 ///
-/// The heads are anywhere along the hull and side by side, with hidden wall, swing and position errors.
+/// The heads are at random places along and across the hull, with hidden wall, swing and position errors.
 #[test]
 fn speed_search_rules_out_no_speed_that_meets_the_target() {
     let mut seed = 7_u64;
@@ -556,8 +557,8 @@ fn nearest_and_highest_speed_intervals_are_advised() {
         };
         outside += 1;
         assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
-        // Any speed closer to the present one by more than the search step of 1 % misses the target, except in narrow
-        // intervals.
+        // All speeds that are nearer to the present speed miss the target. The search step of 1 % is left out. The
+        // limit is 0.48 m instead of 0.5 m, because the search may miss narrow intervals.
         let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
         for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
             let by = math::exp(nearer);
@@ -611,7 +612,7 @@ fn speed_margin_is_larger_where_the_spacing_grows_faster_than_speed() {
 }
 
 #[test]
-fn mean_share_of_lost_returns_is_the_mean_over_all_heads() {
+fn share_of_lost_returns_is_the_mean_over_all_heads() {
     assert!((mean([0.1, 0.2, 0.6].into_iter()) - 0.3).abs() < 1e-12);
     assert!(mean(core::iter::empty()).abs() <= 0.0);
 }

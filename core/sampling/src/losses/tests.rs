@@ -91,7 +91,7 @@ fn required_passes_leave_no_hole_in_19_of_20_stretches() {
         for (seed, rate) in (1..).zip(rates) {
             let passes = passes(t_y_m, &[rate]);
             let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
-            // The tolerance covers a sample of 80 stretches of wall in which neighbouring stretches share holes.
+            // The tolerance allows for the small number of stretches, and for holes that neighbours share.
             assert!(share >= 0.87, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
         }
     }
@@ -144,14 +144,14 @@ fn required_passes_grow_continuously_with_losses() {
 }
 
 #[test]
-fn no_extra_passes_are_needed_without_losses_or_a_possible_speed() {
+fn no_extra_passes_are_needed_without_losses_or_if_no_speed_meets_the_target() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
     // If samples of a turn are farther apart than the target, no speed meets the target.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
 
-/// Chance losses often make small holes and never large ones.
+/// Chance losses often make small holes, and never large holes.
 ///
 /// Without chance losses, no hole counts as caused by chance.
 #[test]
@@ -163,7 +163,7 @@ fn hole_is_attributed_to_chance_if_enough_losses_can_coincide() {
     let [never, runs] = [LossRate::default(), LossRate { share: 0.58, after_lost: 0.98 }];
     assert!(!hole(0.55, never));
     assert!(hole(2.0, runs), "most of each turn is lost in long runs");
-    // A hole that counts as caused by chance still counts so with higher losses, and so do smaller holes.
+    // If a hole counts as caused by chance, smaller holes do so, too, and so does the same hole with higher losses.
     for share in 1..9 {
         let rate = LossRate::independent(f64::from(share) / 10.0);
         let largest = |from: i32| (from..60).rev().find(|n| hole(f64::from(*n) / 20.0, rate)).unwrap_or(0);

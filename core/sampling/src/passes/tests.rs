@@ -51,15 +51,15 @@ fn place_hidden_from_some_heads_has_longer_times_between_passes() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-    // Without two of four heads that are half a turn apart, the longest gap doubles. Without two that are a quarter
-    // turn apart, two successive passes are missing.
+    // The place is hidden from two of four heads. If these two are half a turn apart, the longest gap doubles. If they
+    // are a quarter turn apart, two successive passes are missing.
     assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
     assert_eq!(passes.gap_s(HeadSet::default()), None);
     assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
 }
 
 #[test]
-fn time_for_several_passes_is_the_longest_over_all_starts() {
+fn time_for_several_passes_is_the_time_of_the_slowest_sequence() {
     let even = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let time_s = |heads: HeadSet, needed: f64| even.time_for_s(heads, even.gap_s(heads).unwrap(), needed);
     let all = even.heads();
@@ -158,7 +158,7 @@ fn measured_sector_is_ignored_in_a_phase_shift_layout() {
 }
 
 #[test]
-fn remaining_heads_pass_at_equal_intervals() {
+fn planned_heads_without_a_failed_head_pass_at_equal_intervals() {
     let three = Passes::evenly_phased(HeadSet::first(4).without(1), |_| 9.0).unwrap();
     assert!((all(&three) - 3.0).abs() < 1e-12);
     let none = HeadSet::default();
@@ -179,7 +179,7 @@ fn parallax_is_larger_in_a_narrow_tunnel() {
 
 /// The mean distance does not depend on the position of the vehicle's origin along the hull.
 #[test]
-fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
+fn mean_distance_between_successive_heads_is_a_share_of_the_largest_distance() {
     for origin_m in [-3.0, 0.0, 0.4, 5.0] {
         let at = |x_m: &[f64]| {
             let x_m: Vec<f64> = x_m.iter().map(|x_m| x_m + origin_m).collect();
@@ -191,8 +191,7 @@ fn mean_distance_of_successive_heads_is_given_relative_to_their_spread() {
             (vec![0.9, -0.3], 1.2, 1.0),
             (vec![0.9, 0.9, -0.3, -0.3], 1.2, 0.5),
             (vec![0.9, -0.3, 0.9, -0.3], 1.2, 1.0),
-            // The mean is over two distances of half the spread, and the whole spread from the last head back to the
-            // first.
+            // The mean of 0.4 m, 0.4 m, and 0.8 m from the last head back to the first, is two thirds of 0.8 m.
             (vec![0.0, 0.4, 0.8], 0.8, 2.0 / 3.0),
             (vec![0.7, 0.7], 0.0, 0.0),
             (vec![0.7], 0.0, 0.0),

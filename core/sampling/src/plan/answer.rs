@@ -92,7 +92,7 @@ pub struct Spacing {
     pub t_min_m: f64,
     /// T_mean: mean spacing of samples. Eq. 17.
     pub t_mean_m: f64,
-    /// Largest T_max over all tolerated poses; `None` if no head sees some strip. Eq. 16.
+    /// Largest T_max over all tolerated poses; `None` if there is a strip that no head sees. Eq. 16.
     ///
     /// Hidden strips are included.
     pub t_max_m: Option<f64>,

@@ -19,11 +19,11 @@ pub struct Briefing {
     pub speed_mps: f64,
     /// Angles hidden from each head.
     pub hidden: Vec<Hidden>,
-    /// Strips of the wall with fewer passes than the rest, or with none.
+    /// Strips of the wall with fewer passes than the rest of the wall, or with no passes.
     pub strips: Vec<ThinStrip>,
     /// Start angle and direction of each head.
     pub starts: Vec<Start>,
-    /// Spacing rule for heads that are apart along the hull and start at equal angles.
+    /// Spacing rule for each head that is behind the foremost head.
     pub hull_rules: Vec<HullAdvice>,
     /// Pairs of heads that can receive each other's pings.
     pub exposures: Vec<Heard>,
@@ -72,18 +72,18 @@ pub struct Start {
     pub sector_deg: Option<[f64; 2]>,
 }
 
-/// The rule x = q v T / s for the distance of a head behind the foremost head.
+/// The rule x = q v T / s for the distance x of a head behind the foremost head, see [`layout::HullRule`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HullAdvice {
     /// Number of the head to which the rule applies.
     pub head: usize,
     /// Distance x of the head behind the foremost head, m.
     pub behind_m: f64,
-    /// Number q of s-ths of a turn in which the vehicle travels the distance x, rounded to the nearest.
+    /// q: time in which the vehicle travels the distance x, in units of T / s, rounded to the nearest whole number.
     pub q: u32,
-    /// The speed v that fits the rule, m/s.
+    /// Speed v that meets the rule with the present distance `behind_m`, m/s.
     pub speed_mps: f64,
-    /// The distance x that fits the rule, m.
+    /// Distance x that meets the rule at the speed of the briefing, m.
     pub apart_m: f64,
 }
 

@@ -11,7 +11,7 @@ const GAP_M: f64 = 0.05;
 /// Distance below which two mounts count as the same, m.
 const SAME_M: f64 = 0.01;
 
-/// Heads in line along the hull, so that no head hides the wall from another.
+/// Heads in line along the hull, so that no head hides the wall from another head.
 ///
 /// The line passes through the mean position of the heads as mounted now.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -19,7 +19,7 @@ use headrace_geometry::tunnel::{Profile, Yz};
 /// A pilot keeps a speed within 5 %, and heads that are apart along the hull are in phase only near the planned
 /// speed. See docs/why/field.md.
 pub const HELD_SHARE: f64 = 0.95;
-/// Number of ray-cast soundings per turn: soundings 0.1 degrees apart cover many start angles of each head step.
+/// Number of rays that are cast per turn. Rays 0.1 degrees apart cover many start angles of each head step.
 pub(super) const RING: u32 = 3600;
 
 /// Maximum number of iterations until the speed converges.
@@ -267,8 +267,8 @@ impl Planner {
                 shift_m: stance.shift_m,
                 apart_m: stance.apart_m,
                 apart_swing_mps: swing_mps,
-                // The vehicle swings at most from the tolerated yaw on one side to that on the other side. Without a
-                // yaw tolerance, a yaw rate may last indefinitely.
+                // The vehicle swings at most from the tolerated yaw on one side to the tolerated yaw on the other side.
+                // Without a yaw tolerance, a yaw rate may last indefinitely.
                 swing_most_m: (yaw_rad > 0.0).then_some(2.0 * yaw_rad * stance.farthest_m),
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
@@ -286,7 +286,7 @@ impl Planner {
         Some((gap_s(planned.passes.heads())?, longest))
     }
 
-    /// The strips of the wall, each seen by the same heads, at the nominal pose.
+    /// The strips of the wall at the nominal pose. The same heads see all places of a strip.
     pub fn nominal_strips(&self) -> Option<&Strips> {
         self.stances.first().map(|stance| &stance.strips)
     }
@@ -474,7 +474,7 @@ fn views(
     pose: &Pose,
     rings: &[Ring],
 ) -> Result<Vec<View>, SamplingError> {
-    /// Capacity for stretches of wall outside the range limits: every other sounding.
+    /// Capacity for stretches of wall outside the range limits: half the number of rays.
     const OUT_OF_REACH: usize = RING as usize / 2;
     let programs = layout::programs(specs, inspection.layout, 0.0)?;
     let mut views = Vec::with_capacity(specs.len());

@@ -93,7 +93,7 @@ fn footprint_on_a_flat_wall_equals_the_closed_form() {
 }
 
 #[test]
-fn yaw_widens_sample_spacing_and_beam_along_the_tunnel_is_an_error() {
+fn yaw_widens_sample_spacing_until_a_beam_along_the_tunnel_is_an_error() {
     let profile = shapes::ceran().unwrap();
     let turned = pose(&profile, 0.0, 0.0, f64::to_radians(15.0));
     let head = Standing::new(&profile, &turned, &mount()).unwrap();
@@ -117,7 +117,7 @@ fn yaw_widens_sample_spacing_and_beam_along_the_tunnel_is_an_error() {
 }
 
 #[test]
-fn largest_sample_distance_over_every_eighth_ray_equals_that_of_a_coarser_head() {
+fn largest_sample_distance_over_every_eighth_ray_equals_the_distance_of_a_coarser_head() {
     let profile = shapes::ceran().unwrap();
     let fine = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let coarse = |start: u32| {

@@ -80,13 +80,13 @@ impl Limit {
 
 /// Diameter of the largest circle between two rows of samples, m.
 ///
-/// Samples in a row are `along_m` apart, and the rows are `across_m` apart. One row is shifted along the tunnel by
-/// half of `along_m`, by the share `uneven` of it and by +-`moved_m`. The shift ends at most where the rows are
-/// level.
+/// Samples in a row are `along_m` apart, and the rows are `across_m` apart. One row is shifted along the tunnel by half
+/// of `along_m`, by the share `uneven` of `along_m`, and by +-`moved_m`. The largest effective shift is `along_m`: the
+/// samples of both rows are then at the same chainages.
 ///
 /// The circle passes through two samples of a row and the sample of the other row between them, at distances a and b
-/// along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c = `across_m`. If c^2 < a b, its centre is not
-/// between the rows. In that case, two samples of one row limit a circle centred on that row.
+/// along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c = `across_m`. If c^2 < a b, the circle's centre is
+/// not between the rows. In that case, two samples of one row limit a circle centred on that row.
 fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let off_m = (uneven * along_m + moved_m).min(along_m / 2.0);
     let square = |x_m: f64| x_m * x_m;
@@ -137,8 +137,8 @@ mod tests {
                 let told_m = staggered_m(along_m, across_m, uneven, 0.0);
                 let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
                 assert!(widest_m <= told_m + 1e-9, "{what}");
-                // If no circle has its centre between the rows, the samples of the other row limit the space on a
-                // row.
+                // If the circle's centre is not between the rows, `told_m` is only an upper bound: the samples of the
+                // other row also limit a circle that is centred on a row.
                 let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
                 assert!(!is_between || widest_m > told_m - 0.005, "{what}");
                 assert!((staggered_m(along_m, across_m, 0.0, uneven * along_m) - told_m).abs() < 1e-12);
@@ -146,7 +146,7 @@ mod tests {
                 assert!((back_m - along_m).abs() < 1e-9, "{what}: {back_m}");
             }
         }
-        // If the rows are level, their samples form the corners of a rectangle.
+        // If the samples of both rows are at the same chainages, they form rectangles of 0.4 m by 0.3 m.
         assert!((staggered_m(0.4, 0.3, 0.5, 0.0) - 0.5).abs() < 1e-12);
         assert!((staggered_m(0.4, 0.3, 0.3, 1.0) - 0.5).abs() < 1e-12);
     }

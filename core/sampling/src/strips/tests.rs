@@ -92,10 +92,10 @@ fn fewer_passes_on_a_hidden_strip_lower_the_speed() {
 #[test]
 fn narrow_hidden_strip_counts_like_a_large_distance_between_samples() {
     let some = strips(&[all_around(&[arc(7.0, 0.1)]), all_around(&[])]);
-    // The last pings on either side may be one step away from the hidden strip.
+    // On each side, the nearest ping may be one step away from the hidden strip.
     let v = speed(&some, &turning(2), 0.8).unwrap();
     assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
-    // A hidden strip counts even if it is narrower than the spacing of the ring's soundings.
+    // A hidden strip counts even if it is narrower than the distance between two rays on the wall.
     let sliver = strips(&[all_around(&[arc(7.0013, 1e-4)])]);
     let v = speed(&sliver, &turning(1), 0.8).unwrap();
     assert!((v - closed(0.8, 0.4001, 8.0)).abs() < 1e-9, "{v}: {sliver:?}");
@@ -253,7 +253,7 @@ fn wall_beyond_the_range_limits_counts_as_hidden() {
         view.hidden
     };
     assert!(hidden([0.1, 5.0]).is_empty());
-    // The distances of the four corners are 4.5 m, and those of the end walls 4 m.
+    // The four corners are 4.5 m away, and the end walls 4 m.
     let corners = hidden([0.1, 4.2]);
     assert_eq!(corners.len(), 4);
     let far_m: f64 = corners.iter().map(|arc| arc.length_m).sum();
@@ -276,7 +276,7 @@ fn overlapping_hidden_arcs_across_the_seam_form_one_strip() {
 }
 
 #[test]
-fn obstacle_list_at_capacity_overestimates_hidden_wall() {
+fn full_list_of_hidden_arcs_overestimates_the_hidden_wall() {
     // Slots in the wall all around the profile are outside the range limits. One of the two views has too little
     // capacity for the slots.
     let points: Vec<[f64; 2]> = (0..240)

@@ -5,7 +5,7 @@ use crate::passes::Passes;
 
 /// Number of head sets for which the longest time between passes is stored.
 ///
-/// If strips are hidden from one or two heads, there are rarely more different head sets.
+/// There are rarely more different head sets, because strips are usually hidden from one or two heads.
 const SETS: usize = 8;
 /// Number of strips whose head set is cached; for other strips, the time between passes is computed again.
 const STRIPS: usize = 64;

@@ -40,7 +40,7 @@ impl Arc {
         })
     }
 
-    /// Joins this arc with the next one in the head's direction of rotation.
+    /// Joins this arc with the next arc in the head's direction of rotation.
     pub(super) fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
         let (first, last) = if forward { (self, next) } else { (next, self) };
         let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
@@ -86,9 +86,9 @@ impl Sector {
 
     /// Longest time between two passes over the part of the sector that contains this place, 0.5 to 1.
     ///
-    /// The time is a share of a sweep there and back; `None` outside the sector. At a turning point, one pass follows
-    /// another immediately, and the next comes a whole sweep later. In the middle of the sector, passes are evenly
-    /// spaced. A circle between two legs of the zigzag is at most as wide as the legs' distance at its centre.
+    /// The time is a share of a sweep there and back; `None` outside the sector. At a turning point, a second pass
+    /// follows immediately, and the third pass comes a whole sweep later. In the middle of the sector, passes are
+    /// evenly spaced. A circle between two legs of the zigzag is at most as wide as the legs' distance at its centre.
     /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
     pub(super) fn wait(&self, arc_m: f64, perimeter_m: f64) -> Option<f64> {
         let number = self.parts.iter().position(|part| part.has(arc_m, perimeter_m))?;
@@ -120,7 +120,7 @@ stateful!(View { state: sector; lists: hidden; });
 impl View {
     /// Hides the parts of a ring that are outside the head's range limits.
     ///
-    /// Without capacity for another arc, the function extends the last arc over the visible wall up to the new arc.
+    /// Without capacity for another arc, the function extends the latest arc over visible wall to include the new arc.
     /// Hiding too much wall is the safe error.
     ///
     /// Allocates: not if the capacity suffices for one arc.

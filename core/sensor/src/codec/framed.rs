@@ -1,4 +1,4 @@
-//! Search for frames that rescans the bytes of a failed frame candidate; shared by all codecs.
+//! Search for frames in received bytes, shared by all codecs. The bytes of a failed candidate are searched again.
 
 use super::interface::{Codec, CodecCounts};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};

@@ -72,8 +72,8 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Returns the time of the next push of an empty slice, after which an incomplete frame no longer holds back
-    /// others.
+    /// Returns the time at which to push an empty slice. After this push, an incomplete frame no longer holds back
+    /// other frames.
     ///
     /// `None` if no bytes are pending, or if the silence has been handled.
     pub fn settles(&self) -> Option<MonoNs> {

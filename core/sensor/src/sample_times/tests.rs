@@ -47,7 +47,7 @@ fn worst_ns(times: &[(MonoNs, MonoNs)]) -> i64 {
 
 #[test]
 fn samples_of_a_burst_are_separated() {
-    // Of every forty samples, one arrives 25 ms late and the nine after it arrive at the same time.
+    // In every forty samples, one arrives 25 ms late, and the nine after it arrive at the same time.
     let burst = |k: i64| if k % 40 < 10 { (10 - k % 40) * PERIOD.0 } else { 0 };
     let delays: Vec<i64> = (20..20_020).map(burst).collect();
     let off = worst_ns(&times(&delays, in_step));

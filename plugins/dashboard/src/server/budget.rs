@@ -17,7 +17,7 @@ struct Rate {
     per_s: f64,
 }
 
-/// Number of requests left in a budget, and the time at which it was so.
+/// Number of requests left in a budget, and the time for which this number is right.
 #[derive(Debug, Clone, Copy)]
 struct Left(f64, Instant);
 

@@ -31,7 +31,7 @@ impl Client {
         }
         let lines = headers.get_all(FORWARDED_FOR).iter().filter_map(|line| line.to_str().ok());
         let passed: Vec<_> = lines.flat_map(|line| line.split(',')).collect();
-        // Only declared proxies are trusted. Addresses to the left of the last untrusted one may be forged.
+        // Only declared proxies are trusted. Addresses to the left of the rightmost untrusted address may be forged.
         let addresses = passed.iter().rev().map_while(|text| text.trim().parse::<IpAddr>().ok());
         Self::of_address(addresses.into_iter().find(|address| !is_proxy(address)).unwrap_or(peer))
     }

@@ -30,7 +30,7 @@ const MOST_AFTER_CLOSE: usize = 64;
 /// Maximum rate of messages from a viewer, per second.
 pub(super) const MOST_PER_S: f64 = 20.0;
 
-/// Run and number of the last message that a viewer received before it lost its connection.
+/// Instance of the dive, and number of the last message that a viewer received before it lost its connection.
 pub(super) struct Resume {
     pub(super) instance: String,
     pub(super) since: u64,

@@ -129,7 +129,7 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Let each new connection run before so many others arrive that it is closed for them.
+        // Let each new connection run. Otherwise so many others might arrive first that it would be closed for them.
         tokio::task::yield_now().await;
     }
 }

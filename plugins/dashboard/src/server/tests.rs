@@ -278,9 +278,16 @@ fn wrong_tokens_in_all_headers_share_one_budget() {
     assert!(spent("GET /state.json", bearer) && spent("GET /state.json?token=wrong", ""));
     assert!(spent("GET /login?token=wrong", "") && spent("GET /metrics", "Cookie: headrace_token=wrong\r\n"));
     assert!(spent("POST /actions/mark", bearer) && spent("POST /voice/1?seconds=1", bearer));
-    assert!(spent("GET /state.json", OPERATOR), "a right token isn't compared");
-    assert_eq!(served.ask("GET /", bearer, "").0, 200, "the page itself needs none");
-    assert_eq!(ask(&mut right, "GET /state.json", OPERATOR, "").0, 200, "its connection has shown it before");
+    assert!(
+        spent("GET /state.json", OPERATOR),
+        "an address without guesses is refused even with a right token"
+    );
+    assert_eq!(served.ask("GET /", bearer, "").0, 200, "the page itself needs no token");
+    assert_eq!(
+        ask(&mut right, "GET /state.json", OPERATOR, "").0,
+        200,
+        "this connection has shown its token before"
+    );
     assert_ne!(
         ask(&mut right, "GET /state.json", VIEWER, "").0,
         200,

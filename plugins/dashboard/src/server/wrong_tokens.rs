@@ -10,7 +10,7 @@ use super::client::Client;
 const MOST_WRONG: usize = 256;
 const MOST_WRONG_OF_CLIENT: usize = 4;
 
-/// Hashes of wrong tokens by client, the latest last.
+/// Hashes of wrong tokens by client, the latest at the end.
 ///
 /// A repeated wrong token isn't a new guess. Old tokens in a browser's tabs therefore don't exhaust the budget of
 /// their address.

@@ -119,7 +119,7 @@ pub enum CommandError {
 
 /// Linear scale of a byte: value = zero + code * num / den.
 ///
-/// The factor is a fraction, since a product with 0.3 or 0.01 is off in the last place for some codes.
+/// The factor is a fraction, since a product with 0.3 or 0.01 has a rounding error for some codes.
 struct Scale {
     field: &'static str,
     unit: &'static str,
@@ -286,7 +286,7 @@ pub(crate) fn step_deg(counts: u8) -> f64 {
     STEP.value(counts)
 }
 
-/// Largest step supported by the head that has at most `counts` counts.
+/// Largest step of the head that is not above `counts`. Steps are in counts of 0.3 degrees.
 pub(crate) fn step_at_most(counts: i32) -> u8 {
     STEP_CODES.into_iter().rfind(|code| i32::from(*code) <= counts).unwrap_or(0)
 }

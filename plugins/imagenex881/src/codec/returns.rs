@@ -23,11 +23,11 @@ const COARSE_FROM_M: u8 = 5;
 /// Type of a return, which its tag states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tag {
-    /// `IMX`: echo at the 25-point setting.
+    /// `IMX`: echo of nominally 250 points.
     Imx,
-    /// `IGX`: echo at the 50-point setting.
+    /// `IGX`: echo of 500 points.
     Igx,
-    /// Return of a GS model, which has attitude sensors.
+    /// `IPX`: profile point only, without an echo.
     Ipx,
     /// Return of a GS model, which has attitude sensors.
     Ina,

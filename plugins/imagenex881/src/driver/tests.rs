@@ -40,7 +40,7 @@ struct Rig {
     sent: Vec<MonoNs>,
     outbox: Vec<Vec<u8>>,
     answers: usize,
-    /// Whether the last answer has been duplicated.
+    /// Whether the latest answer has been duplicated.
     doubled: bool,
     /// Time and position of each ping whose return was delivered and has the dive's range setting.
     pings: Vec<(MonoNs, u16)>,
@@ -227,7 +227,7 @@ fn head_is_homed_to_its_scan_program_from_any_position() {
 }
 
 #[test]
-fn heads_keep_their_phases_independently() {
+fn two_heads_with_separate_drivers_keep_their_phase_difference() {
     let pings: Vec<_> = [0.0, TAU / 2.0]
         .into_iter()
         .map(|start_rad| {
@@ -243,7 +243,7 @@ fn heads_keep_their_phases_independently() {
 }
 
 #[test]
-fn line_fault_loses_only_its_own_pings_and_the_phase_recovers() {
+fn line_fault_loses_only_the_affected_pings_and_the_phase_recovers() {
     let faults = [
         Faults { lost_commands: vec![300], ..Faults::default() },
         Faults { lost_answers: vec![300, 310], ..Faults::default() },
@@ -293,7 +293,7 @@ fn power_cycled_head_is_located_and_homed() {
 }
 
 #[test]
-fn silent_head_is_polled_less_often_but_without_end() {
+fn silent_head_is_polled_less_often_but_never_given_up() {
     let faults = Faults { lost_commands: (0..10_000).collect(), ..Faults::default() };
     let mut rig = Rig::new("mode = \"fast\"", turning(0.0, true), 0.0, faults);
     rig.run(after_s(100));

@@ -89,7 +89,7 @@ fn wall_beyond_the_range_setting_gives_no_echo() {
 }
 
 #[test]
-fn turn_ends_at_its_start_angle_and_continues_in_either_direction() {
+fn second_turn_repeats_the_angles_of_the_first_in_either_direction() {
     for (mode, step) in [("slow", 1), ("medium", 2), ("fast", 3), ("faster", 4), ("fastest", 8)] {
         for growing in [true, false] {
             let pings = 1200 / step as usize;
@@ -106,7 +106,7 @@ fn turn_ends_at_its_start_angle_and_continues_in_either_direction() {
 }
 
 #[test]
-fn inverted_angle_sign_and_offset_keep_the_scan_program_in_the_sensor_frame() {
+fn angle_sign_and_offset_do_not_move_the_scan_program_in_the_sensor_frame() {
     let text = "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 33";
     let run = run(text, DurNs::ZERO, turning(PI / 2.0, true), 50);
     for (k, got) in (0..).zip(counts(&run)) {

@@ -173,7 +173,7 @@ fn frames_outside_the_message_set_are_ignored_and_wrong_lengths_are_bad() {
 
 #[test]
 fn frame_over_eight_bytes_is_skipped_completely() {
-    // A CAN FD frame of 72 bytes. Its data would parse as further frames.
+    // A CAN FD frame of 72 bytes. If its data were parsed, they would give more frames.
     let mut bytes = [0; 72];
     bytes[0] = 0x34;
     bytes[4] = 12;

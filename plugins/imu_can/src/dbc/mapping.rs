@@ -130,11 +130,11 @@ pub struct Stamp {
 pub struct Conditions {
     /// Condition for the validity of all readings.
     pub all: Option<Condition>,
-    /// Further condition for the validity of attitude.
+    /// Additional condition for the validity of attitude.
     pub attitude: Option<Condition>,
-    /// Further condition for the validity of turn rate.
+    /// Additional condition for the validity of turn rate.
     pub rate: Option<Condition>,
-    /// Further condition for the validity of specific force.
+    /// Additional condition for the validity of specific force.
     pub force: Option<Condition>,
 }
 

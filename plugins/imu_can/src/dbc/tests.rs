@@ -47,7 +47,7 @@ rate_valid = { signal = "ImuStatus", mask = 0x2E1 }
 sample_time = "ImuTime"
 "#;
 
-/// DBC text with the further content that files of whole vehicles have.
+/// DBC text that also has the other content of files for whole vehicles, such as comments and value tables.
 const RICH: &str = "VERSION \"1\"\n\nNS_ :\n\tNS_DESC_\n\tCM_\n\tBA_DEF_\n\nBS_:\n\nBU_: U H\n\
 VAL_TABLE_ OnOff 1 \"on\" 0 \"off\" ;\n\n\
 BO_ 2147483748 A: 8 U\n SG_ Rate : 7|16@0- (0.01,-1) [-10|10] \"deg/s\" Vector__XXX\n\
@@ -274,7 +274,7 @@ fn vector_in_several_frames_is_reported_when_its_last_frame_arrives() {
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
     assert!([force.x(), force.y(), force.z()].iter().all(|mps2| (mps2 - 0.5 * 9.806_65).abs() < 1e-3));
     assert_eq!(got[0].valid_at, MonoNs(9_000_000));
-    // After a lost frame, the remaining components aren't combined with the next sample. The sample after that is
+    // After a lost frame, the components that did arrive aren't combined with the next sample. The next sample is
     // complete.
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len()), (0, 0));
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len(), send(0x576, 1).len()), (0, 0, 1));
@@ -415,7 +415,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
 }
 
 #[test]
-fn emulated_unit_round_trips_by_its_dbc() {
+fn readings_decoded_with_a_dbc_match_the_motion_of_the_emulated_unit() {
     let paged = "[signals]\nrate = [\"Low\", \"F32\", \"High\"]\n".to_owned();
     let cases = [
         ("xsens.dbc", XSENS, XSENS_KEYS.to_owned(), 3),

@@ -13,7 +13,7 @@ pub const ACCELERATION_QUANTUM_MPS2: f64 = 1e-2;
 pub const RATE_QUANTUM_RADPS: f64 = 1e-3;
 /// Quaternion component of one count.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
-/// Euler angle, or accuracy of one, of one count, radians.
+/// Euler angle of one count, radians. Accuracies of Euler angles have the same count.
 pub const EULER_QUANTUM_RAD: f64 = 1e-4;
 /// Temperature difference of one count, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1e-2;

@@ -332,7 +332,7 @@ impl Message {
 
     /// Encodes the message as a frame from one device id to another. The frame replaces the content of `frame`.
     ///
-    /// The caller passes `frame`, since frames are as large as the longest message.
+    /// The caller passes the buffer `frame`, since it is large: it can hold the longest message.
     ///
     /// Errors: the payload is longer than [`MAX_PAYLOAD_BYTES`], or the id may not be sent as [`Message::Other`].
     pub fn encode_to(

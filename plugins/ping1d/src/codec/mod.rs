@@ -36,8 +36,8 @@ impl Addressed {
 
 /// Separates messages in a byte stream, in either direction.
 ///
-/// A frame with a known id is rejected as soon as its length doesn't fit its message. A false length therefore hides no
-/// further frames. Only texts and unknown messages have no length to check.
+/// A frame with a known id is rejected as soon as its length doesn't fit its message. A false length therefore hides
+/// none of the following frames. Only texts and unknown messages have no length to check.
 /// Source: Ping protocol, packet format.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frames;

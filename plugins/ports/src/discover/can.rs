@@ -40,7 +40,7 @@ fn has_hardware(machine: &Machine, name: &str) -> bool {
     machine.exists(&format!("{CLASS}/{name}/device"))
 }
 
-/// Returns the open error of an interface that is down; `None` if it is up or its flags can't be read.
+/// Returns the error for an interface that is down; `None` if it is up or its flags can't be read.
 pub(crate) fn down(machine: &Machine, name: &str) -> Option<OpenError> {
     if is_up(machine, name)? {
         return None;

@@ -37,7 +37,7 @@ impl Machine {
         Self { root: root.to_owned(), user }
     }
 
-    /// Returns where the machine's file `absolute` is on this host.
+    /// Returns the path on this host of the machine's file `absolute`.
     pub(super) fn path(&self, absolute: &str) -> PathBuf {
         self.root.join(absolute.trim_start_matches('/'))
     }

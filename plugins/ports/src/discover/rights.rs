@@ -53,7 +53,7 @@ impl Rights {
         })
     }
 
-    /// Returns the open error if the user can't open the device file.
+    /// Returns the error for a device file that the user can't open.
     pub(super) fn trouble(&self, path: &str) -> Option<OpenError> {
         (!self.may_open).then(|| OpenError::denied(path, &self.remedy(path)))
     }

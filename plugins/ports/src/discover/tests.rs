@@ -149,7 +149,7 @@ fn usb_ports_have_stable_names() {
 #[test]
 fn ttys_without_hardware_are_not_listed() {
     let tree = Tree::new("phantoms");
-    // A console without hardware, an undetected UART, and a port announced by firmware.
+    // A console without hardware, a detected UART (type 4), and a UART that only firmware announces (type 0).
     tree.file("/sys/class/tty/tty1/uevent", "");
     for (name, kind) in [("ttyS0", "4\n"), ("ttyS1", "0\n")] {
         tree.file(&format!("/sys/class/tty/{name}/type"), kind);
@@ -188,14 +188,14 @@ fn denied_user_gets_the_command_that_grants_access() {
     }
     tree.device("/dev/ttyUSB0", 0o660);
     assert_eq!(said(&tree.seen_by_member(), connect), "There(\"/dev/ttyUSB0\")");
-    assert_eq!(said(&tree.seen_by(0, &[0]), connect), "There(\"/dev/ttyUSB0\")", "root may");
+    assert_eq!(said(&tree.seen_by(0, &[0]), connect), "There(\"/dev/ttyUSB0\")", "root may open it");
     tree.device("/dev/ttyUSB0", 0o666);
     assert_eq!(said(&tree.seen_by_stranger(), connect), "There(\"/dev/ttyUSB0\")");
     assert!(said(&tree.seen_by_stranger(), "serial:/dev/ttyUSB7").contains("there is no such port"));
 }
 
 #[test]
-fn tether_counters_are_named_by_ids_and_serial_number() {
+fn connect_of_a_tether_counter_has_ids_and_serial_number() {
     let tree = Tree::new("hid");
     tree.hid("hidraw0", "COUNTER-7", 0o600);
     tree.hid("hidraw1", "COUNTER-8", 0o660);

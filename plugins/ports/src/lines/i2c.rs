@@ -69,7 +69,7 @@ mod tests {
 
     use super::*;
 
-    /// A bus with one device, which answers with the first byte of the last write.
+    /// A bus with one device, which answers with the first byte of the latest write.
     struct Echo(Vec<u8>);
 
     impl ErrorType for Echo {

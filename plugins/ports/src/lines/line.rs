@@ -11,7 +11,7 @@ use headrace_sensor::driver::IgnoredSenders;
 /// Maximum number of bytes returned by one read.
 pub const READ_BYTES: usize = 2048;
 
-/// Accepted and rejected senders on a line that accepts any sender. They are kept when the line is reopened.
+/// Accepted and rejected senders of a line to which any machine may send. They are kept when the line is reopened.
 #[derive(Default)]
 pub struct Senders {
     /// The accepted sender, which is taken to be the device.
@@ -30,8 +30,7 @@ pub trait Line: Send {
     /// Errors: the connection is lost.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
 
-    /// Reads as [`Line::read`]. On a line that accepts any sender, returns only bytes of the first sender with a
-    /// valid message.
+    /// Reads as [`Line::read`]. On a line to which any machine may send, returns only bytes of the accepted sender.
     ///
     /// Errors: the connection is lost.
     fn read_device(

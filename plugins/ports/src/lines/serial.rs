@@ -38,7 +38,7 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, OpenEr
     Ok(Box::new(Serial { port, byte_time, emptied: clock::now() }))
 }
 
-/// Converts an error of the serial crate, which reports a port locked by another program as absent.
+/// Corrects an error of the serial crate: the crate reports a port as absent if another program has locked it.
 fn cause(path: &str, error: serialport::Error) -> io::Error {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let opened = rustix::fs::open(path, flags, Mode::empty());
@@ -76,7 +76,8 @@ impl Line for Serial {
             return Err(io::Error::new(io::ErrorKind::BrokenPipe, "the port is gone"));
         }
         let now = clock::now();
-        // The first byte is backdated by the line time of all bytes, but not before the port was last found empty.
+        // The time of the first byte is `now` less the line time of all bytes, but not before the port was last found
+        // empty.
         let ago = DurNs(self.byte_time.0.saturating_mul(i64::try_from(count).unwrap_or(0)));
         let first = (now - ago).max(self.emptied).min(now);
         if count < into.len() {

@@ -151,7 +151,7 @@ fn refuse(from: SocketAddr, messages: u64, senders: &mut Senders) {
 }
 
 impl Line for UdpListen {
-    /// Reads from any sender, which only probing needs.
+    /// Accepts any sender. Only probing calls this.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         self.read_device(wait, into, &mut Senders::default(), &|_| true)
     }
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn first_valid_sender_is_pinned_and_gets_the_commands() {
+    fn only_the_first_valid_sender_is_accepted_and_gets_commands() {
         let (mut place, device, stranger) = (Place::new(""), sender(), sender());
         place.tell(&stranger, "x");
         assert_eq!(place.heard(WAIT), None);

@@ -26,7 +26,7 @@ pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
 
 const NO_RECORD: &str = "no bag record";
 
-/// The bag format. Its streams are the sensors' ids.
+/// The bag format. Its streams are named after the sensors' ids.
 #[derive(Default)]
 pub struct Bag {
     feeds: Feeds,
@@ -146,8 +146,8 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
-    // In a damaged file the lengths may be arbitrary. Most wrong lengths are detected because no field name, which
-    // begins with a lower-case letter, follows.
+    // In a damaged file the lengths may be arbitrary. A field name must follow, and begins with a lower-case letter.
+    // This check detects most wrong lengths.
     if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
         return Err(Stop::Bad);
     }

@@ -38,7 +38,8 @@ fn chunk(records: &[Vec<u8>]) -> Vec<u8> {
     whole(5, &[("compression", b"none"), ("size", &size)], &bytes)
 }
 
-/// Builds a bag from chunks and index records. Its header states the start of the index, and the numbers of both.
+/// Builds a bag from chunks and index records. The bag's header states the start of the index, the number of index
+/// records, and the number of chunks.
 fn bag(chunks: &[Vec<u8>], index: &[Vec<u8>]) -> Vec<u8> {
     let header = |at: usize| {
         let connections = u32::try_from(index.len()).unwrap().to_le_bytes();

@@ -32,7 +32,8 @@ pub(super) struct Clocks {
     lag_ns: Option<(i64, i64)>,
     before_ns: u64,
     backwards: u64,
-    /// Offset added to header timestamps, ns, if they are used and their epoch differs.
+    /// Offset added to header timestamps, ns: 0 if the clocks agree within 1 s; `None` if no header timestamp has been
+    /// used.
     moved_ns: Option<i64>,
     anew: u64,
 }

@@ -187,8 +187,8 @@ impl Feed {
 
     /// Encodes a value as entries.
     ///
-    /// A value timed by its header is received after the sensor's own delays. A value timed by the recording is
-    /// received at the time of recording.
+    /// If the header gives the value's time, the receive time is later by the sensor's own delays. Otherwise the
+    /// receive time is the time of recording.
     fn say(
         &mut self,
         (at_ns, stamped): (u64, bool),

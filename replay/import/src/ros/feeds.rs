@@ -42,7 +42,8 @@ impl Feeds {
 
     /// Processes a message.
     ///
-    /// Messages of unassigned topics belong to no sensor. Neither do messages of another type than their topic's.
+    /// A message belongs to no sensor if its topic is unassigned, or if its type isn't the type that the topic's sensor
+    /// expects.
     pub(super) fn take(
         &mut self,
         topic: &Topic,

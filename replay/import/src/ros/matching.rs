@@ -51,7 +51,7 @@ impl Feeds {
     ///
     /// A sensor and a topic are matched if each is the only one for its kind of measurement.
     ///
-    /// Errors: several topics or sensors of a kind, or none.
+    /// Errors: a kind has several topics or sensors, or no kind has a topic and a sensor.
     pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
         let mut feeds = Self::default();
         for sense in SENSES {

@@ -76,7 +76,7 @@ fn shot(seconds: u8) -> Vec<u8> {
 }
 
 #[test]
-fn telemetry_log_gives_frames_and_resynchronises_after_damage() {
+fn telemetry_log_reader_finds_the_next_frame_after_damage() {
     let (entries, lost, left) = cut(&mut TlogFormat::default(), &tlog(0..3));
     assert_eq!((entries.len(), lost.len(), left), (3, 0, 0));
     assert_eq!((entries[2].stamp_ns, &entries[2].bytes), (1_600_000_000_000_002_000, &frame(2)));
@@ -91,7 +91,7 @@ fn telemetry_log_gives_frames_and_resynchronises_after_damage() {
 }
 
 #[test]
-fn ping_viewer_log_gives_messages_across_midnight() {
+fn ping_viewer_times_continue_after_midnight() {
     let file = ping_log(&[("23:59:59.999", b"one"), ("00:00:00.001\0", b"two")]);
     let (entries, lost, left) = cut(&mut PingFormat::default(), &file);
     let got: Vec<_> =

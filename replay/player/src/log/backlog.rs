@@ -78,7 +78,7 @@ impl Backlog {
         Some((self.heads.front()?.log_time, self.heads.back()?.log_time))
     }
 
-    /// Calls `write` with each message, until it fails.
+    /// Calls `write` with each message, until a call fails.
     ///
     /// Errors: an error of `write`.
     pub(super) fn try_each<E>(
@@ -101,12 +101,12 @@ pub(super) struct Tally {
     messages: u64,
     tick: Option<u64>,
     next: BTreeMap<Lane, u32>,
-    /// Log time of the recording's last message.
+    /// Log time of the recording's latest message.
     pub(super) last: Option<MonoNs>,
 }
 
 impl Tally {
-    /// Creates the totals from the form in which a part's metadata contain them. `last` is the time of the last message.
+    /// Creates the totals from those in a part's metadata. `last` is the time of the latest message.
     pub(super) fn of(progress: &Progress, header: &LogHeader, last: MonoNs) -> Self {
         let sources = (0..).take(header.sources.len());
         let lanes = sources.flat_map(|number| [Lane::Raw(number), Lane::Sent(number)]);
@@ -124,7 +124,7 @@ impl Tally {
         self.last = Some(head.log_time);
     }
 
-    /// Returns the totals in the form in which a part's metadata contain them.
+    /// Returns the totals as a part's metadata contain them.
     pub(super) fn progress(&self, header: &LogHeader) -> Progress {
         let sequences = self.next.iter().filter_map(|(lane, next)| Some((topic(*lane, header)?, *next)));
         Progress { messages: self.messages, tick: self.tick, sequences: sequences.collect() }

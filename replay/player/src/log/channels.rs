@@ -71,8 +71,7 @@ impl Channels {
         let stated = distinct.iter().copied().map(usize::from).eq(0..numbers.len());
         definitions.sort_by_cached_key(|d| (stated.then(|| stated_number(d)), d.topic.clone(), d.id));
         let mut channels = Self { budget, ..Self::default() };
-        // Raw channels come first, so that sources that only received bytes get higher numbers than sources that sent
-        // some.
+        // Raw channels come first, so that their sources get lower numbers than sources without a raw channel.
         let (raw, others): (Vec<_>, Vec<_>) =
             definitions.into_iter().partition(|d| stated || d.topic.starts_with(RAW_PREFIX));
         for definition in raw.into_iter().chain(others) {
@@ -108,8 +107,8 @@ impl Channels {
         &self.later
     }
 
-    /// Restores the channels as known at an earlier position. `later` are the definitions found among the messages up
-    /// to there.
+    /// Restores the channels as known at an earlier position. `later` are the definitions found among the messages
+    /// before that position.
     pub(super) fn go_to(&mut self, later: &[Definition]) {
         let same = self.later.iter().zip(later).take_while(|(one, other)| one.id == other.id).count();
         for gone in self.later.drain(same..).rev() {

@@ -89,8 +89,8 @@ pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Resul
     Ok(!matches!(result, Err(McapError::BadDataCrc { .. })))
 }
 
-/// Whether the summary can be parsed and matches its checksum, if it has one. It begins after the data end record at
-/// `data_end`.
+/// Whether the summary can be parsed and matches its checksum, if it has one. The summary begins after the data end
+/// record at `data_end`.
 pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64) -> Result<bool, LogError> {
     let reader =
         reader(|options| options.with_skip_start_magic(true).with_validate_summary_section_crc(true));

@@ -23,7 +23,7 @@ use super::writer::SourceInfo;
 pub struct PartFile {
     /// Path of the log file.
     pub path: PathBuf,
-    /// Number of source messages read from the file so far.
+    /// Number of raw messages read from the file so far.
     pub messages: u64,
     /// Part number of the file, if the recording has parts.
     number: Option<u32>,
@@ -38,7 +38,7 @@ pub struct DivePlace {
     /// Index of the file in the dive's list of files.
     at: usize,
     place: LogPlace,
-    /// Number of source messages read from each file.
+    /// Number of raw messages read from each file.
     messages: Vec<u64>,
     earlier: Vec<Loss>,
     late: u64,
@@ -72,7 +72,7 @@ pub struct DiveLog<R = File> {
 /// Continuation of a recording in the next part, after a part was cut off.
 #[derive(Debug, Clone)]
 struct Resumed {
-    /// Totals up to the next part, which repeats all later messages.
+    /// Totals of the messages before the next part. The next part repeats all messages after these.
     before: Progress,
     /// Number of messages in the cut-off part that the next part doesn't repeat.
     messages: u64,
@@ -128,7 +128,7 @@ impl<R: Read + Seek> DiveLog<R> {
     /// Creates a dive log with a single file, from its reader.
     pub fn of(reader: LogReader<R>) -> Self {
         let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
-        // A single log has no further file, so this is never called.
+        // A single log has no other file, so this is never called.
         let open = |_| Err(LogError::NoLogs { folder: PathBuf::new() });
         Self::start(Box::new(open), reader, vec![file], Vec::new())
     }
@@ -182,7 +182,7 @@ impl<R: Read + Seek> DiveLog<R> {
 
     /// Skips messages earlier than `at`, judged by the chunk headers. Call it before reading the first message.
     ///
-    /// Errors: a further file can't be opened.
+    /// Errors: a later file of the log can't be opened.
     pub(super) fn pass_before(&mut self, at: MonoNs) -> Result<(), LogError> {
         while self.at + 1 < self.files.len() && self.reader.times().is_none_or(|(_, last)| last < at) {
             self.go_on()?;
@@ -344,7 +344,7 @@ impl<R: Read + Seek> DiveLog<R> {
     fn in_part(&self, loss: &Loss) -> Option<Loss> {
         let mut loss = loss.clone();
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
-            // The next part states this loss, so it isn't reported here.
+            // All messages that the next part doesn't repeat were delivered, and the next part states the fault.
             if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
                 return None;
             }
@@ -387,6 +387,12 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
         match (LogReader::open(path), by_name) {
             (Ok(reader), by_name) => match (&reader.header().part, by_name) {
                 (Some(part), _) => parts.push((path.clone(), Glance::of(&reader, part.head.number))),
+                // The power was cut while the header was written. The part that follows has this number, too.
+                (None, Some(part)) if reader.times().is_none() && !reader.losses().is_empty() => {
+                    let why = "it ends within its header".to_owned();
+                    losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));
+                    unread = Some(LogError::NotAPart { path: path.clone() });
+                }
                 (None, Some(number)) if !reader.losses().is_empty() => {
                     losses.push(loss(LossKind::PartByName { part: number }, None, None));
                     parts.push((path.clone(), Glance::of(&reader, number)));
@@ -395,7 +401,8 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
             },
             // An empty file that was created just before a power cut.
             (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
-                losses.push(loss(LossKind::PartUnreadable { part, found: found.clone() }, None, None));
+                let why = format!("it begins with [{found}], which no MCAP file does");
+                losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));
                 unread = Some(LogError::NotMcap { name, found, wanted });
             }
             (Err(error), _) => return Err(error),

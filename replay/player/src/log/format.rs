@@ -186,7 +186,7 @@ pub(crate) fn stream_of(topic: &str) -> Option<usize> {
     STREAMS.iter().position(|stream| *stream == name)
 }
 
-/// Decodes a message of a stream: index of the tick, number of the first record, and words.
+/// Decodes a message of a result stream: index of the tick, number of the first record, and words.
 ///
 /// The words are those of [`headrace_monitor::result_stream`]. All numbers are u64, little-endian.
 pub(crate) fn read_results(message: &[u8]) -> Option<(u64, u64, Vec<u64>)> {

@@ -255,7 +255,7 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
     Ok(whole_or_cut(file, frame(end, item, false)))
 }
 
-/// Identifies a record by its content, for a record whose opcode is damaged.
+/// Identifies a record with a damaged opcode by its content.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
     // A message may contain any bytes. But bytes that can be parsed as a chunk with matching lengths are no
     // coincidence.

@@ -24,7 +24,7 @@ pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
 const UNPACKED_ANYWAY: u64 = 64 << 20;
 /// Maximum window of a chunk packed by zstd, as a power of two: 16 MiB. Levels up to 19 use less.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
-/// Memory limit for overlapping pieces being merged, bytes. At most one piece may exceed the limit.
+/// Memory limit for pieces that are merged because their times overlap, bytes. At most one piece may exceed the limit.
 pub(super) const MAX_HELD_BYTES: usize = 32 << 20;
 /// Maximum number of pieces, which are chunks and runs of messages outside chunks. Three days of half-second chunks
 /// fit.
@@ -86,12 +86,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn entries_beyond_the_header_limit_are_refused_whole() {
+    fn reservation_beyond_the_header_limit_reserves_nothing() {
         let mut budget = HeaderBudget::default();
         assert!(budget.take(MAX_HEADER_BYTES - 10));
         assert!(!budget.take(11) && !budget.take(u64::MAX));
         assert!(budget.take(10) && !budget.take(1));
-        assert!(map_cost(100_000, 300_000) > MAX_HEADER_BYTES, "entries count more than their bytes");
+        assert!(map_cost(100_000, 300_000) > MAX_HEADER_BYTES, "an entry costs more than its bytes");
     }
 
     #[test]

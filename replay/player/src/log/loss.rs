@@ -101,7 +101,7 @@ pub enum LossKind {
         /// Damage in that part.
         kind: Box<LossKind>,
     },
-    /// Parts missing from a recording; the last one is `None` if unknown.
+    /// Parts missing from a recording. The number of the last one is `None` if unknown.
     PartsMissing {
         /// Number of the first missing part.
         first: u32,
@@ -117,12 +117,12 @@ pub enum LossKind {
         /// Number of messages up to the end of this part, as the next part's header states it.
         wanted: u64,
     },
-    /// A part of a recording that isn't an MCAP file.
+    /// A file that is named like a part of a recording, but has no data.
     PartUnreadable {
         /// Part number that the file name states.
         part: u32,
-        /// First bytes of the part's file, in hex.
-        found: String,
+        /// Text that follows "the file can't be read:".
+        why: String,
     },
     /// A part whose part metadata is unreadable. Its number was taken from the file name.
     PartByName {
@@ -256,8 +256,8 @@ impl LossKind {
                 "part {part} is not the one that was recorded: it states {messages} messages so far, and the next part \
                  {wanted}"
             ),
-            Self::PartUnreadable { part, found } => {
-                write!(out, "part {part} can't be read: it begins with [{found}], which no MCAP file does")
+            Self::PartUnreadable { part, why } => {
+                write!(out, "the file that is named like part {part} can't be read: {why}")
             }
             Self::PartByName { part } => {
                 write!(out, "part {part} doesn't state its number, which was taken from its name")

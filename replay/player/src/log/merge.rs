@@ -93,7 +93,7 @@ impl Merge {
 
     /// Returns an empty batch, which reuses the memory of a used one.
     pub(super) fn empty_batch(&mut self) -> Batch {
-        // Batches are released only here, because the last returned message may still be in one of them.
+        // Batches are released only here, because the latest returned message may still be in one of them.
         for slot in self.released.drain(..) {
             if let Some(batch) = self.batches.get_mut(slot)
                 && (batch.memory() > KEPT_BYTES || self.spare.len() >= KEPT)

@@ -22,8 +22,9 @@
 //! [`DiveLog`] reads one log, or the parts of a recording as one. Recordings of voice notes ([`voice`]) have their own
 //! chunks.
 //!
-//! The message numbers of a channel have no gaps and continue in the next part. In this program's logs, readers report
-//! a gap as removed, repeated or moved records. A closed log of this program without a summary has lost its end.
+//! The message numbers of a channel have no gaps and continue in the next part. In this program's logs, numbers that
+//! aren't consecutive show removed, repeated or moved records, and readers report them. A closed log of this program
+//! without a summary has lost its end.
 //!
 //! The file is append-only: written bytes are never modified, so a power cut can't damage them. After an error of the
 //! medium a file is left without an end. The recording continues in another part, which repeats the messages that

@@ -57,8 +57,8 @@ enum Fault {
 struct Break {
     fault: Fault,
     messages: u64,
-    /// First and last piece of a range. The break lies before one of the pieces in this range. One past the last
-    /// piece of the log stands for the log's end.
+    /// First and last piece of a range. The break lies before one of the pieces in this range. The index after that of
+    /// the log's last piece stands for the log's end.
     pieces: (usize, usize),
 }
 
@@ -95,7 +95,8 @@ impl Numbering {
         }
     }
 
-    /// Adds the losses found in a log that has been read to its end, except where a known loss explains them.
+    /// Reports the breaks in the numbers of a log that has been read to its end. Breaks that a known loss explains
+    /// aren't reported again.
     pub(super) fn report(&self, spans: &[Span], losses: &mut Losses) {
         let known = losses.list();
         let mut found: Vec<Break> = self.channels.values().flat_map(Count::breaks).collect();
@@ -129,7 +130,7 @@ impl Numbering {
     }
 }
 
-/// Whether a loss of this kind leaves the number of messages before the closing records unchanged.
+/// Whether the log's stated number of messages can still be checked, in spite of this loss.
 fn is_elsewhere(known: &Loss) -> bool {
     matches!(known.kind, LossKind::Stated(_) | LossKind::Misplaced | LossKind::Truncated)
 }
@@ -185,7 +186,7 @@ impl Break {
 
 impl Count {
     fn add(&mut self, piece: usize, number: u32) {
-        // Numbers wrap at 32 bits. The number nearest to the last one is meant.
+        // Numbers wrap at 32 bits. The full number is the one nearest to the previous number.
         let near = self.runs.last().map_or(self.first, |run| run.last);
         let low = u64::from(number.wrapping_sub(low_word(near)));
         let ahead = low <= u64::from(u32::MAX / 2);

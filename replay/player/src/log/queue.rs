@@ -37,8 +37,8 @@ pub(super) struct State {
     pub(super) failing: AtomicBool,
     /// Ticks that the loop skipped because the recorder was too far behind.
     pub(super) gaps: ArrayQueue<Gap>,
-    /// Log time of the last tick that the loop recorded or skipped, ns. After it, the log time up to which data is
-    /// synced or given up, ns. Both are 0 before the first tick.
+    /// Log time of the latest tick that the loop recorded or skipped (`handed_ns`), and log time up to which all data
+    /// is synced or given up (`certain_ns`), ns. Both are 0 before the first tick.
     pub(super) handed_ns: AtomicU64,
     pub(super) certain_ns: AtomicU64,
     /// Number of the recorder's steps so far, which distinguishes a stuck recorder from a slow one.
@@ -52,9 +52,10 @@ pub(super) struct State {
     pub(super) dropped: ArrayQueue<Dropped>,
     /// Number of dropped packets that aren't in `dropped`, because that queue was full.
     pub(super) dropped_besides: AtomicU64,
-    /// Recordings of voice notes. They don't pass through the loop either.
+    /// Recordings of voice notes. They don't pass through the loop.
     pub(super) voices: ArrayQueue<Vec<u8>>,
-    /// Set when the recorder accepts no further voice recording, before it takes the last one.
+    /// Whether the recorder has stopped accepting voice recordings. Set before it looks into `voices` for the last
+    /// time.
     pub(super) voices_end: AtomicBool,
     pub(super) results_missing: AtomicU64,
 }
@@ -68,7 +69,7 @@ impl State {
         }
     }
 
-    /// Returns the length of the last part of the dive that may not be on the disk yet.
+    /// Returns the duration, up to the latest tick, whose data may not be on the disk yet.
     pub(super) fn unsafe_for(&self) -> DurNs {
         let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
         DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))
@@ -271,7 +272,8 @@ mod tests {
 
     /// Explores all interleavings of a loop and a recorder.
     ///
-    /// The loop pushes two entries and sets the stop flag. The recorder takes entries until `until` ends it.
+    /// The loop pushes two entries and sets the stop flag. The recorder takes entries until the function `until`
+    /// returns.
     fn explored<R: ByteConsumer + 'static>(
         name: &str,
         reading: fn(ModelConsumer) -> R,

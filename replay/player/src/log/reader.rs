@@ -173,7 +173,7 @@ impl LogReader<File> {
 }
 
 impl<R: Read + Seek> LogReader<R> {
-    /// Reads a log from any input. `name` is the log's name in messages.
+    /// Reads a log from any input. `name` is the log's name in error texts.
     ///
     /// Errors: as for [`LogReader::open`].
     pub fn new(input: R, name: String) -> Result<Self, LogError> {
@@ -576,7 +576,7 @@ fn read_run<R: Read + Seek>(file: &mut LogFile<R>, span: &Span, batch: &mut Batc
 
 /// Sets the sort ranks of messages.
 ///
-/// Removes messages of unknown channels, with impossible times, or repeated in the next part.
+/// Removes messages of unknown channels, messages with impossible times, and messages that the next part repeats.
 fn place_entries(
     batch: &mut Batch,
     channels: &Channels,

@@ -31,7 +31,7 @@ use super::writer::{Lane, LogHeader, Summary};
 
 /// Time that the thread sleeps while the queue is empty. Waking it earlier would cost the loop a system call.
 const NAP: Duration = Duration::from_millis(2);
-/// Minimum size of the queue. It fits the longest packet of a port, and a tick with many packets.
+/// Minimum size of the queue. It has room for the longest packet of a port, and for a tick with many packets.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
 /// Capacity for messages to devices: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
@@ -108,7 +108,7 @@ impl Recorder {
         Self::spawn(Self::unthreaded(Box::new(Disk), path, header, rotation, queue_bytes, derived)?)
     }
 
-    /// Starts a recorder that continues an interrupted recording in a further part, which states the interruption.
+    /// Starts a recorder that continues an interrupted recording in a new part. The new part states the interruption.
     ///
     /// Errors: as for [`Recorder::create`]. The earlier parts are never modified.
     pub fn go_on(
@@ -248,7 +248,7 @@ impl RecorderPort {
 
     /// Skips a tick of `packets` packets for which there is no room.
     ///
-    /// The log records the skipped ticks. The first one is also reported as an event.
+    /// The log records the skipped ticks. The first tick of a series is also reported as an event.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {
@@ -260,7 +260,7 @@ impl RecorderPort {
         gap.packets += packets;
     }
 
-    /// Whether the recorder skipped the last tick.
+    /// Whether the recorder skipped the latest tick.
     pub fn is_behind(&self) -> bool {
         self.gap.is_some()
     }
@@ -312,7 +312,8 @@ impl RecorderPort {
         }
     }
 
-    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, the log gets their entry first.
+    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, it first reports them to the
+    /// recorder's thread.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         if Self::entry_bytes(len) <= self.vacant_bytes() {
             self.end_gap();
@@ -339,7 +340,7 @@ impl RecorderHandle {
         self.state.events.pop()
     }
 
-    /// Returns the dive time that a power cut would lose now: from the last synced message to the last tick.
+    /// Returns the dive time that a power cut would lose now: from the latest synced message to the latest tick.
     ///
     /// Messages given up after an error count as synced.
     pub fn unsafe_for(&self) -> DurNs {
@@ -358,8 +359,8 @@ impl RecorderHandle {
 
     /// Tells the thread to end, without waiting for it. Several recorders can then end at the same time.
     ///
-    /// If `in_time` is true, the later wait takes 30 s at most in total. Otherwise it continues while there is
-    /// progress.
+    /// If `in_time` is true, the wait for the thread's end takes 30 s at most in total. Otherwise the wait continues
+    /// while there is progress.
     #[expect(clippy::disallowed_methods, reason = "how long a medium is waited for is wall time")]
     pub fn begin_to_end(&mut self, in_time: bool) {
         self.ending.get_or_insert((Instant::now(), in_time));

@@ -23,8 +23,7 @@ use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
 /// Unsynced bytes after which a sync is due.
 const SYNC_BYTES: usize = 4 << 20;
-/// Wait after the second failed attempt to continue. It doubles after each further attempt. The first retry is
-/// immediate.
+/// Wait after the first failed retry. It doubles after each further failed retry. The first retry is immediate.
 const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
 /// Number of attempts to write the rest after the dive has ended.
@@ -38,13 +37,13 @@ const NAMES: u32 = 1000;
 struct OpenPart {
     path: PathBuf,
     log: LogWriter<Buffered>,
-    /// Log time of the part's first message, or of the last failed rotation.
+    /// Log time of the part's first message, or of the latest failed rotation.
     began: Option<MonoNs>,
     /// File size at which the open part should end, bytes.
     ends_at: u64,
     /// Whether nothing but the part's header has been synced.
     fresh: bool,
-    /// Number of synced messages from sources in this part.
+    /// Number of synced raw messages in this part.
     raw_messages: u64,
     /// Number of synced messages in this part, and total length of these messages, bytes.
     certain: (u64, u64),
@@ -70,9 +69,9 @@ pub(super) struct Recording {
     /// Header of all parts. Its field `part` is set separately for each part.
     header: LogHeader,
     open: Option<OpenPart>,
-    /// Number of the last part that has any content.
+    /// Number of the latest part that has any content.
     number: u32,
-    /// Number in the file name of the last part.
+    /// Number in the file name of the latest part.
     named: u32,
     /// Totals of all messages that are synced or lost, which are all messages before the backlog.
     settled: Tally,
@@ -126,7 +125,7 @@ impl Recording {
         }
     }
 
-    /// Continues an interrupted recording with a further part, which states the interruption.
+    /// Continues an interrupted recording in a new part. The new part states the interruption.
     ///
     /// Errors: the part can't be created or written.
     pub(super) fn go_on(
@@ -154,7 +153,7 @@ impl Recording {
         self.storage.free_bytes(&self.path)
     }
 
-    /// Returns the log time of the last message that is synced or given up.
+    /// Returns the log time of the latest message that is synced or given up.
     pub(super) fn certain_to(&self) -> Option<MonoNs> {
         self.settled.last
     }
@@ -351,7 +350,7 @@ impl Recording {
 
     /// Ends the part and begins the next one, whose first message has time `at`.
     ///
-    /// If the next part can't be begun, the last part continues.
+    /// If the next part can't be begun, the present part continues.
     fn rotate(&mut self, at: MonoNs) {
         self.sync();
         if self.open.is_none() {
@@ -412,7 +411,7 @@ impl Recording {
         }
     }
 
-    /// Creates the next file. Existing names are skipped, except for the first part.
+    /// Creates the next file. A name that exists is skipped; for the first part it is an error.
     fn create(&mut self) -> Result<(PathBuf, Box<dyn super::storage::StoredFile>), LogError> {
         let first = self.named + 1;
         for name in first..first.saturating_add(NAMES) {

@@ -16,7 +16,7 @@ use crate::atomic_file::folder_of;
 /// Condition under which a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Every {
-    /// The file reaches this many bytes. The second in which it reaches them still belongs to the part.
+    /// The file reaches this many bytes. It may exceed them by about a second of data.
     Bytes(u64),
     /// The messages of the part reach this span of dive time.
     Span(DurNs),
@@ -92,14 +92,14 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
     Ok(files)
 }
 
-/// Returns the further parts of a recording whose first part is at `path`.
+/// Returns the later parts of a recording whose first part is at `path`.
 fn continuations(path: &Path) -> Vec<PathBuf> {
     let mut parts = parts_of(path).unwrap_or_default();
     if parts.is_empty() {
         return parts;
     }
     let Some(first) = part_head(path).filter(|head| head.number == 1) else { return Vec::new() };
-    // A part without a header was being created when the power failed. It belongs to the recording by its name.
+    // A part without a header was being created when the power failed. Its name shows that it belongs to the recording.
     parts.retain(|part| part_head(part).is_none_or(|head| head.dive == first.dive));
     parts
 }

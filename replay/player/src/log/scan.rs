@@ -264,8 +264,8 @@ impl Scan {
 
     fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        // A chunk is counted only if it will be unpacked completely. Chunks over the limit and truncated chunks are
-        // not.
+        // A chunk is counted only if it will be unpacked completely. Chunks over the limit and truncated chunks don't
+        // count.
         if !place.compression.is_empty() && !place.cut && place.unpacked_len <= MAX_UNPACKED_BYTES {
             let unpacked = self.unpacked.saturating_add(place.unpacked_len);
             if unpacked > unpacked_limit(end) {
@@ -375,7 +375,7 @@ impl Scan {
         };
         if summary == 0 && self.ours {
             // This program always writes a summary. If there is none, the last messages were removed together with
-            // it.
+            // the summary.
             self.lose(LossKind::Truncated, at..at);
         }
         if summary != 0 && summary != data_end.end && self.losses.list().is_empty() {
@@ -500,7 +500,8 @@ pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
 
 /// Whether a record's length is trusted: the record's fields confirm it, or another record follows.
 ///
-/// If the end of the file cuts off the following record, the length is trusted only if no records lie within it.
+/// If the end of the file cuts off the following record, the length is trusted only if no records begin within that
+/// length.
 fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Found) -> Result<bool, LogError> {
     let followed = !matches!(next, Found::Nothing);
     Ok(match next {

@@ -1,4 +1,4 @@
-//! Monitors the free disk space during a recording, and decides which messages to drop when it runs low.
+//! Monitors the free disk space during a recording, and decides which messages to drop when little space is left.
 //!
 //! Small irreplaceable messages (position readings, ticks, judgements, advice) are recorded until the disk is full.
 //! Echoes are by far the largest share of a log, and are dropped first. The disk then lasts for the whole dive.
@@ -12,7 +12,7 @@ use headrace_geometry::time::MonoNs;
 
 /// Free bytes below which the user is warned. They last for some hours of a dive.
 const WARN_BELOW_BYTES: u64 = 1 << 30;
-/// Free bytes below which echoes are dropped. They last for days of the remaining messages.
+/// Free bytes below which echoes are dropped. They last for days of the messages that are still recorded.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
 /// Maximum length of a sonar packet that is kept, bytes. Longer packets are echoes, shorter ones have only ranges.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;

@@ -31,8 +31,8 @@ pub trait StoredFile: Send {
 
     /// Syncs the file. Once this function returns, everything written so far survives a power cut.
     ///
-    /// After an error, nothing written since the last success is certain. If another program has changed the file,
-    /// nothing in it is certain.
+    /// After an error, nothing written since the last successful sync is certain. If another program has changed the
+    /// file, nothing in it is certain.
     ///
     /// Errors: a system error; another program has deleted, truncated or replaced the file.
     fn sync(&mut self) -> io::Result<()>;

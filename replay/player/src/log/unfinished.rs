@@ -15,10 +15,10 @@ use super::format::Tick;
 use super::loss::{Loss, LossKind};
 use super::part::{PartHead, Progress, named_part, part_path};
 use super::reader::{LogInfo, LogReader, MessageKind};
-use super::rotate::{files_of, part_head};
+use super::rotate::{files_of, in_the_way, part_head};
 use super::writer::LogHeader;
 
-/// A recording that did not end in order, and that a later dive can continue in a further part.
+/// A recording that did not end in order. A later dive can continue it in a new part.
 #[derive(Debug, Clone)]
 pub struct Unfinished {
     /// Path that names the recording, as given to `--record`.
@@ -29,7 +29,7 @@ pub struct Unfinished {
     pub last: MonoNs,
     /// First and last time of the log.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Files of the parts, in order.
+    /// Files of the parts, in order; empty if none of them is at [`Self::recording`].
     pub files: Vec<PathBuf>,
     /// Identifier of the recording, equal for all recordings of a dive.
     pub dive: String,
@@ -153,6 +153,20 @@ impl Unfinished {
         let files = files_of(&[recording.to_owned()])?;
         let has_head = files.iter().any(|file| part_head(file).is_some());
         Ok(has_head && unended(&files)?.is_some())
+    }
+
+    /// Returns the same dive, to be continued at another path, where none of its parts can be continued.
+    #[must_use]
+    pub fn at(&self, recording: &Path) -> Self {
+        let present = in_the_way(recording).unwrap_or_default();
+        let named = present.iter().map(|file| named_part(file).map_or(1, |(_, number)| number)).max();
+        Self {
+            recording: recording.to_owned(),
+            files: Vec::new(),
+            named: self.named.max(named.unwrap_or(0)),
+            _lock: None,
+            ..self.clone()
+        }
     }
 
     /// Returns the path of the last part.

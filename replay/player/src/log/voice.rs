@@ -61,8 +61,8 @@ impl VoicePort {
             return Err(NotKept::Failing);
         }
         self.state.voices.push(encode(voice)).map_err(|_| NotKept::Full)?;
-        // The recorder sets the flag before it looks at the queue for the last time. If the flag is still unset, it
-        // takes this recording.
+        // The recorder sets the flag before it looks at the queue for the last time. If the flag is still unset, the
+        // recorder takes this recording.
         if self.state.voices_end.load(Ordering::SeqCst) { Err(NotKept::Failing) } else { Ok(()) }
     }
 }

@@ -57,11 +57,11 @@ pub struct RecorderWorker {
     skipped: u64,
     /// Ids of the sources.
     ids: Vec<String>,
-    /// Packets dropped by the connections to devices and not recorded in the log yet, by source. The next field is
-    /// the time of the last record.
+    /// Packets that the connections to devices dropped and that the log doesn't state yet, by source. `dropped_stated`
+    /// is the time of the latest statement.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
-    /// Log time of the last entry. A voice recording has no log time of its own, so it gets this one.
+    /// Log time of the latest entry. A voice recording has no log time of its own, so it gets this one.
     last: Option<MonoNs>,
     state: Arc<State>,
     _closed: ClosedWhenDropped,
@@ -212,7 +212,7 @@ impl RecorderWorker {
         }
     }
 
-    /// Records in the log which packets the connections to devices dropped, every few seconds and at the end.
+    /// Records in the log how many packets the connections to devices dropped, every few seconds and at the end.
     ///
     /// The interval limits the number of records if packets are dropped for hours.
     fn state_dropped(&mut self, now: Duration, at_end: bool) {

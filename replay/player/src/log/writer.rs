@@ -93,7 +93,7 @@ pub struct ResultChannel {
     pub message_encoding: String,
     /// Whether the messages are dropped together with echoes when the disk fills.
     ///
-    /// True if the channel has a record per echo, or a replay doesn't need it.
+    /// True if the channel has a record per echo, or if a replay doesn't need the channel.
     pub follows_echoes: bool,
 }
 
@@ -116,7 +116,7 @@ pub struct Summary {
     pub left_out: LeftOut,
     /// Number of messages to devices that didn't fit in the recorder's queue.
     pub sent_dropped: u64,
-    /// Number of packets in skipped ticks. This recorder was too far behind, while another one continued.
+    /// Number of packets in skipped ticks. The recorder was too far behind to record these ticks.
     pub skipped: u64,
     /// Number of ticks whose results didn't all fit in the recorder's queue.
     pub results_missing: u64,

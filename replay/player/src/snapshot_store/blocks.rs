@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn block_lengths_are_bounded_and_their_mean_as_designed() {
+    fn block_lengths_are_bounded_and_their_mean_is_as_designed() {
         let bytes = noise(4 << 20, 1);
         let cut: Vec<&[u8]> = blocks(&bytes).collect();
         assert_eq!(cut.concat(), bytes);

@@ -24,14 +24,14 @@ pub struct SnapshotStore {
 }
 
 impl SnapshotStore {
-    /// Creates an empty store for at most `max_bytes`. A snapshot is due after each `interval` of work.
+    /// Creates an empty store for at most `max_bytes`. A snapshot is due after each `interval` of processing time.
     ///
     /// The first snapshot is kept, whatever its size is.
     pub fn new(max_bytes: usize, interval: Duration) -> Self {
         Self { snapshots: BTreeMap::new(), blocks: BTreeSet::new(), used_bytes: 0, max_bytes, interval }
     }
 
-    /// Returns the work between two snapshots. It doubles each time the store is full.
+    /// Returns the processing time between two snapshots. It doubles each time the store is full.
     pub fn interval(&self) -> Duration {
         self.interval
     }

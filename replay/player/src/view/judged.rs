@@ -12,7 +12,7 @@ use super::site::Site;
 
 /// Minimum interval between two published lists of missed stretches.
 const EVERY: DurNs = DurNs(2_000_000_000);
-/// Maximum number of stretches in a list; the last ones along the tunnel are kept.
+/// Maximum number of stretches in a list. The stretches farthest from the portal are kept.
 ///
 /// The log stays small even if a dive misses everything.
 const MOST_STRETCHES: usize = 40;
@@ -22,9 +22,9 @@ const MOST_STRETCHES: usize = 40;
 pub(super) struct Sections {
     /// Flagged sections by number, each with its cause and the diameter of its hole, m.
     flagged: BTreeMap<i64, (Cause, f64)>,
-    /// First and last section of each run of missed sections, by the run's number.
+    /// First and last section of each missed stretch, by the stretch's number.
     runs: BTreeMap<u64, (i64, i64)>,
-    /// Runs of missed sections that have changed, each with its change.
+    /// Numbers of the missed stretches that have changed, each with its change.
     ///
     /// The next judgement is of the section that caused the change, and creates the alert to the pilot.
     changed_runs: Vec<(u64, u64)>,
@@ -33,7 +33,7 @@ pub(super) struct Sections {
 }
 
 impl Sections {
-    /// Stores the change of a run of missed sections, until the next judgement of a section.
+    /// Stores the change of a missed stretch until the next judgement of a section.
     pub(super) fn run(&mut self, id: u64, change: u64) {
         self.changed_runs.push((id, change));
     }
@@ -66,7 +66,7 @@ impl Sections {
         (shown(judged, flagged, site), said)
     }
 
-    /// Creates the alert to the pilot about a changed run of missed sections.
+    /// Creates the alert to the pilot about a missed stretch that has changed.
     fn say(
         &mut self,
         id: u64,
@@ -79,7 +79,7 @@ impl Sections {
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
-            // Some sections of the cleared run may now belong to another run, which is still missed.
+            // Some sections of the cleared stretch may now belong to another stretch, which is still missed.
             let open = self.flagged.range(from..=to).next().is_some();
             let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
             return (!open).then(|| Log::new(judged.at, Level::Info, words));
@@ -114,7 +114,7 @@ impl Sections {
         })
     }
 
-    /// Returns the missed stretches. A stretch is adjacent flagged sections with the same cause.
+    /// Returns the list for display. Each of its stretches is adjacent flagged sections with the same cause.
     fn stretches(&self, site: &Site) -> Vec<Stretch> {
         let mut stretches: Vec<Stretch> = Vec::new();
         let mut last = None;

@@ -298,7 +298,7 @@ impl DerivedChannels for View {
         let at = self.at;
         let mut made = Outbox { at, made };
         made.push_some(Topic::Points, self.points.close().as_ref());
-        // The last state of the wall and of the missed stretches is always published, even if it isn't due yet.
+        // The final state of the wall and of the missed stretches is always published, even if it isn't due yet.
         self.wall.hurry();
         self.sections.hurry();
         if let Some((x_m, _)) = self.last {
@@ -310,7 +310,8 @@ impl DerivedChannels for View {
 
 /// Collects messages for viewers, to be written to the log.
 struct Outbox<'a> {
-    /// Log time of the messages. It is that of the results they come from, so that log times don't go back.
+    /// Log time of the messages. It is the log time of the results from which they are made, so that log times don't go
+    /// back.
     at: MonoNs,
     made: &'a mut Vec<Made>,
 }

@@ -74,7 +74,7 @@ fn pose_is_published_as_transform_pose_and_vehicle_state() {
     assert_eq!(transforms[0]["timestamp"], serde_json::json!({"sec": 1, "nsec": 200_000_000}));
     assert_eq!(transforms[0]["translation"], serde_json::json!({"x": 12.3457, "y": 0.5, "z": 3.0}));
     assert_eq!(transforms[1]["child_frame_id"], "wall");
-    assert!(transforms[1]["translation"]["y"].as_f64().unwrap() > 3.9, "it lies outside the tunnel");
+    assert!(transforms[1]["translation"]["y"].as_f64().unwrap() > 3.9, "the wall lies outside the tunnel");
     assert_eq!(made["pose"][0]["pose"]["orientation"]["w"], 0.5);
     let vehicle = &made["vehicle"][0];
     assert_eq!((&vehicle["position"], &vehicle["speed_mps"]), (&"known".into(), &0.2.into()));
@@ -96,7 +96,7 @@ fn samples_are_published_as_clouds_of_half_a_second() {
         .collect();
     let made = taken(&mut view, "pings", ms(1200), &samples);
     let clouds = &made["points"];
-    assert_eq!(clouds.len(), 2, "the third is being gathered");
+    assert_eq!(clouds.len(), 2, "the third cloud isn't complete yet");
     assert_eq!(clouds[0]["pose"]["position"]["x"], 6900.0);
     // The five points alternate between two heads: x = 0.25 with the head number in its lowest byte, y = 1, z = -2.5.
     let point = |head: u8| [[head, 0, 0x80, 0x3e], 1_f32.to_le_bytes(), (-2.5_f32).to_le_bytes()].concat();
@@ -104,7 +104,7 @@ fn samples_are_published_as_clouds_of_half_a_second() {
     assert_eq!(clouds[0]["data"], messages::base64(&expected));
     let mut made = Vec::new();
     view.end(&mut made);
-    assert_eq!(by_topic(&made)["points"].len(), 1, "the end shows what was gathered");
+    assert_eq!(by_topic(&made)["points"].len(), 1, "the end publishes the incomplete cloud");
 }
 
 #[test]

@@ -26,7 +26,7 @@ use crate::stages::{OwnBeam, Stage};
 ///   a head's beam, from 600 to 1000. The default is a head's own width, and 30 degrees for an echosounder.
 /// - `form`: first, mean or bilinear (first).
 /// - `bin_m`, the width of a range bin for bilinear, from 0.001 to 1 m. The default is a 500th of a head's range
-///   setting in this water, and 0.15 m for an echosounder.
+///   setting in the scene's water, and 0.15 m for an echosounder.
 ///
 /// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view of a Ping1D in BlueOS, 0.52 rad, and
 /// the 200 points of its profile over 30 m.
@@ -90,7 +90,7 @@ struct BeamCone {
 impl Cone {
     /// Creates a cone of `width_rad` with this many rays.
     ///
-    /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two are at the
+    /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two rays are at the
     /// cone's edges in the plane of turning, where an oblique wall is nearest and farthest.
     pub fn new(width_rad: f64, rays: usize) -> Self {
         let last = rays.max(2) - 1;

@@ -16,10 +16,11 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// Changes bytes from devices at random: a bit is flipped, a byte is lost, or another byte is inserted before it.
+/// Changes bytes from devices at random: bits are flipped, bytes are lost, and other bytes are inserted.
 ///
 /// Each byte is affected independently. `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the
-/// rates, all zero by default. A message that loses all its bytes doesn't arrive. Bytes to devices are unchanged.
+/// rates, all zero by default. A message that loses all its bytes doesn't arrive. Bytes that hosts send to devices are
+/// unchanged.
 pub(super) struct ByteErrorsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -109,8 +110,8 @@ impl Hits {
         math::floor_to_i64(math::ln(u) / self.ln_missed).unsigned_abs()
     }
 
-    /// Returns a random number between 0 and 1 if this byte is affected; `None` otherwise. Must be called in order of
-    /// bytes.
+    /// Returns a random number between 0 and 1 if this byte is affected; `None` otherwise. Must be called for the bytes
+    /// in order.
     fn hit(&mut self, byte: u64) -> Option<f64> {
         if byte < self.next {
             return None;
@@ -217,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn message_without_bytes_never_arrives() {
+    fn message_that_loses_all_its_bytes_never_arrives() {
         let keys = "[effects.byte_errors]\ndropped_per_million = 500000\n";
         let lost = Bench::turning(keys).messages();
         assert!(lost.iter().all(|message| !message.3.is_empty()));
@@ -225,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_rates_are_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_rates_are_refused() {
         let keys = "[effects.byte_errors]\ndropped_per_million = 9000\nflipped_per_million = 9000\n\
                     inserted_per_million = 9000\n";
         same_in_any_slices(&Bench::turning(keys));

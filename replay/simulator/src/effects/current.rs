@@ -20,7 +20,7 @@ const OUTSIDE_M: f64 = 20.0;
 /// Interval at which the trajectory is checked against [`OUTSIDE_M`], s.
 const LOOK_S: f64 = 5.0;
 
-/// The water flows along the tunnel and carries a vehicle that holds its speed through water.
+/// The water flows along the tunnel and carries a vehicle that keeps its speed through the water.
 ///
 /// Legs and a pilot's course end at the same place as without a current, after a different duration.
 ///
@@ -166,7 +166,7 @@ mod tests {
     ///
     /// For times t well above the correlation time T, the variance of the displacement is 2 sd^2 T t.
     #[test]
-    fn gusts_have_the_given_strength_and_correlation_time() {
+    fn gusts_have_the_given_sd_and_correlation_time() {
         let current = Current { flow: Flow::default(), gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
         let (mut speeds, mut lagged, mut ways) = (0.0, 0.0, 0.0);
         let (runs, seconds) = (200_u32, 4000.0);

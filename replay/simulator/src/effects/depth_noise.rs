@@ -17,7 +17,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step number that is reserved for drawing the offset. No sample has it.
+/// Step number that is reserved for drawing the offset. No sample has this number.
 const OFFSET: u64 = u64::MAX;
 
 /// A depth sensor's pressure has white noise, an offset, and a drift.
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_noise_is_white_with_the_given_strength() {
+    fn depth_noise_is_white_with_the_given_sd() {
         let errors = errors_pa("[effects.depth_noise]\nnoise_pa = 300\n");
         let n = errors.len() as f64;
         assert!(n > 3000.0);
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_offsets_of_many_dives_have_the_given_spread() {
+    fn depth_offsets_of_many_dives_are_normally_distributed_with_the_given_sd() {
         let offset_pa = |seed: u64| {
             let keys = "[effects.depth_noise]\noffset_sd_pa = 1000\n";
             let [plain, with] =
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_offset_is_constant_over_the_dive_and_simulation_slices() {
+    fn depth_offset_is_constant_in_a_dive_and_noise_does_not_depend_on_time_slices() {
         let errors = errors_pa("[effects.depth_noise]\noffset_sd_pa = 1000\n");
         assert!(errors[0] != 0.0 && errors.iter().all(|error| (error - errors[0]).abs() < 1e-6));
         same_in_any_slices(&Bench::turning("[effects.depth_noise]\nnoise_pa = 300\ndrift_pa = 100\n"));

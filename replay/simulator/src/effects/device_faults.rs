@@ -21,8 +21,8 @@ use crate::stages::Stage;
 
 /// A device has a fault.
 ///
-/// `kind` is the kind of fault, `from_s` its start in seconds from the dive's start (0), `for_s` its duration in
-/// seconds (until the dive's end). Afterwards the device works as before.
+/// `kind` is the kind of fault. `from_s` is its start in seconds from the dive's start, 0 by default. `for_s` is its
+/// duration in seconds, by default until the dive's end. After the fault the device works as before.
 ///
 /// - `stick`: the device repeats its last value: range, pressure, attitude with rates and forces, velocity, or cable
 ///   length. A head continues to turn.
@@ -137,7 +137,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Makes a sensor repeat its last value.
+/// Makes a sensor repeat the value that it had before the fault.
 #[derive(Component)]
 struct Stuck<M: Measurement> {
     span: Span,
@@ -187,7 +187,7 @@ impl Sticking for Payout {
     }
 }
 
-/// Repeats the last value before the span. A device that is stuck from the dive's start repeats its first value.
+/// Repeats the last value before the fault. A device that is stuck from the dive's start repeats its first value.
 fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &mut Stuck<M>)>) {
     for (mut samples, mut stuck) in &mut devices {
         for measured in &mut samples.list {

@@ -1,4 +1,4 @@
-//! Detection of echoes depending on their strength.
+//! Detection of echoes. It depends on their strength.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};

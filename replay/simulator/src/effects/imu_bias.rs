@@ -20,7 +20,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step number that is reserved for drawing the constant parts. No sample has it.
+/// Step number that is reserved for drawing the constant parts. No sample has this number.
 const CONSTANT: u64 = u64::MAX;
 /// Block of random numbers for the tilt, after the blocks for the biases.
 const TILT: u64 = 3;
@@ -63,8 +63,8 @@ struct ImuBias {
     /// Latest tilt of the attitude in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Last sample interval, and two factors each for biases and for tilt: the correlation over the interval, and the
-    /// weight of a new random number.
+    /// Previous sample interval, with two factors for the biases and two for the tilt: the correlation over the
+    /// interval, and the weight of a new random number.
     ///
     /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_bias_is_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_bias_is_refused() {
         same_in_any_slices(&Bench::turning(
             "[effects.imu_bias]\ngyro_degps = 0.2\naccel_mps2 = 0.01\ntau_s = 5\n",
         ));

@@ -17,7 +17,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Numbers of the first block of random numbers for each quantity. Each vector takes two blocks.
+/// Index of the first block of random numbers for each quantity. Each vector takes two blocks.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_noise_is_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_noise_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_noise]\n").contains("or accel_mps2_rthz or attitude_deg must not be"));
     }

@@ -30,10 +30,10 @@ use pings::{Ping, Pings};
 /// beam points at this head's body. The ping's apparent range is (c (t_other - t_own) + path) / 2. The head reports the
 /// apparent range if it is less than the range of the head's own echo, and not less than the head's least range.
 ///
-/// The ping is always heard if it arrives within this head's beam. Otherwise it is heard through side lobes with a
-/// probability. A wall point is within the beam if its angle from the axis is at most half the beam's width plus a
-/// margin. The other head is within the beam if its angle is at most half the beam's width plus half the angular size
-/// of the other head's body.
+/// The ping is always heard if it arrives within this head's beam. Otherwise it is heard through side lobes with the
+/// probability `share`. A wall point is within the beam if its angle from the axis is at most half the beam's width
+/// plus a margin. The other head is within the beam if its angle is at most half the beam's width plus half the angular
+/// size of the other head's body.
 ///
 /// Keys, with defaults in brackets:
 /// - `sensors`, two or more heads that share a frequency (all heads). There is one table per frequency.
@@ -41,9 +41,9 @@ use pings::{Ping, Pings};
 /// - `margin_deg`, from 0 to 45. The default is half the other head's beam width, since the insonified patch is that
 ///   wide.
 ///
-/// Heads whose bodies overlap are idealised ones and don't hear each other. Pings of another head that begin while a
-/// head is already listening are extrapolated from the two pings before. The extrapolation is wrong for one or two
-/// pings when a head reverses.
+/// Heads whose bodies overlap are idealised. They don't hear each other. Pings of another head that begin while a head
+/// is already listening are extrapolated from the two pings before. The extrapolation is wrong for one or two pings
+/// when a head reverses.
 ///
 /// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, in which the planner uses the same two paths.
 pub(super) struct InterferenceKind;
@@ -225,7 +225,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this range arrives before all other sounds, and the range is at least the least range.
+    /// Whether a sound at this apparent range arrives before all sounds so far, and not from within the least range.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }

@@ -22,9 +22,9 @@ pub(super) const SENSES: [Sense; 6] =
 
 /// Messages from a device arrive late, in addition to the latency in the vehicle file.
 ///
-/// All messages are delayed by `latency_ms`, and each one by a further exponentially distributed time with mean
-/// `jitter_ms`. A message that would overtake the previous one on its line arrives together with it. Messages to
-/// devices aren't delayed.
+/// `latency_ms` delays all messages. In addition, a random time delays each message. This time is exponentially
+/// distributed with mean `jitter_ms`. A message that would overtake the previous one on its line arrives together with
+/// it. Messages to devices aren't delayed.
 pub(super) struct LineDelayKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_delay_is_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_delay_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.line_delay]\n").contains("or jitter_ms must not be zero"));
     }

@@ -54,7 +54,7 @@ struct Ramp {
 struct MissingReturns {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the last ping was lost as part of a run; `None` before the first ping.
+    /// Whether the previous ping was lost as part of a run; `None` before the first ping.
     in_run: Option<bool>,
 }
 
@@ -134,7 +134,7 @@ impl Parameters {
     }
 }
 
-/// The echo of a ping before this effect removes any.
+/// The echo of a ping as it was before this effect.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
     range_m: Option<f64>,

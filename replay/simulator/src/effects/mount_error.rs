@@ -16,7 +16,8 @@ use crate::sensing::Mounted;
 ///
 /// `position_m` and `angles_deg` (roll, pitch and yaw, applied before the file's angles) are added to the mounts of all
 /// named sensors. `position_sd_m`, up to 1, and `angles_sd_deg`, up to 30, are the standard deviations of additional
-/// errors, which are drawn for each axis and sensor. When a head occludes others, its position is that of the file.
+/// errors, which are drawn for each axis and sensor. A head that occludes other heads does so from its position in the
+/// file.
 pub(super) struct MountErrorKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -121,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn mount_errors_have_the_given_spread_and_are_independent_per_sensor() {
+    fn mount_errors_have_the_given_sd_and_are_independent_between_sensors() {
         let mut places = Vec::new();
         for seed in 0..200 {
             let dive = Dive { seed, seconds: 0.2, ..Dive::with_heads(&[[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0]]) };
@@ -141,7 +142,7 @@ mod tests {
     /// A beam is perpendicular to the head's axis. Roll turns the beam within its plane of turning; pitch and yaw turn
     /// it out of this plane.
     #[test]
-    fn mount_angle_errors_have_the_given_spread_about_each_axis() {
+    fn mount_angle_errors_have_the_given_sd_about_each_axis() {
         let sd_rad = f64::to_radians(0.5);
         let (mut within, mut out) = (Vec::new(), Vec::new());
         for seed in 0..400 {
@@ -187,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_error_is_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_error_is_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.mount_error]\nangles_sd_deg = 2");
         let refusal = Dive::with_head().refusal("[effects.mount_error]");
         assert!(refusal.contains("or angles_sd_deg must not be zero"), "{refusal}");

@@ -27,13 +27,14 @@ use crate::stages::Stage;
 ///
 /// Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
-/// - `square_share` (0) and `share` (0.1), the shares of returns that arrive by this path, for a beam perpendicular to
-///   the wall and for a beam along the wall. Both are from 0 to 1. In between, the share grows with 1 minus the cosine
-///   of incidence.
+/// - `square_share` (0) and `share` (0.1), the shares of returns that arrive by this path. The first is for a beam
+///   perpendicular to the wall, the second for a beam along the wall. Both are from 0 to 1. In between, the share grows
+///   with 1 minus the cosine of incidence.
 /// - `mean_run`, the mean number of consecutive returns by this path once one has arrived, as in missing_returns.
-///   Without it, each return arrives by either path, whatever the return before it.
+///   Without this key, the path of each return is independent of the previous return.
 ///
-/// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see that wall.
+/// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see the second
+/// wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
 pub(super) struct MultipathKind;
 
@@ -51,7 +52,7 @@ struct Parameters {
 struct Multipath {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the last return arrived by way of two walls.
+    /// Whether the previous return arrived by way of two walls.
     is_bounced: bool,
 }
 
@@ -104,7 +105,7 @@ fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f
 }
 
 impl Parameters {
-    /// Whether a return arrives by way of two walls, for a beam with this squareness to the wall.
+    /// Whether a return arrives by way of two walls. `square` is the cosine of the beam's incidence.
     fn is_bounced(&self, before: bool, square: f64, chance: f64) -> bool {
         let share = self.share + (self.square_share - self.share) * square;
         let Some(mean) = self.mean_run.filter(|_| share > 0.0 && share < 1.0) else { return chance < share };
@@ -148,7 +149,7 @@ mod tests {
     /// If the rectangular tunnel is mirrored at each wall that the beam meets, the reflected beam becomes a straight
     /// line through the mirrored copies of the tunnel.
     #[test]
-    fn double_reflection_in_a_rectangle_matches_a_straight_beam_through_mirrored_rectangles() {
+    fn multipath_range_in_a_rectangular_tunnel_matches_a_straight_beam_through_mirrored_tunnels() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
         let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
@@ -177,15 +178,15 @@ mod tests {
     }
 
     #[test]
-    fn double_reflection_in_a_circle_is_a_chord_with_equal_incidence() {
+    fn multipath_range_in_a_circular_tunnel_matches_trigonometry() {
         let (radius_m, out_m) = (4.0, 1.5);
         let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
         // The circle rests on the floor, so its centre is a radius above the floor.
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&pipe, [out_m, radius_m], angle_rad);
-            // The sine of incidence follows from the law of sines. The ends of a chord are seen from the centre under
-            // the angle pi - 2 i.
+            // The sine of incidence follows from the law of sines. Seen from the centre, the ends of a chord are pi - 2
+            // i apart, where i is the incidence.
             let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
             let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
             let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();

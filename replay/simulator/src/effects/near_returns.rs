@@ -27,8 +27,8 @@ use crate::stages::Stage;
 ///   clusters are uniformly distributed.
 /// - `spread_m` (0.1), the standard deviation of the returns about the cluster's range.
 ///
-/// A cluster beyond the wall gives no return. Source: docs/why/field.md, "murk": 5 % near returns. Runs: see
-/// missing_returns.
+/// A cluster beyond the wall has no effect: the ping returns the wall. Source: docs/why/field.md, "murk": 5 % near
+/// returns. Runs: see missing_returns.
 pub(super) struct NearReturnsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -45,10 +45,10 @@ struct NearReturns {
     cluster: Cluster,
 }
 
-/// The current cluster, and whether the last ping hit it.
+/// The current cluster, and whether the previous ping hit it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cluster {
-    /// Whether the last ping hit a cluster; `None` before the first ping.
+    /// Whether the previous ping hit a cluster; `None` before the first ping.
     met: Option<bool>,
     range_m: f64,
 }
@@ -90,8 +90,8 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// The range of the cluster that the ping of a step hits, m; `None` if it hits none. Must be called once per step,
-    /// in order.
+    /// Range that the ping of a step returns from a cluster, m; `None` if the ping hits no cluster. Must be called once
+    /// per step, in order.
     fn met_m(&self, cluster: &mut Cluster, stream: Stream, step: u64) -> Option<f64> {
         let [chance, place] = stream.at(step).uniform();
         let meets = self.runs.next(cluster.met, chance);
@@ -178,7 +178,7 @@ mod tests {
     /// The wall is 3 m away, so half of the clusters from 2 to 4 m are in front of the wall. A ping that the sonar
     /// loses has no return, even if it hit a cluster.
     #[test]
-    fn clusters_beyond_the_wall_give_no_return_and_lost_pings_stay_lost() {
+    fn clusters_beyond_the_wall_have_no_effect_and_lost_pings_stay_lost() {
         let dive = Dive { seconds: 400.0, ..Dive::with_sounder() };
         let keys = "[effects.near_returns]\nshare = 0.4\nnear_m = 2\nfar_m = 4\nspread_m = 0\n";
         let (base, with) = (dive.dive("").ranges_m(0), dive.dive(keys).ranges_m(0));
@@ -198,7 +198,7 @@ mod tests {
     /// There are two stretches with a gap between them. Nearly every ping hits a cluster, and the first stretch's
     /// cluster must end with the stretch.
     #[test]
-    fn near_return_cluster_ends_with_its_configured_stretch() {
+    fn near_return_cluster_ends_at_the_end_of_its_stretch() {
         let dive = Dive { seconds: 60.0, ..Dive::with_head() };
         let table = |from_m: f64, near_m: f64| {
             format!(
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.near_returns]\n{keys}"));
         assert!(refusal("").contains("share: must be above zero"));

@@ -17,10 +17,10 @@ use crate::stages::Stage;
 
 /// Some returns are unrelated to the wall. Their range is uniformly distributed.
 ///
-/// Echosounders in a tunnel give such outliers between echoes of all kinds. Keys, with defaults in brackets:
+/// Echosounders in a tunnel give such outliers. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which they occur.
 /// - `share`, the share of outliers among the returns, from 0 (excluded) to 1 (0.08).
-/// - the nearest range `near_m` (0.3) and the farthest `far_m` (a head's range setting in this water; 30 for an
+/// - the nearest range `near_m` (0.3) and the farthest `far_m` (a head's range setting in the scene's water; 30 for an
 ///   echosounder), from 0 to 200 m.
 ///
 /// Source: the share is that of the logs of VITA 1, as in the project's scene vita1-field; 30 m is a Ping1D's usual
@@ -118,7 +118,7 @@ mod tests {
     use crate::testing::{Dive, assert_share};
 
     #[test]
-    fn outliers_have_the_given_share_and_spread() {
+    fn outliers_have_the_given_share_and_uniformly_distributed_ranges() {
         let dive = Dive { seconds: 1000.0, ..Dive::with_sounder() };
         let (base, dived) = (dive.dive(""), dive.dive("[effects.outliers]\nshare = 0.2\nfar_m = 20.3"));
         let pairs = || base.ranges_m(0).into_iter().zip(dived.ranges_m(0));

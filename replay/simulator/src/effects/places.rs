@@ -8,7 +8,7 @@ use crate::facts::Facts;
 use crate::sensing::{Ray, Scenery};
 use crate::stretch::Stretch;
 
-/// The parameters of an effect on one sensor, each with the stretches in which they apply.
+/// The stretches in which an effect acts on one sensor, each with the effect's parameters there.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Places<P>(Vec<(Stretch, P)>);
 
@@ -80,7 +80,7 @@ impl<P> Places<P> {
         Places(self.0.iter().map(|(stretch, parameters)| (*stretch, how(parameters))).collect())
     }
 
-    /// Parameters of the effect in all stretches and for all sensors, in the order of the scene.
+    /// Parameters of the effect in all stretches, in the order of the scene.
     pub(super) fn all(&self) -> impl Iterator<Item = &P> {
         self.0.iter().map(|(_, parameters)| parameters)
     }

@@ -18,8 +18,8 @@ use crate::stages::Stage;
 /// Ranges are rounded to steps, as if read from an echo with a limited number of points.
 ///
 /// Keys, with defaults in brackets. At most one is allowed:
-/// - `quantum_m`, the step in metres as the device computes them, from 0.0005 to 1. A head computes with 1500 m/s, an
-///   echosounder in metres of water.
+/// - `quantum_m`, the step in metres as the device computes them, from 0.0005 to 1. A head computes with 1500 m/s. An
+///   echosounder's step is in true metres.
 /// - `points`, the number of steps over a head's range setting, from 50 to 10,000 (500).
 ///
 /// Steps are in the device's own metres because the device measures time. Its wire format adds its own step. Source:
@@ -77,7 +77,7 @@ impl Effect for PerSensor<Step> {
 }
 
 impl Step {
-    /// Step to which ranges are rounded, converted from the device's metres to metres of water.
+    /// Step to which ranges are rounded, converted from the device's metres to true metres.
     fn in_water_m(self, head: Option<&Head>, sound_speed_mps: f64) -> f64 {
         let water_per_device = head.map_or(1.0, |Head(spec)| sound_speed_mps / spec.sound_speed_mps);
         let quantum_m = match self {
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn echosounder_ranges_are_rounded_to_steps_in_metres_of_water() {
+    fn echosounder_ranges_are_rounded_to_steps_in_true_metres() {
         let mut dive = Dive::with_sounder();
         dive.trajectory = "place_m = [0.123, 2]";
         assert_lattice(&dive, "[effects.range_quantisation]\nquantum_m = 0.15", 0.15);

@@ -11,7 +11,7 @@ const LONGEST_RUN: f64 = 10_000.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Runs {
     share: f64,
-    /// Probability that a run begins with the next ping, if the last ping is in no run.
+    /// Probability that a run begins with the next ping, if the previous ping is in no run.
     begin: f64,
     /// Probability that a run continues with the next ping.
     go_on: f64,
@@ -44,7 +44,8 @@ impl Runs {
         Ok(Some(Self::new(share, mean.unwrap_or(1.0 / (1.0 - share)))))
     }
 
-    /// Whether the next ping is in a run, from the same state of the last ping and a random number between 0 and 1.
+    /// Whether the next ping is in a run. `before` tells whether the previous ping was in a run; `chance` is a random
+    /// number between 0 and 1.
     ///
     /// The probability that the first ping is in a run equals the share.
     pub(super) fn next(&self, before: Option<bool>, chance: f64) -> bool {
@@ -56,7 +57,7 @@ impl Runs {
         chance < in_run
     }
 
-    /// Correlation of being in a run between consecutive pings.
+    /// Correlation between the states of consecutive pings: 1 in a run, 0 in no run.
     #[cfg(test)]
     pub(super) fn correlation(&self) -> f64 {
         self.go_on - self.begin

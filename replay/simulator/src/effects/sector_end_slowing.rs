@@ -18,10 +18,10 @@ use crate::stages::Stage;
 
 /// A head in a sector follows its commands with a first-order lag and reports its true angle.
 ///
-/// The head slows down at the ends. The steps there are short, which gives the false minima that Jorge et al. 2021
-/// describe. Heads that turn continuously are unchanged. `lag_ms` is the time constant, 100 by default. The command is
-/// assumed to change linearly between two pings; for such a command the lag is exact. The head begins at rest. Source:
-/// Jorge et al. 2021, §8.1 (sensors "decreasing speed due to the control system of the head").
+/// The head slows down at the ends of its sector. The steps there are short, which gives the false minima that Jorge et
+/// al. 2021 describe. Heads that turn continuously are unchanged. `lag_ms` is the time constant, 100 by default. The
+/// command is assumed to change linearly between two pings; for such a command the lag is exact. The head begins at
+/// rest. Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due to the control system of the head").
 pub(super) struct SectorEndSlowingKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_heads_without_a_sector_are_refused() {
+    fn time_slice_length_does_not_change_results_and_heads_without_a_sector_are_refused() {
         same_in_any_slices(&Bench::sectors(KEYS));
         let why = refusal("[effects.sector_end_slowing]\n");
         assert!(why.contains("none of its heads turns in a sector"), "{why}");

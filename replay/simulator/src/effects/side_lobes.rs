@@ -22,8 +22,8 @@ use crate::stages::Stage;
 
 /// Some ranges come from side lobes that meet the wall nearer and more perpendicularly than the beam.
 ///
-/// There are four side lobes, two in the plane of turning and two across that plane. The range of the nearest such lobe
-/// is reported with some probability. Keys, with defaults in brackets:
+/// There are four side lobes, two in the plane of turning and two across that plane. With the probability `share`, the
+/// sonar reports the shortest range of these lobes. Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
 /// - `angle_deg`, the angle of the side lobes from the beam's axis, from 0.1 to 80 (1.59 times the beam's width).
 /// - `share`, the probability, from 0 (excluded) to 1 (0.05).
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn side_lobe_share_is_as_configured_and_perpendicular_beams_have_none() {
+    fn side_lobes_are_heard_in_the_given_share_of_oblique_beams_and_in_no_perpendicular_beam() {
         let dive = Dive { seconds: 500.0, ..Dive::with_head() };
         let (mut oblique, mut taken) = (0, 0);
         for row in &dive.dive("[effects.side_lobes]\nshare = 0.2").rows {

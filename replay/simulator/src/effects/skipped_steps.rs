@@ -19,8 +19,8 @@ use crate::stages::Stage;
 /// From time to time a head misses a commanded step. From then on it lags by that step, since hosts command steps and
 /// not angles.
 ///
-/// Of a thousand steps, `per_thousand` are missed, each independently. If `told` is true, the head reports its true
-/// angle; otherwise, as by default, it reports the commanded angle.
+/// `per_thousand` is the mean number of missed steps in a thousand. Each step is missed independently. If `told` is
+/// true, the head reports its true angle; otherwise, as by default, it reports the commanded angle.
 pub(super) struct SkippedStepsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_zero_skips_are_refused() {
+    fn time_slice_length_does_not_change_results_and_zero_skips_are_refused() {
         same_in_any_slices(&Bench::sectors("[effects.skipped_steps]\nper_thousand = 50\n"));
         assert!(refusal("[effects.skipped_steps]\n").contains("must not be zero"));
     }

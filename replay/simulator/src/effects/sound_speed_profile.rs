@@ -16,12 +16,12 @@ use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
 /// The speed of sound changes linearly with the height above the tunnel's floor, as in water with warm layers above
-/// cold.
+/// cold layers.
 ///
 /// Devices compute ranges with the vehicle file's speed. The error of a range depends on the mean slowness along the
 /// path. Keys, with defaults in brackets, besides `from_m` and `to_m` of the stretch: the speed at the floor,
 /// `floor_mps`, from 1300 to 1700 (the file's), and its change per metre of height, `per_metre_mps`, from -50 to 50
-/// (0). One degree is about 4 m/s.
+/// (0). A difference of one degree changes the speed by about 4 m/s.
 ///
 /// Bending of the ray isn't simulated. The ray's radius of curvature is the speed divided by the gradient: 300 m at 5
 /// m/s per metre, or 2 degrees over 10 m of range. Source: Urick, "Principles of underwater sound", ch. 5 (travel time
@@ -137,8 +137,8 @@ mod tests {
         }
     }
 
-    /// At a gradient of -50 m/s per metre, the speed is zero about thirty metres up. The mean slowness is computed with
-    /// at least a third of the speed at the floor.
+    /// At a gradient of -50 m/s per metre, the speed would be zero about thirty metres up. The mean slowness is
+    /// computed with at least a third of the speed at the floor.
     #[test]
     fn speed_of_sound_never_falls_below_a_third_of_the_floor_value() {
         let profile = Parameters { floor_mps: 1440.0, per_metre_mps: -50.0, assumed_mps: 1440.0 };
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
         assert!(refusal.contains("or per_metre_mps is needed"), "{refusal}");

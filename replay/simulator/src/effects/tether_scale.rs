@@ -19,11 +19,11 @@ use crate::stages::Stage;
 /// `share` is the relative excess of the counted length, from -0.1 to 0.1 (0). `stiffness_n` is the cable's axial
 /// stiffness EA, in newtons. It enables `drag_npm`, the drag on each metre of moving cable (0.05).
 ///
-/// The cable passes the wheel under the tension that the tender keeps. Further in, each point of the cable bears the
-/// drag of all cable between it and the wheel. For x metres of cable, the mean strain is therefore drag x / (2 EA), and
-/// x metres of tunnel are counted as x / (1 + drag x / (2 EA)). The strain on the way back is the same. The cable's own
-/// hysteresis, and friction that hasn't built up yet after a turn, aren't simulated. Source: Hooke's law for a rod
-/// under evenly distributed load (Timoshenko, "Strength of Materials", part I, ch. I).
+/// The cable passes the wheel under the tension that the tender keeps. A point of the cable farther in also bears the
+/// drag of all cable between this point and the wheel. For x metres of cable, the mean strain is therefore drag x / (2
+/// EA), and x metres of tunnel are counted as x / (1 + drag x / (2 EA)). The strain on the way back is the same. The
+/// cable's own hysteresis, and friction that hasn't built up yet after a turn, aren't simulated. Source: Hooke's law
+/// for a rod under evenly distributed load (Timoshenko, "Strength of Materials", part I, ch. I).
 pub(super) struct TetherScaleKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,8 +113,7 @@ mod tests {
             let rod_m = counted_m / f64::from(rods);
             let mut reach_m = 0.0;
             for rod in 0..rods {
-                // The middle of this rod bears the drag on all rods nearer to the wheel, so it sets the rod's mean
-                // tension.
+                // The mean tension of a rod is the tension at its middle: the drag on all cable nearer to the wheel.
                 let tension_n = drag_npm * (f64::from(rod) + 0.5) * rod_m;
                 reach_m += rod_m * (1.0 + tension_n / stiffness_n);
             }
@@ -142,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_scale]\nshare = -0.01\nstiffness_n = 5e4\n"));
         assert!(refusal("[effects.tether_scale]\n").contains("share: or stiffness_n must not be zero"));
         assert!(refusal("[effects.tether_scale]\ndrag_npm = 1\n").contains("only with stiffness_n"));

@@ -24,7 +24,7 @@ use crate::trajectory::{Knots, wandering};
 /// control points of a cubic B-spline are half a period apart.
 ///
 /// `swings` are tables of `reach_m` and `period_s`. With each, the cable swings as a sine of full reach and random
-/// phase, even while the vehicle is stationary. If there are swings, the slack varies additionally only if `reach_m` is
+/// phase, even while the vehicle is stationary. If there are swings, the smooth variation is added only if `reach_m` is
 /// given.
 pub(super) struct TetherSlackKind;
 
@@ -117,7 +117,7 @@ mod tests {
 
     /// The correlation of a cubic B-spline with independent control points falls to zero over four control points.
     #[test]
-    fn slack_has_the_given_amplitude_spread_and_period() {
+    fn slack_has_the_given_amplitude_sd_and_period() {
         let keys = "[effects.tether_slack]\nperiod_s = 1\n";
         let (plain, slack) = (Bench::on(LONG, "").run("tether"), Bench::on(LONG, keys).run("tether"));
         let more: Vec<f64> =
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_changes_nothing_and_other_sensors_are_refused() {
+    fn time_slice_length_does_not_change_results_and_other_sensors_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_slack]\n"));
         same_in_any_slices(&Bench::turning(
             "[effects.tether_slack]\nreach_m = 0.1\nswings = [{ reach_m = 0.1, period_s = 7 }]\n",

@@ -1,8 +1,9 @@
 //! The tunnel's axis in plan view: a sequence of straight pieces and arcs.
 //!
 //! Chainage is the arc length along the axis. The axis is smooth, bends no tighter than [`Axis::parse`] allows and
-//! turns by no more than half a turn between any two points. Hence it never approaches itself, each point of the tunnel
-//! has one nearest point of the axis, and along a straight line through the tunnel chainage is monotonic.
+//! turns by no more than half a turn between any two points. Three properties follow. The axis never comes near itself.
+//! Each point of the tunnel has exactly one nearest point of the axis. Chainage is monotonic along a straight line
+//! through the tunnel.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -14,7 +15,7 @@ pub(super) const LEAST_RADIUS_HALF_WIDTHS: f64 = 2.0;
 /// Largest angle between any two headings of the axis.
 const LARGEST_TURN_RAD: f64 = PI * (1.0 + 1e-12);
 
-/// The tunnel's axis, level at z = 0. It continues straight before chainage 0 and past the last piece.
+/// The tunnel's axis, horizontal at z = 0. It continues straight before chainage 0 and beyond the last piece.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// The pieces, without gaps, from -infinity to +infinity of chainage.

@@ -117,7 +117,8 @@ impl Boulder {
         let (wall, [ny, nz]) = ground.tube.wall_place(WallPoint { x_m: self.chainage_m, arc_m: self.arc_m });
         let above_m = half[2] * (1.0 - 2.0 * self.sunk);
         let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
-        // Axes of the boulder before its rotation: across the wall, along the wall, and along the tunnel.
+        // Axes of the boulder: its normal across the wall; its length along the tunnel and its width along the wall,
+        // both rotated about the normal.
         let normal = section.outwards([0.0, ny, nz]);
         let (sin, cos) = math::sin_cos(self.yaw_rad);
         let length = section.outwards([cos, -sin * nz, sin * ny]);

@@ -5,8 +5,8 @@ use headrace_geometry::tunnel::WallPoint;
 
 /// A displaced patch of wall, with the shape of a raised cosine along the tunnel and along the wall.
 ///
-/// The wall moves along the ray from the profile's reference point. A displacement that ends short of that point
-/// therefore leaves the section star-shaped.
+/// The wall moves along the ray from the profile's reference point. If the displacement ends short of that point, all
+/// of the section remains visible from it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bulge {
     /// Number of the feature that the patch belongs to.

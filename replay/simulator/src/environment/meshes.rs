@@ -132,7 +132,7 @@ fn check(
     if site.axis.pieces().iter().any(|piece| bend(piece.from_m, piece.to_m, piece.curvature_pm())) {
         return refuse("meets a bend of the axis; a mesh can be the wall of a straight stretch only");
     }
-    // At a larger distance from the axis, the nearest point of the axis could lie in the bend.
+    // For a point farther from the axis than the radius of a bend, the nearest point of the axis could lie in the bend.
     let (low, high) = wall.mesh.bounds();
     let (_, piece) = site.axis.piece_at(wall.from_m);
     let left_m = piece.left_of([wall.frame.origin[0], wall.frame.origin[1]]);

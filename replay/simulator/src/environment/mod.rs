@@ -255,7 +255,7 @@ impl Environment {
         Hit { range_m: hit.range_m + deeper_m, ..hit }
     }
 
-    /// Range to the smooth wall as in [`Environment::cast`], m, at a lower cost.
+    /// Range to the smooth wall, m. Costs less than [`Environment::cast`].
     ///
     /// Allocates: no.
     pub fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<f64> {
@@ -375,8 +375,8 @@ impl Environment {
         }
     }
 
-    /// Among the hollows at the end of the ray, the one that extends farthest: the range of its end, the normal there,
-    /// and the hollow.
+    /// Finds the hollow at the end of the ray that extends farthest. Returns the range of the hollow's end, the normal
+    /// there, and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
         // The index lists hollows by the chainage of their openings. Deeper in the rock, a hollow may meet any other

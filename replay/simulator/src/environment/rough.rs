@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn rough_wall_heights_have_the_given_spread() {
+    fn rough_wall_heights_have_the_given_sd() {
         let many = || (0..100_000).map(|k| at_m(f64::from(k) * 0.137, f64::from(k % 97) * 0.211));
         assert!(mean(many()).abs() < 0.0005, "{}", mean(many()));
         let sd_m = mean(many().map(|h_m| h_m * h_m)).sqrt();

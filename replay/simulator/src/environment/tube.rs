@@ -1,12 +1,12 @@
 //! The tunnel's wall: a profile that follows the axis, with a variable scale and local displacements.
 //!
-//! The gauge of a point compares two distances from the reference point: the distance to the point, divided by the
-//! distance to the wall in the same direction. The gauge is below 1 in the tunnel and 1 on the wall.
+//! The gauge of a point is a ratio of two distances from the reference point: the distance of the point, divided by the
+//! distance of the wall in the same direction. The gauge is below 1 in the tunnel and 1 on the wall.
 //!
 //! If the axis is straight, the scale constant and the wall not displaced, the range to the wall has a closed form.
 //! Otherwise a ray advances in steps of (1 - gauge) divided by an upper bound on the slope of the gauge. Such steps
-//! cannot pass the wall, however thin a protrusion is. Only the last steps have a minimum length of [`LEAST_STEP_M`],
-//! so a ray may cross less than that length of rock unnoticed.
+//! cannot pass the wall, however thin a protrusion is. However, steps are at least [`LEAST_STEP_M`] long, so a ray may
+//! cross less than that length of rock unnoticed.
 //!
 //! A mesh that replaces the wall has a stretch of its own. The planes at its ends are also wall where water on one side
 //! meets rock on the other. A ray therefore cannot escape if profile and mesh do not fit.
@@ -28,7 +28,7 @@ const LEAST_STEP_M: f64 = 1e-4;
 const ROOT_M: f64 = 1e-11;
 /// Displacement above which a hit on the wall is attributed to the feature that displaced the wall, m.
 const FEATURE_M: f64 = 1e-3;
-/// Half the distance between the points whose difference gives the normal of a displaced wall, m.
+/// Half the distance between the points from which the normal of a displaced wall is computed, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
 /// The tunnel's wall along the whole tunnel, except openings.
@@ -71,7 +71,7 @@ pub(super) struct Passage {
     pub(super) t_m: f64,
     /// Whether the ray's passage ends at the wall.
     pub(super) wall: bool,
-    /// Face of the wall at the end of the passage, if known without further computation.
+    /// Face of the wall at the end of the passage; `None` if it is not computed yet.
     pub(super) face: Option<Face>,
     /// Chainages of the start and the end of the passage, m.
     pub(super) chainages_m: [f64; 2],
@@ -134,13 +134,13 @@ impl Tube {
         }
     }
 
-    /// Number of the mesh that is the wall anywhere between two chainages, and the mesh.
+    /// A mesh that is the wall somewhere between two chainages: its number, and the mesh.
     fn mesh_over(&self, from_m: f64, to_m: f64) -> Option<(usize, &MeshWall)> {
         let overlaps = |(begin_m, end_m): (f64, f64)| begin_m < to_m && from_m < end_m;
         self.meshes.iter().enumerate().find(|(_, mesh)| overlaps(mesh.span_m()))
     }
 
-    /// Number of the feature with the mesh that is the wall anywhere between two chainages.
+    /// Number of the feature whose mesh is the wall somewhere between two chainages.
     pub(super) fn mesh_within(&self, from_m: f64, to_m: f64) -> Option<u16> {
         self.mesh_over(from_m, to_m).map(|(_, mesh)| mesh.feature())
     }
@@ -384,8 +384,8 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Without this return, adding and subtracting the floor's position could change the last bit. The plain case
-        // must equal the profile exactly.
+        // Without this return, adding and subtracting the floor's position could change the last bit of the result. The
+        // plain case must equal the profile exactly.
         if scale == 1.0 {
             return section;
         }

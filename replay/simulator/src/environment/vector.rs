@@ -84,6 +84,6 @@ impl Frame {
 pub(super) struct Face {
     /// Unit normal of the wall, towards the water.
     pub(super) normal: V3,
-    /// Number of the feature that displaced the wall at the point.
+    /// Number of the feature that displaced the wall at the point, or whose mesh is the wall there.
     pub(super) feature: Option<u16>,
 }

@@ -11,7 +11,7 @@
 //! | bar100 | depth_steps, depth_noise | 31.2 mm; a count of 305 Pa / 2 | the data sheet: 3.05 mbar; resolution 3 mbar |
 //! | models with known noise | imu_noise, imu_bias | the device's own figures | the device's crate, through [`Device::inertial_noise`] |
 //!
-//! A head on a vehicle implies further effects: see [`of_vehicle`].
+//! A head on a vehicle implies more effects: see [`of_vehicle`].
 //!
 //! [`Device::inertial_noise`]: headrace_sensor::device::Device::inertial_noise
 

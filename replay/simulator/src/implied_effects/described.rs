@@ -258,7 +258,7 @@ fn openings(environment: &Environment, sonars: &[String], length_m: f64) -> Vec<
     environment.openings().map(by_opening).collect()
 }
 
-/// Wide beams near rubble, which hit both stones and the wall behind them.
+/// Effect of rubble: a wide beam hits both stones and the wall behind them.
 fn rubble(environment: &Environment, sonars: &[String]) -> Option<Call> {
     let [from_m, to_m] = environment.rubble_m()?;
     let by = format!("rubble from {from_m:.1} to {to_m:.1} m");

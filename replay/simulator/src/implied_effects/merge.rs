@@ -4,8 +4,8 @@
 use super::call::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
-/// The key of effects whose value is a list. The lists of several calls are concatenated. For any other key the later
-/// call's value applies.
+/// The only key of an effect whose value is a list. The lists of several calls are concatenated. For all other keys,
+/// the value of the later call applies.
 const PLACES: &str = "places";
 
 /// Name of the effect that has one table per group of sensors.
@@ -13,7 +13,7 @@ const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
 
-/// Sensors whose tables have the same ranges of chainage and the same keys. For [`GROUPED`], also the sensors that the
+/// Sensors that share tables, the ranges of chainage and keys of these tables, and for [`GROUPED`] the sensors that the
 /// call names.
 type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
@@ -68,7 +68,7 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
         };
         let acting: Vec<&Call> = calls.iter().filter(acts).copied().collect();
         let pieces = pieces(&acting);
-        // A table of this effect lists the heads of one frequency. Two calls therefore give two tables.
+        // A table of `interference` lists the heads of one frequency. Two calls therefore give two tables.
         let group = acting.first().filter(|_| effect == GROUPED).map(|call| call.sensors.as_ref());
         match shared.iter_mut().find(|(_, other, of)| *other == pieces && *of == group) {
             Some((ids, ..)) => ids.extend(sensor),

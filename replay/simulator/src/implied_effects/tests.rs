@@ -35,7 +35,7 @@ fn implied_effects_are_simulated_only_if_the_scene_says_so() {
 
 /// The displayed tables are equivalent to the implied effects: copied into the scene, they give the same bytes.
 #[test]
-fn implied_effects_act_like_named_ones() {
+fn implied_effects_give_the_same_messages_as_named_effects() {
     let called = format!("{MURK}[effects]\ntake = \"called\"\n");
     let scene = dive().scene(&called).unwrap();
     let tables: String = scene.called().iter().map(|call| call.tables.as_str()).collect();
@@ -97,7 +97,7 @@ fn each_description_implies_its_effects() {
 }
 
 #[test]
-fn named_effects_override_implied_ones_and_the_leave_key_omits_effects() {
+fn named_effects_override_implied_effects_and_the_key_leave_omits_effects() {
     let text = format!(
         "{MURK}[effects]\ntake = \"called\"\nleave = [\"beam_cone\"]\nrange_noise = {{ sd_m = 0.2 }}\n"
     );
@@ -110,7 +110,7 @@ fn named_effects_override_implied_ones_and_the_leave_key_omits_effects() {
 }
 
 #[test]
-fn left_out_effect_acts_as_if_the_scene_did_not_name_it() {
+fn leaving_out_an_effect_equals_not_naming_it_in_the_scene() {
     let both = "[effects]\nrange_noise = { sd_m = 0.2 }\nmissing_returns = { share = 0.2 }\n";
     let mut scene = dive().scene(both).unwrap();
     scene.leave_out(&["range_noise"]);

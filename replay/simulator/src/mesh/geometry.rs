@@ -8,7 +8,7 @@
 use headrace_geometry::math;
 
 /// Relative size of a triangle's area, seen along the ray, below which rounding errors dominate. Such a triangle is a
-/// needle or is seen edge-on. The value is a few thousand units in the last place.
+/// needle or is seen edge-on. The value is a few thousand times the relative rounding error of one operation.
 const THIN: f64 = 1e-12;
 /// Factor that widens the interval of a box by more than its rounding error.
 const WIDER: f64 = 1.0 + 1e-15;
@@ -29,8 +29,8 @@ pub(super) struct Ray {
     inverse: [f64; 3],
     /// Numbers of the coordinate axes. The axis nearest to the ray's direction is last.
     axes: [usize; 3],
-    /// Shear that maps the ray onto the last axis: amounts subtracted from the first two coordinates per unit of the
-    /// last, and the scale of the last coordinate.
+    /// Shear that makes the ray parallel to the last axis: the amounts that are subtracted from the first two
+    /// coordinates per unit of the last coordinate, and the scale of the last coordinate.
     shear: [f64; 3],
     far: f64,
 }

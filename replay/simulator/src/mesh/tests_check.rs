@@ -58,7 +58,7 @@ fn duplicated_vertices_are_welded() {
 }
 
 #[test]
-fn edges_of_three_faces_are_refused() {
+fn edge_shared_by_three_faces_is_refused() {
     let mut t = cuboid([1.0; 3]);
     t.vertices.push([5.0, 0.0, 0.0]);
     t.faces.push([0, 1, 8]);

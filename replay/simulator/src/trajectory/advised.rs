@@ -13,11 +13,11 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// Number of knots after a time on which the position at that time depends.
+/// The position at a time depends on at most this many later knots.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back to a missed stretch, m/s.
 const BACK_MPS: f64 = 0.2;
-/// Least distance of a missed stretch behind the vehicle at which the pilot goes back, m.
+/// The pilot goes back for a missed stretch once it is this far behind the vehicle, m.
 const BEHIND_M: f64 = 3.0;
 /// Run-up before the second pass over a missed stretch, m.
 const RUN_UP_M: f64 = 2.5;
@@ -25,7 +25,7 @@ const RUN_UP_M: f64 = 2.5;
 const HOLD_S: f64 = 20.0;
 /// Maximum total time that the pilot keeps the vehicle stationary because of advice, s.
 const MOST_STOOD_S: f64 = 120.0;
-/// Time that the pilot waits for further advice at the end, s.
+/// Time that the pilot waits for more advice at the end, in addition to `lag_s`, s.
 const WAITS_S: f64 = 10.0;
 
 /// The monitor's advice to the pilot at one time.
@@ -99,7 +99,7 @@ pub(super) struct Advised {
     x_m: f64,
     speed_mps: f64,
     farthest_m: f64,
-    /// Missed stretches that the pilot has gone back for.
+    /// Missed stretches that the pilot has gone back for, each extended by 1 m at both ends.
     tried_m: Vec<[f64; 2]>,
     /// Number of the next knot of the trajectory to decide.
     next: i64,
@@ -201,7 +201,7 @@ impl Advised {
         }
     }
 
-    /// The last advice given at least `lag_s` before `at_s`, if any.
+    /// The latest advice that was given at least `lag_s` before `at_s`, if any.
     fn told_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
         let heard = |told: &&PilotAdvice| told.at <= by && by > MonoNs(START.0);

@@ -1,4 +1,4 @@
-//! The trajectory: a base motion, and further motions added to it.
+//! The trajectory: a base motion, and other motions added to it.
 
 use super::advised::{Advised, PilotAdvice};
 use super::flow::Flow;
@@ -24,7 +24,8 @@ enum Base {
 }
 
 impl Trajectory {
-    /// Creates a trajectory of legs at constant speed from `start_m`, level, at one position in the cross-section.
+    /// Creates a trajectory of legs at constant speed from `start_m`, at one position in the cross-section. The vehicle
+    /// stays level.
     pub fn of_legs(start_m: f64, across_m: [f64; 2], legs: Vec<Leg>) -> Self {
         let legs = Legs::new(start_m, across_m, legs);
         Self { duration_s: legs.duration_s(), base: Base::Legs(legs), sways: Vec::new() }
@@ -78,7 +79,7 @@ impl Trajectory {
         place
     }
 
-    /// Adds a further motion to the trajectory. The duration stays the same.
+    /// Adds a motion to the trajectory. The duration stays the same.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }

@@ -23,7 +23,8 @@ impl Leg {
     }
 }
 
-/// Trajectory of legs in sequence, level and parallel to the axis, at one position in the cross-section.
+/// Trajectory of legs in sequence, at one position in the cross-section. The vehicle stays level and parallel to the
+/// axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Legs {
     across_m: [f64; 2],

@@ -46,8 +46,8 @@ fn legs_follow_each_other_without_a_jump() {
     assert!(steps.windows(2).all(|w| (w[1].chainage_m - w[0].chainage_m).abs() < 0.005 + 1e-9));
 }
 
-/// Corners are rounded over two seconds. The trajectory therefore starts after, and ends before, its outer waypoints,
-/// by a sixth of the distance travelled in half a second.
+/// Corners are rounded over two seconds. The trajectory therefore starts a little after its first waypoint and ends a
+/// little before its last one. The difference is a sixth of the distance travelled in half a second.
 #[test]
 fn waypoints_are_passed_at_their_speeds() {
     let trajectory = trajectory(
@@ -226,7 +226,7 @@ fn spline_acceleration_has_no_jumps() {
 }
 
 #[test]
-fn random_drift_has_the_given_amplitude_and_spread() {
+fn random_drift_has_the_given_amplitude_and_sd() {
     let reach = [1.0, 2.0, 0.0, 0.1, 0.2, 0.3];
     let knots = wandering(Stream::new(2, "wandering", "test"), 20_000.0, 10.0, reach);
     let (mut squares, mut products, count) = ([0.0; 6], 0.0, 20_000_u32);

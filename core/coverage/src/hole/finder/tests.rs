@@ -101,7 +101,7 @@ proptest! {
     /// The exact diameter D lies within the bounds found by a search with a tolerance. The bounds are at most
     /// the tolerance apart.
     ///
-    /// A verdict from these bounds equals the exact one, or is undecided if T lies between them.
+    /// A verdict from these bounds equals the verdict from the exact D, or is undecided if T lies between the bounds.
     #[test]
     fn bounds_of_a_search_with_tolerance_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -175,7 +175,7 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// On a lattice, every local maximum is equidistant from four samples.
+    /// On a lattice, the centre of every hole is equidistant from four samples.
     #[test]
     fn lattice_hole_is_as_wide_as_the_lattice_diagonal(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
@@ -314,7 +314,7 @@ fn largest_holes_of_ideal_helices_match_reference_values() {
 }
 
 #[test]
-fn samples_of_visits_before_the_requested_one_are_ignored() {
+fn samples_of_visits_before_the_requested_visit_are_ignored() {
     let grid = |off_m: f64| {
         (0..60).flat_map(move |i| {
             (0..20).map(move |k| (f64::from(i) * 0.1 + off_m, f64::from(k) * PERIMETER_M / 20.0))

@@ -64,7 +64,7 @@ fn section_without_pings_has_the_largest_position_error_nearby() {
     for (beside, expected) in [(18, 0.0), (19, 0.03), (21, 0.03), (22, 0.03), (23, 0.0)] {
         assert!(near(error_of(beside, 20), expected), "{beside}: {}", error_of(beside, 20));
     }
-    assert!(near(error_of(31, 30), 0.01), "its own error, although a neighbour has a larger one");
+    assert!(near(error_of(31, 30), 0.01), "its own error, although a neighbour has a larger error");
     assert!(near(error_of(29, 28), 0.03) && near(error_of(27, 28), 0.03));
 }
 
@@ -114,7 +114,7 @@ fn verdict_stays_open_until_enough_of_the_hole_is_beyond_the_heads_reach() {
 }
 
 #[test]
-fn no_verdict_is_given_if_the_hole_bounds_straddle_the_target() {
+fn verdict_is_cannot_say_if_the_hole_bounds_straddle_the_target() {
     let within = |diameter_m: f64, least_m: f64, most_m: f64| {
         verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, Target::new(0.5), BEHIND)
     };
@@ -124,10 +124,10 @@ fn no_verdict_is_given_if_the_hole_bounds_straddle_the_target() {
     assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
 }
 
-/// Judges a section of a pipe after two visits, each with a mesh of samples of this size, m.
+/// Judges a section of a pipe after two visits. Each visit leaves a square mesh of samples; `meshes_m` are its widths.
 ///
-/// With `is_related`, both visits belong to one stretch of navigation. Returns the verdict, the hole's diameter, m,
-/// and the first visit that counts.
+/// With `is_related`, both visits belong to one navigation segment. Returns the verdict, the hole's diameter, m, and
+/// the first visit that counts.
 fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
@@ -143,7 +143,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
             errors: [PassError::default(); 2],
         };
         let around = math::round_to_i64(perimeter_m / mesh_m);
-        // The centre between two rows of samples is the centre of the section.
+        // The centre of the section lies half way between two rows of samples.
         let rows = math::floor_to_i64(2.0 / mesh_m);
         for (i, k) in (-rows..rows).flat_map(|i| (0..around).map(move |k| (i, k))) {
             let (x_m, arc_m) = (5.125 + mesh_m * (i as f64 + 0.5), perimeter_m / around as f64 * k as f64);
@@ -173,8 +173,9 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     (section.verdict, section.hole.unwrap().diameter_m, section.visits.first())
 }
 
-/// Judges a section of a pipe in which a square hole has no samples except, in its middle, a missing sample that may be
-/// wall or not. The section is judged again at the end of the dive, when the list of missing samples is empty.
+/// Judges a section of a pipe with a square hole. `may_be_wall` describes a missing sample in the middle of the hole.
+///
+/// The section is judged again at the end of the dive, when the list of missing samples is empty.
 fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>) {
     let profile = shapes::circle(3.0).unwrap();
     let layout = StoreLayout {
@@ -226,7 +227,7 @@ fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>
     (section.verdict, section.unsure())
 }
 
-/// The target is 0.5 m. A return in the middle of a hole of 0.7 m would fill it, but not one of 2 m.
+/// The target is 0.5 m. A sample in the middle would fill a hole of 0.7 m, but not a hole of 2 m.
 #[test]
 fn section_neither_passes_nor_fails_if_doubtful_returns_would_fill_its_hole() {
     let undecided = (Verdict::CannotSay, Some(Unsure::DoubtfulReturns));
@@ -237,7 +238,7 @@ fn section_neither_passes_nor_fails_if_doubtful_returns_would_fill_its_hole() {
     assert_eq!(with_hole(2.0, Some(true)), (Verdict::Fail, None), "the rest of the hole is too large");
 }
 
-/// A mesh leaves holes as wide as its diagonal: 0.28 m for 0.2 m, 0.48 m for 0.34 m.
+/// A mesh leaves holes as wide as its diagonal: 0.28 m for a mesh width of 0.2 m, 0.48 m for 0.34 m.
 ///
 /// The target is 0.5 m.
 #[test]
@@ -245,13 +246,13 @@ fn hole_uses_the_samples_of_all_visits_unless_the_newest_visit_alone_passes() {
     let fine_m = 0.2 * math::sqrt(2.0);
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::Pass, 0), "each visit adds to the other");
+    assert_eq!((verdict, first), (Verdict::Pass, 0), "the samples of both visits count");
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], false);
     assert!((hole_m - 0.34 * math::sqrt(2.0)).abs() < 0.01, "{hole_m}");
     assert_eq!((verdict, first), (Verdict::Pass, 1), "the first visit has no relation to the second");
     let (verdict, hole_m, first) = seen_twice([0.2, 0.6], false);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::CannotSay, 0), "neither the newest visit alone nor both pass");
+    assert_eq!((verdict, first), (Verdict::CannotSay, 0), "neither the newest visit nor both visits pass");
     let (verdict, hole_m, first) = seen_twice([0.6, 0.2], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
     assert_eq!((verdict, first), (Verdict::Pass, 0));

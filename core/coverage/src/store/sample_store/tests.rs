@@ -164,7 +164,7 @@ proptest! {
 
     /// Every dropped sample has a stored sample within the stated distance.
     #[test]
-    fn every_dropped_sample_has_a_stored_one_nearby(
+    fn every_dropped_sample_has_a_stored_sample_nearby(
         places in proptest::collection::vec((0.0f64..0.31, 1.0f64..1.31), 400..900),
         packing: bool,
     ) {
@@ -258,7 +258,7 @@ fn memory_stops_growing_while_the_vehicle_is_stationary() {
     assert_eq!(usage.kept + usage.thinned, 4 * pings as u64);
     assert!(usage.kept < 10_000, "{usage:?}");
     assert!(usage.bytes < 2_000_000, "{usage:?}");
-    assert!(usage.kept - after_half.kept < 300, "it should hardly grow any more: {after_half:?} {usage:?}");
+    assert!(usage.kept - after_half.kept < 300, "the store should hardly grow: {after_half:?} {usage:?}");
     assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
 }
 
@@ -288,7 +288,7 @@ fn memory_does_not_grow_over_a_hundred_passes_back_and_forth() {
     for round in 0..100 {
         for k in 0..500 {
             let k = if round % 2 == 0 { k } else { 499 - k };
-            // The vehicle drives 150 m back and forth, so that the beginning is packed and opened each time.
+            // The vehicle drives 150 m back and forth, so that the first bricks are packed and opened each time.
             let x_m = 0.3 * f64::from(k);
             store.nearest_pass_m(at(x_m, 1.0), 12.0);
             let arc_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
@@ -299,7 +299,7 @@ fn memory_does_not_grow_over_a_hundred_passes_back_and_forth() {
         }
     }
     let (usage, (then, used)) = (store.usage(), after_seventy.unwrap());
-    assert!(usage.kept < used.kept + used.kept / 50, "full cells must take no more: {used:?} {usage:?}");
+    assert!(usage.kept < used.kept + used.kept / 50, "full cells must drop samples: {used:?} {usage:?}");
     assert!(usage.bytes < used.bytes + used.bytes / 50, "{used:?} {usage:?}");
     let now = kept(&store);
     let lost = then.iter().filter(|place| !now.iter().any(|other| apart(**place, *other) <= packed::MOVED_M));
@@ -341,7 +341,7 @@ fn packed_stretch_that_fills_all_open_bricks_can_be_read() {
     store.insert(sample(100.0, 0.0)).unwrap();
     assert!(
         store.bricks.iter().take(30).all(|brick| brick.slot == 0),
-        "it must be packed for the distant sample"
+        "the bricks must be packed for the distant sample"
     );
     // The step from 2.2 to 2.3 m crosses the arc length at its centre.
     let distance = store.nearest_pass_m(at(1.5, 2.25), 5.0).unwrap();

@@ -41,7 +41,7 @@ fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     say_otherwise(events, &[source], for_s, |reading, _| last(reading));
 }
 
-/// Checks the filter before the fault and from `wrong_until_s` on. Between both times, the fault looks like real
+/// Checks the filter before the fault and from `wrong_until_s` on. In the time between, the fault looks like real
 /// motion.
 fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
     let mut nav = rig.navigation();
@@ -63,7 +63,7 @@ fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
 }
 
 #[test]
-fn fix_is_withheld_after_long_silence_and_returns() {
+fn fix_is_withheld_during_long_sensor_silence_and_returns_afterwards() {
     /// Name, trajectory, silent sources, duration, and whether there is no fix at the end.
     type Silence = (&'static str, Way, &'static [usize], f64, bool);
     let near_wall: Way = |t| Pose {
@@ -231,7 +231,7 @@ fn jumping_sensor_is_rejected() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // The chainage is unknown while counter and estimate differ by metres, which lasts until a second after the
+        // The chainage is unknown while counter and estimate differ by metres. This lasts until a second after the
         // jump.
         let lacking = if source == TETHER { 45 } else { 0 };
         assert!(
@@ -277,7 +277,7 @@ fn ranged(reading: &Reading, share: f64) -> Reading {
 }
 
 #[test]
-fn filter_recovers_from_a_plausible_jump_within_60_s() {
+fn filter_recovers_from_plausible_wrong_inertial_readings_within_60_s() {
     // The cause is a knock or a faulty unit, and no single sensor shows the fault. The fix is wrong until the other
     // sensors have corrected it.
     let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
@@ -382,7 +382,8 @@ fn length_m(reading: &Reading) -> f64 {
 
 /// A counter sticks permanently while the vehicle moves on. Eventually the filter reports an unknown chainage.
 ///
-/// To gyros and accelerometers, steady motion looks like rest. But the filter does not take steady motion for rest.
+/// Gyros and accelerometers show the same readings in steady motion as at rest. The filter still does not take steady
+/// motion for rest.
 #[test]
 fn permanently_stuck_counter_leads_to_no_fix() {
     let steady: Way = |t| Pose { position: Point3::new(3.0 + 0.2 * t, 0.4, 4.0), attitude: Rot::identity() };

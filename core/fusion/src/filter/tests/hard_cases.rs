@@ -19,7 +19,7 @@ use headrace_support::hard_cases::{found, found_at};
 
 const HOUR: DurNs = DurNs(3_600_000_000_000);
 
-/// Returns estimate and covariance one second after the last reading's validity, when the reordering window is empty.
+/// Returns estimate and covariance a second after the time of the last reading, when the reordering window is empty.
 fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
     let mut nav = rig.navigation();
     let last = events.iter().map(|event| event.valid).max().unwrap();
@@ -232,7 +232,7 @@ fn errors_stay_within_limits_at_any_attitude() {
             let rig = Rig::new(way, seed);
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
-            // The first estimate has no height if no echosounder faces up or down.
+            // The first estimates have no height, and so give no fix, if no echosounder faces up or down.
             assert!(tally.lacking <= 2, "{name}: {tally:?}");
         }
     }

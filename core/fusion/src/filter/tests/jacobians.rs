@@ -373,7 +373,7 @@ fn transition_matrix_equals_finite_differences_of_the_model() {
                 let (off, size) = (math::sqrt(off), math::sqrt(size));
                 assert!(
                     off < 3e-3 * size + 1e-9,
-                    "round {round}: of {from} on {to} off by {off} of {size}: {start:?}"
+                    "round {round}: effect of error {from} on error {to}, {size}, is off by {off}: {start:?}"
                 );
             }
         }

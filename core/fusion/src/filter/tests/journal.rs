@@ -30,7 +30,7 @@ fn is_whole(piece: &[Placed]) -> bool {
 }
 
 #[test]
-fn drive_without_estimate_records_no_smoothing_steps() {
+fn dive_without_an_estimate_records_no_smoothing_steps() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 1.0).iter().filter(|event| event.source == IMU) {

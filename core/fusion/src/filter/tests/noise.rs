@@ -11,7 +11,7 @@ use crate::filter::state::{
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Returns a leg of a vehicle at rest, and the covariance that the leg adds to zero.
+/// Returns the transition of a leg with these inertial data, and the covariance that the leg's noise adds to zero.
 fn leg(settings: &Settings, dt_s: f64, felt: InertialSample) -> (Transition, Factors<ERRORS>) {
     let mut state = Draws::new(1).state();
     let mut leg = Leg::default().with_noise([1.0; 2], settings.slack);
@@ -92,9 +92,10 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
 
 /// The reference is 4000 random epochs of ten samples with white force and white turn rate, by `State::go_on`.
 ///
-/// The relative spread of a variance from n draws is sqrt(2 / n) = 2.2 %, so the limit of 9 % is four standard
-/// deviations. Turn rate noise also tilts the force, which the process noise of an epoch neglects. So the unit is
-/// level and only tilts about x, and only its x axis is checked: gravity has no first-order effect there.
+/// A variance from n draws has a relative standard deviation of sqrt(2 / n) = 2.2 %, so the limit of 9 % is four
+/// standard deviations. Turn rate noise also tilts the force, which the process noise of an epoch neglects. So the
+/// simulated unit is level and only tilts about x, and the reference is its x axis: there, gravity has no first-order
+/// effect.
 #[test]
 fn white_process_noise_covariance_equals_monte_carlo() {
     const DRAWS: u32 = 4000;

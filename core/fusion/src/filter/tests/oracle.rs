@@ -222,7 +222,7 @@ fn all(case: &str, n: usize) -> [Worst; 3] {
 /// Name of each oracle case, number of errors, and tolerance of the factored form: about ten times its error.
 ///
 /// The rounding error is some units in the last place, times the ratio of the largest to the smallest standard
-/// deviation in any direction. This ratio is 1e12 after ten hours.
+/// deviation over all directions. This ratio is 1e12 after ten hours.
 const CASES: [(&str, usize, f64); 13] = [
     ("mild", 4, 1e-14),
     ("mild", 6, 1e-14),
@@ -238,7 +238,7 @@ const CASES: [(&str, usize, f64); 13] = [
     ("swinging", 4, 1e-9),
     ("swinging", 6, 1e-5),
 ];
-/// Multiple of the factored form's tolerance above which the full covariance form counts as failed.
+/// The full covariance form fails if its error exceeds this multiple of the factored form's tolerance.
 const FAILS: f64 = 30.0;
 
 #[test]

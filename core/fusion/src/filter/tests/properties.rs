@@ -95,7 +95,7 @@ proptest! {
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// From a start half a metre away, a fit to the echoes from a position ends at this position.
+    /// The echoes come from a known position. A fit that starts about half a metre away ends at this position.
     ///
     /// With arbitrary ranges, the fit still ends inside the tunnel.
     #[test]
@@ -126,7 +126,7 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// If a sensor sends too often, its used readings are at least one period apart. No other reading is skipped.
+    /// Used readings are at least one period apart if a sensor sends too often. No other reading is skipped.
     #[test]
     fn readings_of_a_source_are_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
@@ -224,7 +224,7 @@ fn whole(transition: &Transition) -> Square {
     }))
 }
 
-/// An augmented filter as in textbooks: clones' errors are appended to the present errors and are not corrected.
+/// An augmented filter as in textbooks: errors of clones are appended to the present errors and are not corrected.
 struct Augmented {
     now: Square,
     /// Covariance of the errors at the time of each clone, and their cross-covariance with the present errors.
@@ -250,8 +250,8 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the change in chainage error, at `arm`, from the clone `back` before the newest until
-    /// now.
+    /// Standard deviation of the change in chainage error, at `arm`, until now. The change is counted from the clone
+    /// that is `back` clones before the newest.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];

@@ -17,7 +17,7 @@ pub(super) const TETHER: usize = 1;
 pub(super) const DEPTH: usize = 2;
 /// Source number of the first of four echosounders: left, right, down, up.
 pub(super) const ECHOES: usize = 3;
-/// Source number of the first of two heads; one head is yawed ahead and the other head back.
+/// Source number of the first of two heads. The first head faces ahead, and the second head astern.
 pub(super) const HEADS: usize = 7;
 pub(super) const VELOCITY_LOG: usize = 9;
 /// Source number of a sensor that navigation does not use.

@@ -59,7 +59,7 @@ fn rotated_head_is_reported_with_its_angle() {
     }
 }
 
-/// Feeds the readings of a dive to a filter that knows `mount_sd_deg`; only readings that `is_heard` allows.
+/// Feeds the readings of a dive to a filter with this declared mount error. `is_heard` selects the sources.
 fn dived(rig: &Rig, to_s: f64, mount_sd_deg: f64, is_heard: &dyn Fn(usize) -> bool) -> FilterNavigation {
     let mut nav = rig.navigation();
     nav.context.settings.mount_sd_rad = mount_sd_deg.to_radians();

@@ -8,7 +8,7 @@ use crate::math::{self, TAU};
 
 /// Distance below which two points count as equal, m.
 pub(super) const SAME_POINT_M: f64 = 1e-9;
-/// Number of elements above which a polygon has a table of its extent by direction.
+/// A polygon with more elements than this has a table of its extent by direction.
 const MANY: usize = 256;
 /// Number of equidistant wall places that [`Profile::places`] returns.
 const PLACES: u32 = 64;
@@ -175,15 +175,15 @@ impl Profile {
 
     /// Casts a ray like [`Profile::cast`], but does not check that `origin` is inside.
     ///
-    /// For many rays from one point that is known to be inside.
+    /// Use it for many rays from one point that is known to be inside.
     pub fn cast_from_inside(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         self.hit(origin, direction)
     }
 
     /// Returns the arc length of the wall in the direction of `point`, as seen from the reference point.
     ///
-    /// This arc length is the coordinate for spacing if the wall differs from the design. Zero for the reference
-    /// point itself.
+    /// If the wall differs from the design, the spacing of samples is measured by this arc length. Zero for the
+    /// reference point itself.
     pub fn arc_of(&self, point: Yz) -> f64 {
         let direction = sub(point, self.reference);
         self.hit(self.reference, direction).map_or(0.0, |hit| hit.arc_m)

@@ -7,11 +7,11 @@ use crate::math::{self, TAU};
 pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
 /// Margin beyond which a ray's hit is clearly inside or outside the angle of an arc.
 ///
-/// The margin applies to the cosine of the angle about the arc's middle, minus this cosine at the arc's ends. This
-/// margin is far larger than `ARC_SLACK_RAD` plus rounding.
+/// The margin applies to the difference of two cosines: of the angle from the arc's middle to the hit, and of the angle
+/// from the middle to an end. It is far larger than `ARC_SLACK_RAD` plus rounding.
 const CLEAR: f64 = 1e-9;
 
-/// Sine of the angle below which an edge of the profile and a ray count as parallel.
+/// An edge of the profile and a ray count as parallel if the sine of their angle is below this.
 const PARALLEL: f64 = 1e-6;
 
 /// One input piece of a profile, a line or an arc; pieces run counter-clockwise with y to the right and z up.

@@ -33,7 +33,7 @@ fn worst(case: &str) -> (f64, f64, u32) {
 }
 
 #[test]
-fn rays_from_1_mm_off_the_wall_agree_with_50_digit_values() {
+fn rays_that_start_1_mm_from_the_wall_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("millimetre");
     assert_eq!(count, 144);
     found("geometry.millimetre", range_m.max(arc_m), 1e-13);

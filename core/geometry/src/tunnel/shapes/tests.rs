@@ -92,7 +92,7 @@ fn rays_through_a_corner_and_an_ulp_beside_it_hit_the_corner() {
 }
 
 #[test]
-fn rays_from_1_mm_off_the_wall_end_on_the_wall() {
+fn rays_that_start_1_mm_from_the_wall_end_on_the_wall() {
     for (name, profile) in all() {
         for step in 0..50 {
             let wall = profile.cast(profile.reference(), {
@@ -150,7 +150,7 @@ fn ray_from_outside_has_no_hit() {
 }
 
 #[test]
-fn invalid_curve_is_rejected_with_its_vertex() {
+fn error_of_an_invalid_curve_names_its_vertex() {
     let bow_tie = [[1.0, 0.0], [-1.0, 2.0], [1.0, 2.0], [-1.0, 0.0]];
     assert!(Profile::polygon(&bow_tie, Some([0.0, 1.0])).is_err());
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];

@@ -48,10 +48,10 @@ fn angle_is_hidden_if_most_pings_get_no_return() {
     assert!(!hides([10_000, 400]), "the last hundreds of pings got returns");
 }
 
-/// The simulated pings of a silent head are lost as often, and in runs as long, as its real pings were. The
+/// The simulated pings of a silent head are lost as often, and in series as long, as its real pings were. The
 /// same times always give the same losses.
 #[test]
-fn simulated_losses_match_rate_and_run_length() {
+fn simulated_losses_match_the_share_and_clustering_of_real_losses() {
     let lost = |rate: LossRate| {
         let mut turning = Turning::default();
         (0..40_000).map(|k| turning.would_lose(MonoNs(k * 20_000_000), rate)).collect::<Vec<bool>>()
@@ -82,7 +82,7 @@ fn pings_without_a_fix_beyond_the_capacity_are_dropped_and_recorded() {
     assert_eq!((first.is_lost, second.is_lost), (false, true), "a return without a fix isn't lost");
     assert!([first, second].iter().all(|ping| ping.why == Causes::of(Cause::PositionLost) && ping.head == 1));
     note_ping(&mut lacking, &away(ROOM as u64, unplaced), &mut lacks);
-    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, true), "a forgotten stretch is recorded");
+    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, true), "the dropping is recorded");
 }
 
 fn lacks_of(lacks: &MissingSamples) -> Vec<MissingSample> {
@@ -114,7 +114,7 @@ fn loss_at_an_occluded_angle_is_a_missing_return_once_other_pings_there_detect_w
     assert_eq!(causes(&[lost(Loss::Occluded)]), Some(Causes::of(Cause::MissingReturns)));
     assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
     let before = lacks_of(&lacks).len();
-    assert_eq!(before, 14, "samples are not missing");
+    assert_eq!(before, 14, "pings with a return add none");
     note_ping(&mut lacking, &PlacedPing { standing: true, ..lost(Loss::Missing) }, &mut lacks);
     assert_eq!(lacks_of(&lacks).len(), before, "a stalled head misses nothing at its own angle");
     assert!(lacking.stalled.has(1) && !lacking.stalled.has(0));
@@ -220,7 +220,7 @@ impl Dive {
         lacks_of(&self.coverage.lacks)
     }
 
-    /// Whether the missing samples are those of the pings expected after 10 s, in order, each at its expected
+    /// Whether the missing samples belong to the pings expected after 10 s, in order, each at its expected
     /// place.
     fn are_pings_after_10_s(&self, lacks: &[MissingSample], why: &[Cause]) -> bool {
         let [y_m, z_m] = self.profile.reference();
@@ -239,7 +239,7 @@ impl Dive {
 fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
     let mut dive = Dive::new();
     assert_eq!(dive.beat(10.2, true).len(), 0, "the head may still ping");
-    // The missing samples are first those of one second, then those of two seconds.
+    // After one second 50 samples are missing, and after two seconds 100.
     let first = dive.beat(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadSilent]), "{first:?}");
     let second = dive.beat(12.0, true);

@@ -201,7 +201,7 @@ fn error_about_an_impossible_plan_names_the_cause() {
 ///
 /// Four heads of a vehicle lose speed to hidden wall and phases.
 #[test]
-fn each_margin_lowers_the_speed_down_to_the_largest_planned_speed() {
+fn margins_lower_the_speed_step_by_step_to_the_largest_planned_speed() {
     for (inspection, loses) in [(ideal(1), false), (vita_2(HeadLayout::PhaseShift), true)] {
         let planner = Planner::new(inspection).unwrap();
         let (mode, target_m) = (2, 0.5);
@@ -339,11 +339,11 @@ fn plan_error_names_the_configured_target() {
     assert!(why.to_string().contains("a target of 0.6 m"), "{why}");
 }
 
-/// Heads at one position see the same neighbours as one head.
+/// Heads at one position have the same distances between samples as one head.
 ///
 /// For heads at different positions, the smallest and largest distances between samples are over all heads.
 #[test]
-fn minimum_and_maximum_neighbour_distances_are_over_all_heads() {
+fn smallest_and_largest_sample_distances_are_over_all_heads() {
     let chords_m = |inspection: Inspection| {
         let planner = Planner::new(inspection).unwrap();
         planner.modes().iter().map(|mode| mode.chords_m).collect::<Vec<_>>()

@@ -6,7 +6,7 @@ import { Feed } from "./feed";
 import { embedded, entryAt, isLast, readDive, stateAt, type Dive } from "./file";
 import type { Command } from "./types";
 
-/** Time span before the displayed time whose samples the cross-section of a file shows: two turns of a slow head. */
+/** Time span before the displayed time. In a file the cross-section shows its samples: two turns of a slow head. */
 const TURNS_MS = 20_000;
 
 let feed: Feed | null = null;

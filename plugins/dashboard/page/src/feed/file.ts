@@ -1,5 +1,5 @@
-// Reads a dive that is embedded in the page's own file: base64 of deflate-raw of frames (u32 length, u8 0 text | 1
-// binary, bytes).
+// Reads a dive that is embedded in the page's own file: base64 of frames that are compressed with deflate-raw. A frame
+// is u32 length, u8 kind (0 text, 1 binary), bytes.
 import type { Store } from "../store/store";
 import { frameOf, KIND_SAMPLES, type Frame } from "./binary";
 import type { End, Message, State } from "./types";

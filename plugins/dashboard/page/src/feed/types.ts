@@ -3,7 +3,7 @@ import type { CLASSES, CONDITIONS, POSITION_WHY, PRIORITIES, REASONS, SENSOR_STA
 
 export type Mode = "live" | "demo" | "replay" | "file";
 export type Lamp = "green" | "amber" | "red";
-/** Speed texts with the one rounding rule of all screens. `limit` and `margin` are null if no limit applies at present. */
+/** Speed texts, rounded as on all screens. `limit` and `margin` are null if no limit applies at present. */
 export interface Speeds { speed: string | null; limit: string | null; margin: string | null }
 export type Condition = keyof typeof CONDITIONS;
 export type Priority = keyof typeof PRIORITIES;
@@ -55,7 +55,7 @@ export interface State {
   ended?: boolean;
   alert_list?: Alert[]; alerts_hidden?: number;
   left?: { cable_m: number | null; time_s: number | null; battery_pct: number | null } | null;
-  /** When the dive began; the hello of a page that was open before has 0. */
+  /** Time at which the dive began. The hello of a page that was opened before states 0. */
   begun_s?: number | null;
   pose?: { y_m: number; z_m: number; roll_deg: number; pitch_deg: number; yaw_deg: number } | null;
   echosounders?: Echosounder[];

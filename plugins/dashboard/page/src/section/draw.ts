@@ -41,7 +41,7 @@ export function drawSection(context: CanvasRenderingContext2D, store: Store, wid
   const echosounders = state?.echosounders ?? [];
   echosounders.forEach((echo) => beam(frame, echo));
   vehicle(frame, pose);
-  // The labels of short beams lie on the vehicle.
+  // Labels are drawn after the vehicle, because those of short beams lie on it.
   echosounders.forEach((echo) => distance(frame, echo));
 }
 
@@ -74,7 +74,7 @@ export function pointAt(points: [number, number][], share: number): [number, num
   return [y0 + (y1 - y0) * part, z0 + (z1 - z0) * part];
 }
 
-/** Draws the angles that the vehicle hides from a head. They count from down towards the left, and turn with the vehicle's roll. */
+/** Draws the angles that the vehicle hides from a head. They count from straight down to the left. Roll turns them. */
 function hidden({ context, x, y, scale }: Frame, ranges: [number, number][], pose: Pose, reach_m: number): void {
   context.fillStyle = colour("hidden");
   context.globalAlpha = 0.3;
@@ -114,7 +114,7 @@ function returns({ context, x, y }: Frame, list: Return[], present: boolean): vo
   }
 }
 
-/** Draws the last aim of a head. */
+/** Draws the direction of a head's latest ping. */
 function direction(frame: Frame, pose: Pose, latest: Return, head: number, points: [number, number][]): void {
   const { context, x, y } = frame;
   const [py, pz] = latest.outcome === 2 || Number.isNaN(latest.y_m) ? pointAt(points, latest.arc) : [latest.y_m, latest.z_m];

@@ -4,7 +4,7 @@ import { figure } from "../text/format";
 
 /** A wall nearer than this raises a warning on the page, m. At 0.2 m/s it leaves 2.5 s to react. */
 export const CLOSE_M = 0.5;
-/** A reading older than this counts as silent, s, as the age of the data. */
+/** A reading older than this counts as silent, s. It is the age above which all data of the page count as old. */
 const FRESH_S = 2;
 
 export function isFresh({ age_s }: Echosounder): boolean {

@@ -67,7 +67,7 @@ function Left() {
 
 export function Back() {
   useTopics(store.topics.back, store.topics.state);
-  // A file has the legs of the end only.
+  // A file has the way back only for the end of the dive.
   const known = store.link.phase !== "file" || hasEnded(store);
   const { legs, way_m, time_s } = known ? store.back : { legs: [], way_m: 0, time_s: 0 };
   const totals = legs.length === 0 ? [] : [legs.length > 1 ? `${legs.length} stretches` : null, metres(way_m), time_s === null ? null : span(time_s)];

@@ -18,7 +18,7 @@ export function hasEnded(store: Store): boolean {
   return store.end !== null || store.state?.ended === true;
 }
 
-/** Lengths by verdict. Those of the result replace those of the last state, whose verdicts are not all final. */
+/** Lengths by verdict. The result's lengths replace the lengths of the last state, whose verdicts are not all final. */
 export function metresOf({ end, state }: Store): Metres | null {
   const sums = end?.summary;
   if (!sums) return state?.metres ?? null;

@@ -1,4 +1,4 @@
-// Times of the dive: seconds since its begin, and UTC if the log knows it.
+// Times of the dive: seconds since its beginning, and UTC if the log states it.
 import type { Hello } from "../feed/types";
 import { clock } from "./format";
 

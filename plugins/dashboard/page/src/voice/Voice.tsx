@@ -5,8 +5,8 @@ import { clock } from "../text/format";
 import { MOST_S } from "./lack";
 import { discard, lacks, next, voice, voiceTopic } from "./record";
 
-/** A recording whose button is held longer than this ends on release. Both times are those of the input, because a busy
- * page handles it late. */
+/** A recording whose button is held longer than this ends on release. The times of press and release are those of the
+ * input events, because a busy page handles the events late. */
 const HELD_MS = 700;
 let down_ms: number | null = null;
 

@@ -13,7 +13,7 @@ export function set(next: View): void {
   viewTopic.changed();
 }
 
-/** Chainages of the coverage extent, and of the tunnel if its length is known. */
+/** Chainages of the coverage extent, as far as the page has its sections. */
 export function wayOf(): [number, number] {
   const { sections, hello } = store;
   if (sections.least > sections.most || !hello) return [0, 0];

@@ -2,7 +2,8 @@
 import { SAMPLE_BYTES, type Frame } from "../feed/binary";
 import { downOf, type Round } from "./view";
 
-/** Floats per sample: x from the origin, fraction of the perimeter from the crown (outside 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
+/** Floats per sample: x from the origin, fraction of the perimeter from the crown, time, and head + 16 * outcome. A
+ * sample near the seam has a copy with a fraction outside 0 to 1. */
 export const FLOATS = 4;
 /** A live frame with more records than this may have been thinned, because the server sends at most 1,000 at once. */
 const WHOLE_LIVE = 500;

@@ -55,13 +55,13 @@ export function movedDown(view: View, by: number): View {
   return { ...view, centreDown: down - Math.floor(down) };
 }
 
-/** Shows the whole coverage extent, from the portal. */
+/** Shows the whole range between two chainages. */
 export function wholeView(view: View, from_m: number, to_m: number): View {
   const span_m = Math.max(to_m - from_m, LEAST_SPAN_M) * 1.04;
   return { ...view, span_m, centre_m: (from_m + to_m) / 2, follow: false, whole: true, zoomDown: 1, centreDown: 0.5 };
 }
 
-/** Fraction of the perimeter at the crown, and sign of arc length when clock positions run down from 12 by way of 3, looking inwards. */
+/** Fraction of the perimeter at the crown, and 1 if arc length grows from 12 o'clock towards 3, or -1 if it shrinks. */
 export interface Round { crown: number; sign: number }
 
 export function roundOf(clock_arc_m: number[], perimeter_m: number): Round {
@@ -70,7 +70,7 @@ export function roundOf(clock_arc_m: number[], perimeter_m: number): Round {
   return { crown, sign: step < 0.5 ? 1 : -1 };
 }
 
-/** Converts a fraction of the arc length to a fraction of the perimeter from the crown, 0 to 1. */
+/** Converts an arc length, as a fraction of the perimeter, to the fraction from the crown, 0 to 1. */
 export function downOf(round: Round, arc: number): number {
   const down = round.sign * (arc - round.crown);
   return down - Math.floor(down);

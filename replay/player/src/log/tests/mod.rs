@@ -68,7 +68,7 @@ fn read_all<R: std::io::Read + std::io::Seek>(reader: &mut LogReader<R>) -> Vec<
         let MonoNs(log_time) = message.log_time;
         seen.push((kind, log_time, message.publish_time.0, message.sequence, message.data.to_vec()));
     }
-    assert!(reader.next().unwrap().is_none(), "the end stays the end");
+    assert!(reader.next().unwrap().is_none(), "a second call must return the end again");
     seen
 }
 

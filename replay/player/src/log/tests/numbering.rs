@@ -228,7 +228,7 @@ fn damaged_chunk_is_reported_as_one_loss() {
 }
 
 #[test]
-fn numbering_losses_after_resuming_at_an_earlier_position_are_unchanged() {
+fn resuming_at_an_earlier_position_reports_the_same_numbering_losses() {
     each(|what, records| {
         let mut records = without_summary(records);
         let places = chunks(&records);

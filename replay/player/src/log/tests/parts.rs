@@ -188,7 +188,7 @@ fn damaged_parts_lose_only_damaged_messages_and_recover_to_one_log() {
     assert!(seen.len() > 1000 && whole.starts_with(&seen), "{}", seen.len());
     let told: Vec<String> = log.losses().iter().map(ToString::to_string).collect();
     assert_eq!(told.len(), 2, "{told:?}");
-    assert!(told[0].starts_with("part 4 can't be read: "), "{told:?}");
+    assert!(told[0].starts_with("the file that is named like part 4 can't be read: "), "{told:?}");
     assert!(told[1].starts_with("part 3, byte ") && told[1].contains("the file ends before"), "{told:?}");
 
     let mut output = Vec::new();

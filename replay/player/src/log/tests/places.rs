@@ -69,7 +69,7 @@ fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
 
 /// Checks that reading resumes correctly from the position after `first` messages.
 ///
-/// It resumes with the reader that has meanwhile read `further` messages, and with a new reader.
+/// It resumes with the same reader, which has meanwhile read `further` more messages, and with a new reader.
 fn check(bytes: &[u8], first: usize, further: usize) -> Result<(), TestCaseError> {
     let mut straight = open(bytes);
     let all = take(&mut straight, usize::MAX);

@@ -86,7 +86,7 @@ impl Write for Held {
 /// Until a sync returns, the unsynced time is the time from the first tick to the last. The unsynced time is zero after
 /// a sync that began after the last tick.
 #[test]
-fn unsynced_time_runs_from_last_sync_to_last_tick() {
+fn unsynced_time_lasts_from_latest_sync_to_latest_tick() {
     let (go, held) = mpsc::channel();
     go.send(()).unwrap();
     let (mut port, mut handle) = Recorder::start(Held(held), &header(true), 0).unwrap();
@@ -110,8 +110,8 @@ fn unsynced_time_runs_from_last_sync_to_last_tick() {
     assert_eq!(handle.finish().unwrap().messages, 7);
 }
 
-/// Writing the queue takes seconds. A dive from ports waits 0.6 s in total. Other recordings wait while the medium
-/// makes progress.
+/// Writing the queue takes seconds. With a time limit, the end of the recording waits 0.6 s in total. Without one, it
+/// waits while the medium makes progress.
 #[test]
 fn slow_recording_is_cut_off_at_the_time_limit_only_on_request() {
     for in_time in [true, false] {
@@ -125,7 +125,7 @@ fn slow_recording_is_cut_off_at_the_time_limit_only_on_request() {
         handle.patience = Duration::from_millis(600);
         handle.begin_to_end(in_time);
         match handle.finish() {
-            Err(LogError::Stuck { .. }) => assert!(in_time, "it makes progress"),
+            Err(LogError::Stuck { .. }) => assert!(in_time, "no time limit was requested"),
             ended => assert!(!in_time && ended.is_ok_and(|summary| summary.messages == 40_000)),
         }
     }
@@ -150,7 +150,7 @@ fn messages_older_than_a_second_are_readable_in_an_open_log() {
 }
 
 #[test]
-fn entry_larger_than_the_queue_is_refused_whole() {
+fn entry_larger_than_the_queue_is_refused_and_not_written_in_part() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let capacity = port.capacity_bytes();
@@ -163,7 +163,7 @@ fn entry_larger_than_the_queue_is_refused_whole() {
 }
 
 #[test]
-fn dropped_recorder_handle_syncs_all_but_writes_no_end() {
+fn dropped_recorder_handle_syncs_every_message_and_writes_no_end_mark() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.raw(0, MonoNs(5), MonoNs(5), b"ping").unwrap();
@@ -282,7 +282,7 @@ fn within(
 }
 
 #[test]
-fn recorder_on_a_nearly_full_disk_keeps_small_messages_and_records_omissions() {
+fn recorder_on_a_nearly_full_disk_keeps_small_messages_and_states_dropped_echoes() {
     let (medium, flushed) = slow(0);
     let mut header = header(true);
     header.results.push(ResultChannel {
@@ -362,7 +362,7 @@ fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
 }
 
 #[test]
-fn packets_dropped_by_connections_are_recorded_per_source_every_few_seconds() {
+fn counts_of_dropped_packets_are_recorded_per_source_every_few_seconds() {
     let s = Duration::from_secs;
     let words = |packets: u64, id: &str, from: u64, to: u64| {
         format!(
@@ -468,7 +468,7 @@ fn recorder_ends_despite_a_blocked_medium() {
 }
 
 #[test]
-fn skipped_ticks_are_recorded_in_the_log() {
+fn skipped_ticks_are_stated_in_the_log() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let second = |seconds: u64| MonoNs(seconds * 1_000_000_000);

@@ -111,7 +111,7 @@ fn messages_for_undeclared_channels_are_refused() {
 }
 
 #[test]
-fn log_is_opened_by_path_and_its_digest_computed() {
+fn logs_are_opened_by_path_and_file_digest_is_sha256() {
     let path = std::env::temp_dir().join(format!("headrace-round-trip-{}.mcap", std::process::id()));
     let mut log = LogWriter::create(&path, &header(true)).unwrap();
     write(&mut log, 10);

@@ -206,7 +206,7 @@ fn storage_fault_that_occurs_once_loses_nothing_and_is_recorded() {
             let which = format!("{name}, operation {at} of {ops}, {forgets}: {:?}", summary.faults);
             assert_eq!(seen, expected, "{which}");
             assert_eq!(summary.messages, 4 * TICKS, "{which}");
-            // If the failed operation was to begin the next part, only the rotation fails.
+            // If the next part can't be created, only the rotation fails.
             let Some(fault) = summary.faults.first() else {
                 assert!(every.is_some() && losses.is_empty(), "{which}: {losses:?}");
                 continue;
@@ -365,7 +365,7 @@ fn lost_s(sync: Duration) -> f64 {
 }
 
 #[test]
-fn killed_program_loses_at_most_a_second_and_a_sync() {
+fn killed_program_loses_at_most_one_second_plus_one_sync_time() {
     for sync_s in [0.001, 0.01, 0.1, 0.25, 0.5, 0.7, 1.0, 2.0, 5.0] {
         let lost = lost_s(Duration::from_secs_f64(sync_s));
         assert!(lost <= 1.0 + sync_s, "{lost} s are lost where a sync takes {sync_s} s");

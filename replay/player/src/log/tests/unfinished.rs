@@ -1,4 +1,4 @@
-//! Recordings that were cut off at any byte are continued in further parts, and are read as one log.
+//! Recordings that were cut off at any byte are continued in new parts, and are read as one log.
 
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ fn recording_cut_at_any_byte_is_continued_without_gaps_or_repetitions() {
         assert!(kept[..before.len()] == before, "cut at {bytes}");
         stated.push(go_on(&recording));
         let (after, losses) = messages(&recording);
-        assert_eq!(losses, stated, "cut at {bytes}: only the interruptions are lost");
+        assert_eq!(losses, stated, "cut at {bytes}: only the interruptions are reported");
         assert!(after[..kept.len()] == kept, "cut at {bytes}");
         continued += 1;
         let of = |kind: &str| {
@@ -116,7 +116,59 @@ fn recorder_dropped_without_an_orderly_end_can_be_continued() {
 }
 
 #[test]
-fn last_recording_of_a_folder_is_found_if_it_did_not_end_in_order() {
+fn part_cut_within_its_header_does_not_prevent_the_continuation() {
+    let folder = Folder::new("header");
+    let recording = folder.0.join("dive.mcap");
+    let rotation = Rotation { every: None, dive: "one".to_owned() };
+    record(Recorder::create(&recording, &header(true), &rotation, QUEUE_BYTES, None).unwrap(), 0..50);
+    cut(&recording, std::fs::metadata(&recording).unwrap().len() / 2);
+    let (before, _) = messages(&recording);
+    let unfinished = Unfinished::read(&recording).unwrap().unwrap();
+    let interrupted = Interrupted { to: unfinished.last, recording: unfinished, words: String::new() };
+    let recorder = Recorder::go_on(&interrupted, &header(true), None, QUEUE_BYTES, None).unwrap();
+    drop((recorder, interrupted));
+    let part = std::fs::read(folder.part(2)).unwrap();
+    // With its number, the part is continued like any other. Without it, its file has no data.
+    let (mut with_number, mut without) = (0, 0);
+    for bytes in (0..part.len()).step_by(part.len() / 30) {
+        std::fs::write(folder.part(2), &part[..bytes]).unwrap();
+        go_on(&recording);
+        let (after, losses) = messages(&recording);
+        assert!(after.len() == before.len() + 90 && after[..before.len()] == before, "cut at {bytes}");
+        match losses.iter().any(|loss| loss.contains("the file that is named like part 2 can't be read")) {
+            true => without += 1,
+            false => with_number += 1,
+        }
+        std::fs::remove_file(folder.part(3)).unwrap();
+    }
+    assert!(with_number > 2 && without > 2, "{with_number} with number, {without} without");
+}
+
+#[test]
+fn dive_is_continued_at_another_path_if_its_medium_is_gone() {
+    let folder = Folder::new("elsewhere");
+    let recording = folder.0.join("dive.mcap");
+    let rotation = Rotation { every: None, dive: "one".to_owned() };
+    record(Recorder::create(&recording, &header(true), &rotation, QUEUE_BYTES, None).unwrap(), 0..50);
+    cut(&recording, std::fs::metadata(&recording).unwrap().len() / 2);
+    let elsewhere = folder.0.join("other.mcap");
+    let unfinished = Unfinished::read(&recording).unwrap().unwrap();
+    let moved = unfinished.at(&elsewhere);
+    assert_eq!(moved.next_path(), folder.0.join("other.part002.mcap"));
+    let (tick, to) = (moved.next_tick(), moved.last);
+    let interrupted = Interrupted { recording: moved, to, words: "begins within a dive".to_owned() };
+    record(Recorder::go_on(&interrupted, &header(true), None, QUEUE_BYTES, None).unwrap(), tick..tick + 30);
+    let (after, losses) = messages(&elsewhere);
+    assert_eq!(after.len(), 90);
+    assert!(losses.iter().any(|loss| loss.contains("part 1 of the recording is missing")), "{losses:?}");
+    // Brought together, they are one dive again.
+    std::fs::copy(folder.0.join("other.part002.mcap"), folder.part(2)).unwrap();
+    let (all, losses) = messages(&recording);
+    assert!(all.len() > 90 && losses.len() == 1, "{losses:?}");
+}
+
+#[test]
+fn latest_recording_of_a_folder_is_found_if_it_did_not_end_in_order() {
     let folder = Folder::new("last");
     let last = || Unfinished::last_in(&folder.0, &|info| info.metadata.contains_key("simulated")).unwrap();
     let create = |name: &str, dive: &str| -> PathBuf {

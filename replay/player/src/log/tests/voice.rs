@@ -126,7 +126,7 @@ fn voice_recording_gets_the_log_time_of_the_previous_message() {
     assert_eq!(
         voices(&seen),
         [voice(1, 5000), voice(2, 5000), voice(3, 5000)],
-        "the first, once there is a time"
+        "the first recording waits for a log time"
     );
     let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
     assert!(times.is_sorted(), "{times:?}");
@@ -150,7 +150,7 @@ fn voice_recording_is_refused_while_the_medium_fails() {
 }
 
 #[test]
-fn waiting_voice_recordings_are_limited() {
+fn number_of_waiting_voice_recordings_is_limited() {
     let storage = Small::of(usize::MAX);
     let mut dive = dive(&storage);
     dive.go_on(1);

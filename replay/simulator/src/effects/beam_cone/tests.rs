@@ -15,7 +15,7 @@ fn wide_tunnel() -> Environment {
 }
 
 #[test]
-fn beam_rays_span_the_footprint_on_the_floor() {
+fn beam_rays_cover_the_whole_footprint_on_the_floor() {
     let tunnel = wide_tunnel();
     for (angle_deg, width_deg) in [(0.0, 2.4), (30.0, 2.4), (60.0, 1.4), (60.0, 20.0)] {
         let (angle_rad, width_rad) = (f64::to_radians(angle_deg), f64::to_radians(width_deg));
@@ -139,7 +139,7 @@ fn single_echo_is_found_at_its_range_and_then_removed() {
 }
 
 #[test]
-fn stronger_echo_wins_and_near_echoes_merge() {
+fn strongest_echo_sets_the_range_and_neighbouring_echoes_are_averaged() {
     let mut bins = Bins::new(0.02);
     bins.add(3.0, 1.0);
     bins.add(4.0, 1.5);

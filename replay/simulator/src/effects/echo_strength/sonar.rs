@@ -109,7 +109,7 @@ pub(crate) fn frequency_of_khz(beam_rad: f64) -> f64 {
 
 /// Usual setting of the absorption that the head compensates, dB/m: one value for 1 MHz, one for 675 kHz.
 ///
-/// Source: the switch command as DUNE's driver sets it. The limit between the two values is halfway.
+/// Source: the switch command as DUNE's driver sets it. The limit is halfway between the two frequencies.
 pub(super) fn usual_absorption_dbpm(frequency_khz: f64) -> f64 {
     if frequency_khz > 837.0 { 0.6 } else { 0.2 }
 }
@@ -158,7 +158,7 @@ impl Silt {
         let denser = GRAIN_DENSITY - 1.0;
         let friction = k * denser * denser * s / (s * s + (GRAIN_DENSITY + tau) * (GRAIN_DENSITY + tau));
         let scattering = k * k * k * k * self.grain_m * self.grain_m * self.grain_m / 3.0;
-        // Both terms are absorption of power, while nepers refer to amplitude.
+        // Both terms are absorption of power. Nepers refer to amplitude, hence the factor 1/2.
         volume * (friction + scattering) / 2.0 * DB_PER_NEPER
     }
 }

@@ -28,7 +28,7 @@ fn head(dive: &Dive, source: usize) -> HeadSpec {
 }
 
 #[test]
-fn reflected_and_direct_paths_give_their_apparent_ranges() {
+fn apparent_ranges_of_reflected_and_direct_pings_follow_from_time_and_path() {
     let dive = pair();
     let spec = head(&dive, 0);
     let other_spec = head(&dive, 1);
@@ -118,7 +118,7 @@ fn synchronous_heads_hear_each_other_when_facing() {
 }
 
 #[test]
-fn unsynchronised_heads_hear_each_other_by_the_wall_and_through_side_lobes() {
+fn unsynchronised_heads_hear_each_other_via_the_wall_and_through_side_lobes() {
     let dive = Dive { seconds: 100.0, ..out_of_step() };
     let count = |effects: &str| {
         let rows = dive.dive(effects).rows;

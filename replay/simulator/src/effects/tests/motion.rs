@@ -54,7 +54,7 @@ fn row(at: u64, values: &[f64]) -> [f64; 9] {
 /// Effects on other sensors change neither the random numbers of an effect on one sensor, nor the measurements of
 /// sensors without effects.
 #[test]
-fn adding_an_effect_to_one_sensor_changes_nothing_for_others() {
+fn adding_an_effect_to_one_sensor_changes_no_other_sensor() {
     for (sensor, alone) in ALONE.iter().filter(|(sensor, _)| !sensor.is_empty()) {
         let touching = ALONE.iter().filter(|(touched, _)| !touched.is_empty() && touched != sensor);
         let others: Vec<String> =

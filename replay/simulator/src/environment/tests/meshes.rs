@@ -90,7 +90,7 @@ fn place_in(lcg: &mut Lcg, radius_m: f64, x_m: [f64; 2]) -> V3 {
 }
 
 #[test]
-fn mesh_of_the_profile_gives_equal_ranges() {
+fn mesh_of_the_profile_gives_the_ranges_of_the_profile() {
     let environment = wall(&tube(RADIUS_M, 10.0, 3, &[]));
     let within_m = RADIUS_M * (1.0 - SAGITTA);
     let mut lcg = Lcg(60);
@@ -146,7 +146,7 @@ fn no_ray_escapes_between_mismatched_mesh_and_profile() {
             let hit = cast(&environment, ray.origin, ray.direction);
             assert_eq!(environment.is_water(to_point(ray.origin)), hit.is_some(), "{ray:?}");
             let Some(hit) = hit else {
-                assert!(!is_water(ray.origin), "{ray:?} got out");
+                assert!(!is_water(ray.origin), "{ray:?} left the tunnel");
                 continue;
             };
             let places = (0..100).map(|k| ray.at(hit.range_m * f64::from(k) / 100.0));

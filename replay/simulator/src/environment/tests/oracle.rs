@@ -254,7 +254,7 @@ impl Oracle {
             assert!((hit.normal.norm() - 1.0).abs() < 1e-9, "{hit:?}");
             odd_normals += usize::from(!self.is_normal(&hit));
         }
-        assert!(odd_normals * 50 <= rays, "{odd_normals} of {rays} normals don't part water from rock");
+        assert!(odd_normals * 50 <= rays, "{odd_normals} of {rays} normals do not separate water from rock");
         met
     }
 

@@ -18,9 +18,9 @@ fn plain(profile: &Profile) -> Profile {
 }
 
 proptest! {
-    /// Results with a search tree are bit-identical to those without, even for rays through vertices.
+    /// The results are bit-identical, even for rays through vertices.
     #[test]
-    fn profile_queries_with_a_search_tree_equal_queries_without(
+    fn profile_queries_give_equal_results_with_and_without_a_search_tree(
         radii in prop::collection::vec(1.8..2.2_f64, 25..400),
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
