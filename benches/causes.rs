@@ -4,7 +4,7 @@
 //! (default 0 to 500). OPTION is one of:
 //! - `wrong`: lists the stretches with a wrong cause;
 //! - `sections`: lists all sections;
-//! - `remedies`: also simulates the displayed remedy of each run;
+//! - `remedies`: also simulates the displayed remedy of each missed stretch;
 //! - `knowing`: prints how often a reference is right if it knows everything about a dive except its noise.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]

@@ -261,8 +261,8 @@ fn resident() -> f64 {
     pages.split(' ').nth(1).and_then(|pages| pages.parse::<f64>().ok()).unwrap_or(f64::NAN) * 4096.0
 }
 
-/// Measures the memory for ten hours of four heads in FAST mode, on a drive of 7 km and while parked. The heads send
-/// 49 pings a second each, with noise of some centimetres.
+/// Measures the memory for ten hours of four heads in FAST mode, over 7 km and while parked. Each head sends 49 pings a
+/// second, with noise of some centimetres.
 fn memory() {
     for (what, length_m) in [("7 km in ten hours", 7_000.0), ("parked for ten hours", 0.0)] {
         let (before, perimeter_m) = (resident(), perimeter_m());

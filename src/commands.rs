@@ -41,10 +41,10 @@ use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
 
-/// Speed of the replay after a demo that ran as fast as possible, relative to real time. At such a speed there
+/// Speed of the replay after a demo that ran as fast as possible, relative to real time. At the demo's speed there
 /// would be nothing to see.
 const REPLAY_SPEED: f64 = 20.0;
-/// Time after the last packet that is certainly the end of a log.
+/// Time from the last packet to the target of a jump that must reach the end of the log.
 const BEYOND_END: DurNs = DurNs(1_000_000_000);
 
 /// Runs `headrace demo`.

@@ -68,7 +68,7 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Last state given to the loop: whether a recording is failing.
+    /// Whether a recording is failing, as the loop was told most recently.
     fails: bool,
 }
 
@@ -414,8 +414,8 @@ impl Dive {
         }
     }
 
-    /// Rebuilds the state of the dive before an interruption, while packets of the ports are only recorded. Returns
-    /// false if `ended` returned true meanwhile.
+    /// Rebuilds the state that the dive had before the interruption. Meanwhile packets of the ports are only recorded.
+    /// Returns false if `ended` returns true before the state is rebuilt.
     ///
     /// If the log can't be read, the dive goes on without the earlier part, and the report says so. If the dive ends
     /// before its state is rebuilt, the recording can be continued.

@@ -29,7 +29,7 @@ use stand::{OFF, Stand};
 
 /// Longest wait for bytes from a host, ns. It limits the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
-/// Delays of a device's data between which a key steps.
+/// Delays of a device's data, in the order in which a key selects them.
 const DELAYS: [DurNs; 3] = [DurNs(500_000_000), DurNs(2_000_000_000), DurNs(10_000_000_000)];
 
 /// Runs `headrace emulate`.
@@ -140,7 +140,7 @@ fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) ->
 
 /// The scene's vehicle file, with a `connect` in each sensor's table.
 ///
-/// A file for simulations may have none.
+/// A vehicle file for simulations may have no `connect`.
 fn with_connects(scene: &Scene) -> String {
     let missing: Vec<String> = scene
         .vehicle
@@ -347,7 +347,7 @@ fn tell(id: &str, told: &str) {
     say(&format!("{id:<12} {told}"));
 }
 
-/// The delay that follows a delay when the key is pressed.
+/// The delay that the key selects after `delay`.
 fn next_delay(delay: DurNs) -> DurNs {
     DELAYS.into_iter().find(|next| *next > delay).unwrap_or(DurNs(0))
 }

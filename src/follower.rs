@@ -31,8 +31,8 @@ pub(crate) trait Follower {
     fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
     /// Called with the state of the recordings that is to be shown from now on.
     fn recorded(&mut self, _state: &RecordingState) {}
-    /// Called when a replay has paused, jumped or ended, `time` after the log's beginning. The loop may hold
-    /// the state of another time.
+    /// Called when a replay has paused, jumped or ended. `time` counts from the log's beginning. The loop may hold the
+    /// state of another time.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
     /// Called when the state of an interrupted dive has been rebuilt from its log.
     fn rebuilt(&mut self, _dive: &Loop) {}

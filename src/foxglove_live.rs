@@ -1,7 +1,7 @@
 //! `--foxglove`: sends the viewer messages of a recording live, with Foxglove's own server.
 //!
-//! A separate thread builds the messages, as the recorder's does. The loop's thread only copies the words of
-//! a tick's results.
+//! A separate thread builds the messages, like the recorder's thread for a log. The loop's thread only copies the
+//! results of each tick.
 
 use std::net::SocketAddr;
 use std::sync::Arc;

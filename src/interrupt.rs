@@ -102,8 +102,7 @@ fn ending() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Sets `armed` as soon as a further request to end the program no longer counts as a repetition of the
-/// first.
+/// Sets `armed` as soon as another request to end the program no longer counts as a repetition of the first.
 fn arm_later(armed: Arc<AtomicBool>) -> Result<(), Failure> {
     let mut signals = seconds().map_err(failed)?;
     let wait = move || {

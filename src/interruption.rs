@@ -9,13 +9,13 @@ use headrace_replay::log::PartFile;
 use crate::feeds::share;
 use crate::report_output::files_report;
 
-/// An interruption of a dive that goes on.
+/// An interruption after which the dive goes on.
 pub(crate) struct Interruption {
     /// Time without data.
     pub(crate) gap: DurNs,
     /// First and last time of the interrupted dive's log.
     pub(crate) span: Option<(MonoNs, MonoNs)>,
-    /// Text about the dive that goes on.
+    /// Text that tells how the dive goes on.
     pub(crate) words: String,
     /// Losses that the interruption caused, as text.
     pub(crate) losses: Vec<String>,

@@ -12,8 +12,8 @@ const DIVE_BYTES: usize = 232 << 20;
 /// Address space for each metre of tunnel, bytes: the largest of six measurements with tunnels of 1 to 20 km (28 to 69
 /// KiB).
 const TUNNEL_BYTES_PER_M: f64 = 70.0 * 1024.0;
-/// Length of the allocations that are tried, bytes. The system refuses a single one that exceeds its memory, even if
-/// most of it would never be used.
+/// Length of the allocations that are tried, bytes. One large allocation would be refused if it exceeds the machine's
+/// memory, even if most of it is never used.
 const PIECE_BYTES: usize = 32 << 20;
 
 /// Checks that the system has the address space for a dive. Without the check, an allocation would fail later

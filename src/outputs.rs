@@ -175,7 +175,7 @@ struct Claimed {
     /// Option or argument that names the output.
     option: &'static str,
     path: PathBuf,
-    /// Whether the output is a recording, which may also write files of further parts.
+    /// Whether the output is a recording, which may also write files of later parts.
     is_recording: bool,
 }
 
@@ -198,8 +198,8 @@ impl Claims {
     /// Claims a recording, in parts if `rotated`. The recorder itself creates the first file, whose path is
     /// returned.
     ///
-    /// Errors: see [`claim`](Self::claim). Another error is an existing file that would pass for another part
-    /// of the recording.
+    /// Errors: see [`claim`](Self::claim). Another error is an existing file with the name of another part of this
+    /// recording.
     pub(crate) fn claim_recording(
         &mut self,
         option: &'static str,

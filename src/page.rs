@@ -446,7 +446,7 @@ struct PageFollower {
     now: MonoNs,
     /// Playback that the page controls; `None` for a page in a file.
     directed: Option<Arc<Directed>>,
-    /// Number of stops up to which the page shows the finished dive instead of the replay.
+    /// Number of stops for which the page shows the finished dive instead of the replay.
     ignored_stops: u8,
 }
 

@@ -27,7 +27,7 @@ pub(crate) use keys::{Hand, Key};
 /// Computing time between two snapshots of the loop. A jump thus takes well under a second, including the
 /// time to restore a snapshot.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
-/// Memory for snapshots, bytes. When it is full, every other snapshot is dropped and the interval is doubled.
+/// Memory for snapshots, bytes. When it is full, every second snapshot is dropped and the interval is doubled.
 const SNAPSHOT_BYTES: usize = 256 << 20;
 
 /// Controllers of playback besides standard input, such as the page or a full-screen terminal.
@@ -65,8 +65,8 @@ impl Playing {
             let mut playback = Playback::new(armed, player, store, pace)?;
             screen.begun = playback.begun();
             if let Some(from) = from {
-                // As a command, so that followers show the state after the jump, as after any other jump. The receiver
-                // lives as long as this function.
+                // The jump is a command, so that followers show the state after it, as after any other jump. Sending
+                // can't fail, because the receiver lives as long as this function.
                 let _received = sender.send(PlaybackCommand::Seek(screen.begun + from));
             }
             screen.watch.mode(false, pace.speed);

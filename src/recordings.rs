@@ -19,7 +19,8 @@ pub(crate) struct Recordings {
     all: Vec<One>,
     /// Whether the dive's time is that of this machine.
     ///
-    /// In a replay, unsynced data may hold minutes of a dive, but a power cut doesn't lose them.
+    /// Otherwise a power cut loses nothing, even if minutes of the dive are unsynced, because the dive can be run
+    /// again.
     is_live: bool,
     unsafe_for: DurNs,
 }

@@ -257,7 +257,7 @@ fn set_clock(dive: &Unfinished) -> DurNs {
     let gap = if is_same_boot {
         DurNs(host.0.cast_signed() + ahead - dive.last.0.cast_signed())
     } else {
-        // The interruption includes the time since the reboot. A UTC that was set back is no evidence against that.
+        // The gap is at least the time since the reboot, also if UTC was set back meanwhile.
         by_utc.filter(is_plausible).map_or(since_boot, |gap| DurNs(gap.0.max(since_boot.0)))
     };
     let gap = DurNs(gap.0.max(SHORTEST.0));

@@ -210,7 +210,7 @@ fn missed(run: &RunReport, report: &Report) -> String {
     let back = report.go_back.iter().find(|back| back.run == run.id);
     let action = back
         .map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps, heads)));
-    // The remaining sections of the run pass, or no longer have a verdict.
+    // The other sections of the missed stretch pass or no longer have a verdict, so the failed length is stated.
     let of_it = of_it_text(run.failed_m, run.end_m - run.start_m);
     format!(
         "  {} to {}{of_it}  MISSED: {cause}, holes up to {:.2} m{}",
@@ -254,7 +254,8 @@ fn declaration(opening: &SuggestedOpeningReport) -> Vec<String> {
     ]
 }
 
-/// Line about a position gap that no fix has ended, with its lower chainage. The sections of other gaps have verdicts.
+/// Line about a position gap that no fix has ended, and the gap's lower chainage. The sections of other gaps have
+/// verdicts.
 fn without_position(gap: &PositionGapReport, report: &Report) -> Option<(f64, String)> {
     let (from_m, to_m, back_to_m) = (gap.from_m?, gap.to_m?, gap.back_to_m?);
     if gap.is_over {
@@ -293,7 +294,7 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Lines about the effect of smoothing: metres by verdict, and a line per run of neighbouring sections with the
+/// Lines about the effect of smoothing: metres by verdict, and a line for each series of neighbouring sections with the
 /// same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
@@ -323,8 +324,8 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
     lines
 }
 
-/// Whether a section's change of verdict continues the run of changes that ends at `end_m`. If so, `end_m` is
-/// moved to the new end.
+/// Whether a section's change of verdict continues the series of changes that ends at `end_m`. If so, `end_m` is moved
+/// to the new end.
 fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
     let verdicts = |change: &ChangeReport| [change.before, change.after].map(verdict_text);
     let goes_on = (next.start_m - *end_m).abs() < 1e-6 && verdicts(first) == verdicts(next);
@@ -342,7 +343,7 @@ fn verdict_text(judged: Option<JudgedReport>) -> &'static str {
     }
 }
 
-/// Largest hole of a run with its standard deviation, m, as text.
+/// Largest hole of a series of sections with its standard deviation, m, as text.
 fn holes(run: impl Iterator<Item = JudgedReport>) -> String {
     let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sd_m)));
     let largest = measured.max_by(|a, b| a.0.total_cmp(&b.0));

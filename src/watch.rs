@@ -235,7 +235,7 @@ impl Watch {
         }
     }
 
-    /// Shows that a replay has paused, jumped or ended, `time` after the log's beginning.
+    /// Shows that a replay has paused, jumped or ended. `time` counts from the log's beginning.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         self.shown = None;
         self.teller.stopped(dive.now());

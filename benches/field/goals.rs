@@ -8,7 +8,8 @@ struct Bounds {
     false_fails: f64,
     cannot_say: f64,
     passed: f64,
-    /// Smallest ratio of the advised speed to the largest speed by the paper's Eq. 16 with the vehicle's own occlusion.
+    /// Smallest ratio of the advised speed to the largest speed that the paper's Eq. 16 gives with the vehicle's own
+    /// occlusion.
     advice: f64,
 }
 
@@ -98,7 +99,7 @@ impl Missed {
     }
 }
 
-/// Ratio of the advised speed to the largest speed by the paper's Eq. 16.
+/// Ratio of the advised speed to the largest speed that the paper's Eq. 16 gives.
 pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
     figures.advised_mps() / cell.vehicle.edge_mps
 }

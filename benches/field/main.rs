@@ -30,7 +30,7 @@ use table::NamedCell;
 fn main() {
     let arguments = Arguments::of(std::env::args().skip(1));
     let cells = table::cells(&arguments);
-    assert!(!cells.is_empty(), "--cell names none: vehicles, conditions, places and speeds are in the table");
+    assert!(!cells.is_empty(), "no cell of the table matches --cell VEHICLE/CONDITION/PLACE/SPEED");
     let figures = run(&cells, &arguments);
     print!("{}\n{}", table::csv(&cells, &figures), table::falsely(&cells, &figures));
     if let Some(file) = &arguments.csv {

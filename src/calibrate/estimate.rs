@@ -71,9 +71,10 @@ pub(crate) enum NotEstimated {
          turn; at least {least_deg:.0} are needed"
     )]
     LittleWall {
-        /// Sectors in which the head has seen wall, and also in the opposite direction, degrees.
+        /// Total angle of the sectors in which the head has seen wall both there and in the opposite direction,
+        /// degrees.
         opposite_deg: f64,
-        /// Minimum of these sectors, degrees.
+        /// Smallest total angle of such sectors that is enough, degrees.
         least_deg: f64,
     },
     /// The cross-section looks the same at every angle of the head about its axis.
@@ -179,7 +180,7 @@ pub(crate) enum NotEstimated {
         /// Latency at the late end of the search range, ms.
         then_ms: f64,
     },
-    /// The device must answer each request before the next one, so it can't be as late as the best fit.
+    /// The device answers each request before the next one comes, so its latency can't be as long as the best fit says.
     #[error(
         "{found_ms:.0} ms fits best, but the device answers every {every_ms:.0} ms, so its latency is \
          shorter; look for a delay on its line, or another fault"

@@ -21,7 +21,7 @@ pub(crate) struct Findings {
     pub(crate) surface: Result<Zero, NotEstimated>,
     /// Height of the water's surface above the floor, m.
     pub(crate) level: Result<Zero, NotEstimated>,
-    /// Chainage at which each cable counter reads zero, m, and the vehicle file's value.
+    /// Chainage at which each cable counter reads zero, m, each with the vehicle file's value, m.
     pub(crate) tethers: Result<Vec<(Zero, f64)>, NotEstimated>,
     /// Latency error of each sensor's timestamps.
     pub(crate) lags: Result<Vec<Lag>, NotEstimated>,

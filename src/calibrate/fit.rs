@@ -120,8 +120,7 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
     }
 }
 
-/// Mount of a head after a change of its angle about its axis and of its position. The head may also turn the
-/// opposite way.
+/// Mount of a head that is turned about its axis and moved. The head may also turn the opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
     // A head that faces the other way has its angles in the opposite sense.
@@ -305,7 +304,7 @@ impl Problem<'_> {
     }
 }
 
-/// State of the vehicle for these unknowns. The body's origin takes the place of the inertial unit.
+/// State of the vehicle for these unknowns. The inertial unit is assumed to be at the body's origin.
 fn state<const N: usize>(x: &[f64; N], attitude: Rot<Tunnel, Body>) -> State {
     let turn = rotation(Vec3::<Tunnel>::new(at(x, 2), at(x, 3), at(x, 4)));
     State::at_rest(Point3::new(0.0, at(x, 0), at(x, 1)), turn * attitude)

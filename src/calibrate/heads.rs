@@ -1,5 +1,4 @@
-//! Estimates the mounts of the heads. Their turns are used while the vehicle stands still in a tunnel of
-//! known profile.
+//! Estimates the mounts of the heads from their turns while the vehicle stands still in a tunnel of known profile.
 
 use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{Estimate, NotEstimated, median};
@@ -11,17 +10,18 @@ use headrace_geometry::frames::{Mount, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Minimum sector that a head must have seen to be calibrated, opposite walls only, degrees.
+/// Smallest total angle of the sectors in which a head must have seen two opposite walls to be calibrated, degrees.
 const LEAST_OPPOSITE_DEG: f64 = 120.0;
 /// Largest allowed median of the absolute range residuals, m. Above it, the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
-/// An estimate is reported only if its standard deviation is at most this share of that of the file's value.
+/// An estimate is reported only if its standard deviation is at most this share of the one assumed for the file's
+/// value.
 const TOLD: f64 = 0.3;
 /// Minimum cost difference between the two senses of rotation for a decision, in squared standard deviations.
 /// Chance alone exceeds it once in 10,000 times.
 const CLEAR: f64 = 15.0;
-/// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The
-/// last value is the number of rounds of every other fit.
+/// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The last value is
+/// the number of rounds of all other fits.
 const STARTS: usize = 24;
 const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;
@@ -101,9 +101,9 @@ pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
 
 /// Checks that a head has turned once, and seen opposite walls.
 ///
-/// From less of a turn, a fit may have a small standard deviation and still be wrong: it counts the errors of
-/// neighbouring returns as independent. Errors that many returns share (footprint, wall, profile) then look like another
-/// position of the vehicle and another angle of the head. Opposite walls separate them.
+/// After less than a turn, a fit may have a small standard deviation and still be wrong, because it counts the errors
+/// of neighbouring returns as independent. Errors that many returns share (footprint, wall, profile) then look like
+/// another position of the vehicle and another angle of the head. Returns from opposite walls show the difference.
 fn check_evidence(head: &HeadScan) -> Result<(), NotEstimated> {
     let swept_deg = head.sweep.swept_rad().to_degrees();
     if !head.sweep.is_whole() {
@@ -119,13 +119,13 @@ fn check_evidence(head: &HeadScan) -> Result<(), NotEstimated> {
     Ok(())
 }
 
-/// Reason that stands for those of all heads: the longest missing time, otherwise the first reason.
+/// Reason to report if no head can be calibrated: the one with the longest missing time, or else the first one.
 fn hardest(refused: &[(&HeadScan, NotEstimated)]) -> Option<NotEstimated> {
     let missing_s = |why: &NotEstimated| match why {
         NotEstimated::PartOfTurn { missing_s, .. } => *missing_s,
         _ => 0.0,
     };
-    // Of equal ones, `max_by` returns the last.
+    // Of equal reasons, `max_by` returns the last one. The reversed order makes that the first.
     refused.iter().rev().map(|(_, why)| *why).max_by(|a, b| missing_s(a).total_cmp(&missing_s(b)))
 }
 

@@ -74,10 +74,10 @@ impl HeadScan {
         self.seen().iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
     }
 
-    /// Total angle of the sectors in which the head has seen wall, and also in the opposite direction, radians.
+    /// Total angle of the sectors in which the head has seen wall both there and in the opposite direction, radians.
     ///
-    /// Errors that all ranges share move the vehicle and turn the head if only one side is seen. Between opposite
-    /// walls, they cancel.
+    /// If only one side is seen, errors that all ranges share shift the estimated position and turn the estimated
+    /// angle. With opposite walls these effects cancel.
     pub(crate) fn opposite_rad(&self) -> f64 {
         let seen = self.seen();
         let (first, second) = seen.split_at(SECTORS / 2);

@@ -68,7 +68,7 @@ struct Channel {
     by_bin: Vec<Option<f64>>,
 }
 
-/// Longest part in which the vehicle stood still. Of equally long ones, the first.
+/// Finds the longest period in which the vehicle stood still; of equally long ones, the first.
 ///
 /// Errors: there is no attitude or no return, or the vehicle moved all the time.
 pub(crate) fn longest(material: &Material<'_>) -> Result<Still, NotEstimated> {

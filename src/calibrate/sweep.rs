@@ -3,8 +3,8 @@
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
 
-/// Share of steps against the head's sense of rotation up to which it turns all the way round. Pings out of order cause
-/// a few such steps; a head that sweeps a sector makes as many one way as the other.
+/// A head turns all the way round if at most this share of its steps goes against its sense of rotation. Pings out of
+/// order cause a few such steps. A head that sweeps a sector makes as many steps one way as the other.
 const MOST_BACK: f64 = 0.1;
 
 /// Angle swept by a head, from the angles of its pings in order of time.
@@ -87,13 +87,13 @@ mod tests {
         sweep
     }
 
-    /// Pings every 2.4 degrees, as of an Imagenex 881 in its fastest mode.
+    /// Angles of pings every 2.4 degrees, as from an Imagenex 881 in its fastest mode.
     fn turn(pings: u32, sign: f64) -> impl Iterator<Item = f64> {
         (0..pings).map(move |k| 100.0 + sign * 2.4 * f64::from(k))
     }
 
     #[test]
-    fn turn_is_whole_after_its_last_ping_in_both_senses() {
+    fn turn_is_complete_after_its_last_ping_in_either_direction() {
         for sign in [1.0, -1.0] {
             assert!(sweep(turn(150, sign)).is_whole());
             assert!(sweep(turn(400, sign)).is_whole());
@@ -103,13 +103,13 @@ mod tests {
     }
 
     #[test]
-    fn lost_pings_leave_a_turn_whole() {
+    fn turn_with_lost_pings_is_complete() {
         let some = turn(150, 1.0).enumerate().filter(|(k, _)| k % 7 != 3).map(|(_, angle_deg)| angle_deg);
         assert!(sweep(some).is_whole());
     }
 
     #[test]
-    fn missing_seconds_follow_from_the_rate() {
+    fn time_to_complete_a_turn_is_computed_from_the_rate() {
         // 75 pings take 7.4 s at 24 degrees/s. Of 360 degrees, 180 are missing.
         let missing_s = sweep(turn(75, -1.0)).missing_s().unwrap();
         assert!((missing_s - 7.5).abs() < 1e-6, "{missing_s}");

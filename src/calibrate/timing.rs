@@ -175,8 +175,8 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.later.get(source).copied().unwrap_or(false)
     }
 
-    /// Returns the time offset. It is an error if with this offset the device would answer a request only
-    /// after the next one.
+    /// Returns the time offset. It is an error if the offset means that the device answers each request only after the
+    /// next request.
     fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, NotEstimated> {
         let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));
@@ -313,7 +313,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn source_early_beyond_its_latency_widens_all_timing_sds() {
+    fn source_that_seems_early_by_more_than_its_latency_widens_all_timing_sds() {
         let lag = |source, value, sd| Lag { source, offset_s: Ok(Estimate { value, sd }) };
         let latencies = [DurNs::from_secs_f64(0.01); 2];
         let sds = |mut lags: [Lag; 2]| {

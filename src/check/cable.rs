@@ -15,7 +15,7 @@ pub(super) struct Cable {
     /// A speed, m/s, followed by the standard deviation of a hole's diameter and the largest measured hole
     /// that passes at this speed, m.
     ///
-    /// The speed is the planned one, or without a plan the largest that meets the target.
+    /// The speed is the planned one. Without a planned speed it is the largest that meets the target.
     at_speed: Option<[f64; 3]>,
     /// Keys about the cable that the vehicle file doesn't set.
     missing: Vec<String>,
@@ -35,7 +35,7 @@ impl Cable {
         let step_m = vehicle.counter?.step_m;
         let planned_mps = Some(vehicle.planned_speed_mps).filter(|planned| *planned > 0.0);
         let at_speed = errors.zip(planned_mps.or(v_max_mps)).map(|(errors, speed_mps)| {
-            // Time between the passes on either side of a hole of the target's size.
+            // The argument is the time between the passes on either side of a hole of the target's size.
             let sd_m = errors.pass_error_m(vehicle.target.max_hole_m / speed_mps);
             [speed_mps, sd_m, (vehicle.target.max_hole_m - vehicle.target.error_m(sd_m)).max(0.0)]
         });

@@ -30,7 +30,7 @@ pub(super) struct Outlook {
 /// Relative difference below which two speeds are reported as one. It equals the margin that the advice keeps
 /// for errors of the measured speed.
 const TOLD_APART: f64 = 0.02;
-/// Relative difference below which two turn periods are equal.
+/// Relative difference below which two turn periods count as equal.
 const SAME: f64 = 1e-6;
 
 impl Outlook {

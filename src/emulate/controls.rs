@@ -46,7 +46,7 @@ pub(super) enum Order {
     End,
 }
 
-/// Reads the controls on a separate thread, and shows their list. The keyboard is released when it is dropped.
+/// Reads the controls on a separate thread, and shows their list. Dropping the returned `Keyboard` releases the keys.
 ///
 /// Errors: the terminal's settings can't be changed.
 pub(super) fn listen() -> Result<(Receiver<Input>, Option<Keyboard>), Failure> {
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rehearsal_commands_are_parsed_or_refused_with_the_allowed_values() {
+    fn rehearsal_commands_are_parsed_and_errors_list_the_allowed_values() {
         let order = |line| order(line, &["imu", "tether"]);
         assert_eq!(order(" unplug tether "), Ok(Order::Device(1, Change::Unplug)));
         assert_eq!(order("delay imu 0.5s"), Ok(Order::Device(0, Change::Delay(DurNs(500_000_000)))));

@@ -23,7 +23,7 @@ pub(super) struct Stand {
     pub(super) port: Option<EmulatedPort>,
     /// Address at which the host opens its end.
     pub(super) connect: Connect,
-    /// Link to a pseudoterminal, which gets another name when it is plugged in again.
+    /// Link to a pseudoterminal. The pseudoterminal gets another name when the device is plugged in again.
     link: Option<PathBuf>,
     /// Report descriptor of a HID device.
     descriptor: Vec<u8>,
@@ -189,7 +189,7 @@ fn relink(terminal: &str, link: &Path) -> io::Result<()> {
 
 fn remove_link(link: &Path) {
     if std::fs::symlink_metadata(link).is_ok_and(|there| there.is_symlink()) {
-        // If this fails, so does the new link.
+        // If this fails, creating the new link fails, too.
         std::fs::remove_file(link).unwrap_or_default();
     }
 }

@@ -31,8 +31,8 @@ pub(crate) enum Key {
     Help,
 }
 
-/// Reads the terminal's keys until the returned value is dropped, and sends their commands to `to`. `speed` is that
-/// of playback.
+/// Reads the terminal's keys until the returned value is dropped, and sends their commands to `to`. `speed` is the
+/// present playback speed.
 ///
 /// Errors: the terminal's settings can't be read or changed.
 pub(super) fn listen(to: Sender<PlaybackCommand>, speed: Option<f64>) -> Result<Keyboard, Failure> {
@@ -160,6 +160,6 @@ mod tests {
         assert_eq!(press(Key::Faster), PlaybackCommand::Speed(Some(1024.0)));
         assert_eq!(press(Key::Faster), PlaybackCommand::Speed(None));
         assert_eq!(press(Key::Tick), PlaybackCommand::Step(1));
-        assert_eq!(press(Key::Space), PlaybackCommand::Go, "a tick pauses");
+        assert_eq!(press(Key::Space), PlaybackCommand::Go, "a single tick pauses playback");
     }
 }

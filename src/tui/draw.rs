@@ -128,8 +128,8 @@ impl Page {
 
     /// Draws the panels within the available room.
     fn panels(&self, shot: &ScreenFrame, rows: &mut Rows<'_>) {
-        // Room is reserved: alerts and messages have at least two rows, and the wall has two strips. Each
-        // panel except the last has a title. The wall's strips by clock hour go before cautions.
+        // Room is reserved: alerts and messages have at least two rows, and the wall has two strips. Each panel except
+        // the last has a title. The wall's strips by clock hour get room before cautions do.
         let left = usize::from(rows.left()).saturating_sub(3 + 3 + 1 + 2);
         let well = shot.sensors.iter().filter(|sensor| sensor.state == SensorState::Ok).count();
         let wanted = shot.sensors.len() - well + panels::sensor_rows(well, usize::from(rows.width()));

@@ -100,7 +100,7 @@ impl FrameBuilder {
         }
     }
 
-    /// Adds the lines of live messages that add something to the list of alerts.
+    /// Adds the lines of live messages, except those that tell nothing beyond the other lines.
     pub(super) fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told.iter().filter(|one| one.adds_line()) {
             self.tell(message_line(one, &dive.mission().profile, dive.head_descriptions()));

@@ -109,7 +109,7 @@ impl Tui {
         Ok(Self { eye, wanted, sender: Some(sender), thread: Some(thread), done, is_live })
     }
 
-    /// Passes a frame to the renderer. In a live dive, if there is no room, the next frame has the content.
+    /// Passes a frame to the renderer. If there is no room in a live dive, the next frame has the content.
     fn show(&mut self, dive: &Loop, stopped: Option<Stop>) {
         let Some(sender) = &self.sender else { return };
         if self.is_live && sender.is_full() {

@@ -180,7 +180,7 @@ fn wrapped(text: &str, columns: usize) -> Vec<String> {
     lines
 }
 
-/// Number of rows needed for the alerts above a caution, and for all alerts.
+/// Number of rows needed for the alerts more urgent than a caution, and for all alerts.
 pub(super) fn alert_rows(shot: &ScreenFrame, ink: Palette, columns: usize) -> [usize; 2] {
     [false, true].map(|cautions| {
         let counted = shot.alerts.iter().filter(|alert| cautions || !alert.is_caution);
@@ -194,7 +194,7 @@ pub(super) fn alerts(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut R
     let (mut lines, mut shown) = (Vec::new(), 0);
     for alert in &shot.alerts {
         let of_it = alert_lines(alert, ink, columns);
-        // The problem is more important than the action.
+        // If room is short, an alert's action is left out before its problem.
         if lines.len() == room {
             break;
         }

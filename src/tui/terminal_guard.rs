@@ -21,7 +21,7 @@ pub(super) const ARTIST: &str = "screen";
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
 /// Codes that restore the main screen and show the cursor.
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
-/// Interval and number of another thread's checks whether the renderer has released the terminal.
+/// Another thread checks so many times, at this interval, whether the renderer has released the terminal.
 const STEP: Duration = Duration::from_millis(25);
 const STEPS: u32 = 20;
 
@@ -163,14 +163,14 @@ mod tests {
 
     use super::*;
 
-    /// Environment variable with the name of the thread that panics in [`panics_with_the_terminal_taken`].
+    /// Environment variable with the name of the thread that panics in [`thread_panics_while_the_terminal_is_taken`].
     const THREAD: &str = "HEADRACE_TEST_THREAD";
     const WORDS: &str = "a panic on purpose";
 
     /// Runs in a process with its own terminal. [`panic_restores_the_terminal`] starts that process.
     #[test]
     #[ignore = "takes the terminal, and panics"]
-    fn panics_with_the_terminal_taken() {
+    fn thread_panics_while_the_terminal_is_taken() {
         let Ok(name) = std::env::var(THREAD) else { return };
         let hold = TerminalGuard::take().unwrap();
         let panicking = thread::Builder::new().name(name).spawn(|| panic!("{WORDS}")).unwrap();
@@ -191,7 +191,7 @@ mod tests {
         let before = tcgetattr(&end).unwrap();
         let mut command = Command::new(std::env::current_exe().unwrap());
         command.args([
-            "tui::terminal_guard::tests::panics_with_the_terminal_taken",
+            "tui::terminal_guard::tests::thread_panics_while_the_terminal_is_taken",
             "--exact",
             "--ignored",
             "--nocapture",
@@ -227,7 +227,7 @@ mod tests {
         // it.
         for thread in [ARTIST, "main"] {
             let (written, same) = written(thread);
-            assert!(same, "{thread}: the settings are others");
+            assert!(same, "{thread}: the terminal's settings have changed");
             assert!(at(&written, enter) < at(&written, leave), "{thread}: {written:?}");
             assert!(at(&written, leave) < at(&written, WORDS), "{thread}: {written:?}");
             assert_eq!(written.matches(leave).count(), 1, "{thread}: {written:?}");

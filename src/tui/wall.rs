@@ -42,7 +42,7 @@ pub(super) enum Known {
     #[default]
     Unseen,
     Pass,
-    /// Further driving may still fill the section.
+    /// Driving on may still fill the section's hole.
     Open,
     NotInspected,
     CannotSay,

@@ -81,7 +81,7 @@ def drift(n, dt, times, noise):
 
 
 def unknown_then_known(n, prior, noise):
-    """Nothing known, then everything: a row for each error, and each again."""
+    """Unknown errors that become known: one measurement of each error, and then a second one."""
     rows = [row(n) for _ in range(n)]
     steps = [("start", *[prior] * n)]
     for h in rows + rows:

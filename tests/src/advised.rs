@@ -1,4 +1,4 @@
-//! Dives in which a vehicle follows the live advice, which is recorded at each update as the pilot sees it.
+//! Simulated dives whose live advice is recorded at each update, as the pilot sees it.
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;

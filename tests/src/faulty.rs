@@ -198,7 +198,7 @@ impl Wire {
         }
     }
 
-    /// Adds to the count of whole frames those that were sent by other means than [`Wire::whole`].
+    /// Counts this number of frames as sent whole. They were sent without [`Wire::whole`].
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }

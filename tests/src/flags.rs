@@ -1,4 +1,4 @@
-//! Finds when a failed section can no longer be recovered by further forward motion, from the poses and samples of a
+//! Finds the moment from which driving on can no longer undo the fail of a section. It uses the poses and samples of a
 //! dive.
 //!
 //! A place has failed for good at the first moment when both of these conditions hold. First, an empty circle about
@@ -54,7 +54,7 @@ pub fn reached(dive: &Dive) -> Vec<Reached> {
     all
 }
 
-/// Smallest chainage from which all heads have passed every place, m. It depends on where the heads started.
+/// Chainage from which on all heads pass every place, m. It depends on where the heads started.
 pub fn all_passed_from_m(reached: &[Reached]) -> f64 {
     reached.iter().map(|reached| reached.front_m).fold(f64::INFINITY, f64::min)
 }
@@ -76,7 +76,8 @@ fn ends_m(dive: &Dive, pose: &Pose) -> [f64; 2] {
     [rear_m, front_m]
 }
 
-/// Smallest chainage of a place in a section with an empty circle of this radius that lies wholly beyond `passed_m`.
+/// In a section, smallest chainage of the centre of an empty circle that has this radius and lies wholly beyond
+/// `passed_m`.
 ///
 /// The resolution is one part of the section ([`PARTS`]), and the result is never too small.
 pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, passed_m: f64) -> Option<f64> {

@@ -124,7 +124,7 @@ impl Folder {
         assert!(!self.path("dive.mcap").exists(), "a refused scene leaves no log");
     }
 
-    /// Runs `replay LOG --json` with further arguments; returns exit code and report.
+    /// Runs `replay LOG --json` with more arguments; returns exit code and report.
     pub fn replay(&self, log: &str, further: &[&str]) -> (Option<i32>, Value) {
         let answer = self.headrace(&[&["replay", log, "--json"], further].concat());
         let report = serde_json::from_str(&answer.stdout)

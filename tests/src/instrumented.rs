@@ -112,7 +112,7 @@ impl Seen {
         }
     }
 
-    /// Adds a return that the loop has classified to its ping.
+    /// Stores a return with its ping, after the loop has classified the return.
     fn note_return(&mut self, words: &[u64], is_wall: bool) {
         let [received, source, _, place @ ..] = words else { panic!("a ping's words") };
         let [x_m, y_m, z_m, arc_m] = [0, 1, 2, 3].map(|k| f64::from_bits(place[k]));
@@ -140,7 +140,7 @@ pub fn dive_in_ticks(vehicle: &str, scene: &str, tick: DurNs) -> Dive {
     watched(&scene, &scene.vehicle, scene.vehicle.mission(), Pace { tick, ..Pace::default() })
 }
 
-/// As [`dive`], but the arc length of the loop's profile starts at another place.
+/// As [`dive`], but the loop uses this profile.
 pub fn dive_with_profile(vehicle: &str, scene: &str, profile: Profile) -> Dive {
     let scene = parse(vehicle, "", scene);
     watched(&scene, &scene.vehicle, Mission { profile, ..scene.vehicle.mission() }, Pace::default())

@@ -77,7 +77,7 @@ pub struct Rig {
     dive: Loop,
     supervisor: Supervisor,
     devices: Vec<Faulty>,
-    /// Index in `devices` of the line of each sensor.
+    /// For each sensor, the index of its line in `devices`.
     on: Vec<usize>,
     view: View,
     places: Vec<String>,
@@ -193,7 +193,8 @@ impl Rig {
         self.end_but(None)
     }
 
-    /// As [`Rig::end`], but doesn't wait for one sensor, which may have lost frames at a full ring.
+    /// As [`Rig::end`], but doesn't wait for the frames of the sensor `overrun`, which may have lost frames at a full
+    /// ring.
     #[track_caller]
     pub fn end_but(mut self, overrun: Option<usize>) -> Ended {
         for device in &self.devices {
@@ -263,7 +264,7 @@ impl View {
     }
 }
 
-/// Replaces addresses in a status text, which the system chooses, with fixed words.
+/// Replaces the addresses in a status text with fixed words, because the system chooses the addresses.
 fn neutral(words: &str, places: &[String]) -> String {
     let mut words = words.to_owned();
     for place in places {

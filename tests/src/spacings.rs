@@ -18,11 +18,11 @@ const ROUNDING: f64 = 1e-9;
 pub struct Spacing {
     /// Chainage of the sample, m.
     pub x_m: f64,
-    /// T_x: distance in chainage to the nearest earlier pass, without and with the end points of series.
+    /// T_x: distance in chainage to the nearest earlier pass. Two values: without and with the end points of series.
     pub t_x_m: [Option<f64>; 2],
     /// T_y: distance to the previous sample of the same head.
     pub t_y_m: Option<f64>,
-    /// Spacing T from T_x and T_y, without and with the end points of series.
+    /// Spacing T from T_x and T_y. Two values: without and with the end points of series.
     pub t_m: [Option<f64>; 2],
 }
 
@@ -30,7 +30,7 @@ struct Step {
     from: [f64; 2],
     /// Step in chainage and arc length from `from`, the shorter way round the wall, m.
     by: [f64; 2],
-    /// Whether another step in the same direction precedes and follows this step.
+    /// Whether a step in the same direction precedes this step, and whether one follows it.
     joined: [bool; 2],
 }
 

@@ -44,7 +44,7 @@ fn tell(name: &str, error: f64, bound: f64, condition: Option<f64>) {
     let told = &row[3..6];
     assert_eq!(
         told, figures,
-        "docs/why/hard-cases.csv tells other figures of {name}; tests/hard_cases/run makes it anew"
+        "docs/why/hard-cases.csv has other figures for {name}; renew it with tests/hard_cases/run"
     );
 }
 
@@ -58,7 +58,7 @@ fn row(name: &str) -> Vec<String> {
     let table = read("docs/why/hard-cases.csv");
     let row = table.lines().map(cells).find(|cells| cells.get(1).is_some_and(|found| found == case));
     row.unwrap_or_else(|| {
-        panic!("docs/why/hard-cases.csv has no row {case:?}; tests/hard_cases/run makes it")
+        panic!("docs/why/hard-cases.csv has no row {case:?}; add it with tests/hard_cases/run")
     })
 }
 

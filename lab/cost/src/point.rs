@@ -222,7 +222,7 @@ impl Trade {
 
     /// Difference of two errors up to which they count as equal, in the unit of the error.
     ///
-    /// This is a tenth of the deciding error, and at least the reference's own error.
+    /// This is a tenth of `decides`, and at least the reference's own error.
     pub fn resolution(&self) -> f64 {
         self.oracle.size.max(self.decides.map_or(0.0, |decides| decides / 10.0))
     }

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn dive_without_sections_gives_no_errors() {
+    fn dive_without_sections_gives_no_error_figures() {
         assert!(errors(&[Vec::new()], 0.5).is_empty());
     }
 }

@@ -74,7 +74,7 @@ fn cost_page_in_docs_matches_its_data() {
         }
         assert!(
             read(name) == content,
-            "docs/why/cost/{name} isn't what headrace cost makes of docs/why/cost/cost.json; HEADRACE_RENEW_COST=1 renews it"
+            "docs/why/cost/{name} differs from the page that headrace cost makes from docs/why/cost/cost.json; HEADRACE_RENEW_COST=1 renews it"
         );
     }
     let mut known: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
@@ -103,5 +103,5 @@ fn shipped_defaults_falsely_pass_few_sections() {
             assert!(error.interval.middle < 2.5, "{}: {} %", point.scene, error.interval.middle);
         }
     }
-    assert!(told > 0, "no trade tells of false passes");
+    assert!(told > 0, "no trade has a figure for false passes");
 }

@@ -39,7 +39,7 @@ fn is_whole(trade: &Trade) {
 }
 
 #[test]
-fn filter_is_more_accurate_than_the_cable_and_each_setting_has_an_effect() {
+fn filter_is_more_accurate_than_the_cable_alone_and_each_setting_changes_its_result() {
     let trade = measured(navigation::measure);
     is_whole(&trade);
     let of = |scene: &str, value: &str, name: &str| figure(&trade, [scene, "method", value], name);
@@ -48,7 +48,7 @@ fn filter_is_more_accurate_than_the_cable_and_each_setting_has_an_effect() {
     let within = |scene: &str, value: &str| of(scene, value, "displacements within two sigma");
     assert!(within("taut cable", "filter, sonar returns") > 90.0);
     assert!(within("taut cable", "cable only") < 20.0, "the counter's resolution isn't its error");
-    assert!(within("slack cable", "filter, sonar returns") < 60.0, "a cable looser than told shows");
+    assert!(within("slack cable", "filter, sonar returns") < 60.0, "undeclared slack must show");
     let slack = |scene: &str| of(scene, "cable only", "displacement between passes");
     assert!(slack("VITA 1, slack") > 2.0 * slack("VITA 1, field"), "a slack three times as large");
     // A setting that has no effect would give exactly the same result as the default.
@@ -68,7 +68,7 @@ fn filter_is_more_accurate_than_the_cable_and_each_setting_has_an_effect() {
 }
 
 #[test]
-fn ticks_change_no_verdict_but_coarse_profiles_change_the_advice() {
+fn tick_length_changes_no_verdict_but_a_coarse_profile_changes_the_advice() {
     let trade = measured(live::measure);
     is_whole(&trade);
     for value in ["1 ms", "5 ms", "20 ms", "50 ms", "100 ms"] {
@@ -89,7 +89,7 @@ fn ticks_change_no_verdict_but_coarse_profiles_change_the_advice() {
 }
 
 #[test]
-fn only_omitted_effects_change_the_result_and_more_rays_reduce_the_change() {
+fn omitting_an_effect_changes_the_result_and_more_rays_per_beam_reduce_the_error() {
     let trade = measured(simulation::measure);
     is_whole(&trade);
     for scene in ["boulders", "small pipe"] {
@@ -117,10 +117,10 @@ fn only_omitted_effects_change_the_result_and_more_rays_reduce_the_change() {
     );
 }
 
-/// A verdict at a confidence of k standard deviations (sigma) makes the plan aim at a smaller hole, T - k (sigma - 2
-/// mm).
+/// At a confidence of k standard deviations (sigma), the plan aims at a smaller hole, T - k (sigma - 2 mm): it ignores
+/// the first 2 mm of sigma.
 #[test]
-fn survey_hours_at_a_confidence_equal_hours_for_a_reduced_target() {
+fn survey_hours_at_confidence_k_equal_the_hours_for_a_smaller_target() {
     let trade = measured(sureness::measure);
     is_whole(&trade);
     let inputs = inputs();

@@ -131,7 +131,7 @@ impl Cache {
         }
         match fs::rename(beside.path(), dive) {
             Ok(()) => {
-                // The temporary folder must not be removed after the rename.
+                // `keep` prevents an attempt to remove the temporary folder, which has just been renamed.
                 let _gone = beside.keep();
                 Ok(())
             }

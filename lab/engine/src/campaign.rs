@@ -328,7 +328,7 @@ impl Campaign {
         register_listed(session, name, rows.schema(), std::iter::once(path))
     }
 
-    /// The program version, other than this one, that has replayed the most dives of these parameters in the cache.
+    /// The program version with the most dives in the cache for these parameters, apart from this version.
     fn other_version(&self) -> Option<String> {
         let versions = std::fs::read_dir(self.maker.cache().folder()).ok()?.filter_map(Result::ok);
         let counted = versions.filter_map(|entry| {

@@ -30,7 +30,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Dives that were replayed.
+    /// Number of dives that were replayed.
     pub fn replayed(&self) -> u64 {
         self.replayed.load(Ordering::Relaxed)
     }
@@ -41,12 +41,12 @@ impl Counts {
         self.cached.fetch_add(cached as u64, Ordering::Relaxed);
     }
 
-    /// Dives whose tables were in the cache.
+    /// Number of dives whose tables were in the cache.
     pub fn cached(&self) -> u64 {
         self.cached.load(Ordering::Relaxed)
     }
 
-    /// Dives whose tables were broken in the cache and were made again.
+    /// Number of dives whose tables in the cache were broken and were made again.
     pub fn broken(&self) -> u64 {
         self.broken.load(Ordering::Relaxed)
     }

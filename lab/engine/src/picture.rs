@@ -18,7 +18,7 @@ use headrace_pictures::polyline::Frame;
 
 use crate::error::Error;
 
-/// Maximum number of rows drawn. A line below states the number of further rows.
+/// Maximum number of rows drawn. A line below the chart states how many rows are left out.
 const MOST_ROWS: usize = 60;
 /// Maximum width of a label, pixels.
 const LABEL_PX: f64 = 260.0;

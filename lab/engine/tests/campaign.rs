@@ -104,7 +104,7 @@ fn threads_shards_and_repeated_runs_give_the_same_tables() {
             assert!(union.insert(path, content).is_none(), "two shards have the same dive");
         }
     }
-    assert!(union == all, "the shards aren't the whole");
+    assert!(union == all, "all shards together differ from one run");
     // The folders of all shards, merged into one folder, form a cache.
     let moved = cache("1-2").join(headrace_tables::program_version());
     let copied = Command::new("cp").arg("-r").arg(&moved).arg(cache("2-2")).status().unwrap();
@@ -114,7 +114,7 @@ fn threads_shards_and_repeated_runs_give_the_same_tables() {
 }
 
 #[test]
-fn sql_matches_reports() {
+fn sql_answers_match_the_reports() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let sql = "SELECT d.log, d.plant, d.digest, s.chainage_m, s.verdict, s.d_m FROM sections s JOIN dives d ON s.dive = d.dive \
                ORDER BY d.log, s.chainage_m";
@@ -203,7 +203,7 @@ fn sigkill_loses_no_finished_dive() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let mut running = program(folder.path(), cache.path(), &["--threads", "1"]).spawn().unwrap();
     while finished(cache.path()) == 0 {
-        assert!(running.try_wait().unwrap().is_none(), "it ended without a dive");
+        assert!(running.try_wait().unwrap().is_none(), "the program ended before it finished a dive");
         std::thread::sleep(Duration::from_millis(2));
     }
     // `kill` sends SIGKILL.
@@ -246,7 +246,7 @@ fn broken_cache_entries_are_found_and_remade() {
 }
 
 #[test]
-fn changed_log_is_a_new_dive() {
+fn changed_log_counts_as_a_new_dive() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     run(folder.path(), cache.path(), &[]);
     std::fs::copy(golden("echoes.mcap"), folder.path().join("ceran/murk.mcap")).unwrap();

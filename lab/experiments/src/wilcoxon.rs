@@ -51,11 +51,11 @@ pub(crate) struct SignedRank {
     pub used: usize,
     /// Number of zero differences.
     pub zeros: usize,
-    /// Probability that W+ is at least as far from its mean, on either side.
+    /// Probability of a W+ at least as far from its mean as the measured one, on either side.
     pub p_two_sided: f64,
-    /// Probability that W+ is at least as large; small if differences tend to be positive.
+    /// Probability of a W+ at least as large as the measured one; small if differences tend to be positive.
     pub p_greater: f64,
-    /// Probability that W+ is at most as large.
+    /// Probability of a W+ at most as large as the measured one; small if differences tend to be negative.
     pub p_less: f64,
     /// Distribution from which p was computed.
     pub method: Method,

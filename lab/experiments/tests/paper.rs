@@ -242,7 +242,7 @@ fn tables_are_written_as_json() {
 }
 
 #[test]
-fn missing_command_prints_the_available_ones() {
+fn missing_command_prints_the_available_commands() {
     let Output { status, stdout, stderr } = answer(&[]);
     assert_eq!((status.code(), stdout.as_slice()), (Some(2), &[][..]));
     insta::assert_snapshot!(String::from_utf8(stderr).unwrap(), @"

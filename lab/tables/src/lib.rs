@@ -55,7 +55,7 @@ pub struct Tables {
     pub holes: RecordBatch,
     /// A row for each section that was flagged.
     pub flags: RecordBatch,
-    /// A row for each run of flagged sections.
+    /// A row for each missed stretch: neighbouring flagged sections.
     pub runs: RecordBatch,
     /// A row for each sensor.
     pub sources: RecordBatch,

@@ -176,7 +176,7 @@ fn tables_match_reports() {
 }
 
 #[test]
-fn parameters_reach_the_replay() {
+fn parameters_apply_to_the_replay() {
     let log = [golden("too-fast.mcap")];
     let of = |parameters: &Parameters| replay(&log, parameters).unwrap();
     let asked = Parameters {

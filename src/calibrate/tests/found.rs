@@ -146,10 +146,10 @@ fn zeros_of_cable_counter_surface_and_water_level_are_exact() {
     });
 }
 
-/// Further turns see the same roughness of the wall. Their returns share the weight, so each piece of wall
-/// counts once.
+/// Repeated turns see the same roughness of the wall. Their returns share the weight, so each piece of wall counts
+/// once.
 #[test]
-fn further_turns_add_no_weight_to_a_piece_of_wall() {
+fn repeated_turns_add_no_weight_to_a_piece_of_wall() {
     let stand = Stand { seconds: 100, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     stand.ask(|material| {
         let still = longest(material).unwrap();

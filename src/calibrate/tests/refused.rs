@@ -34,9 +34,9 @@ fn calibration_refuses_a_moving_vehicle() {
     }
 }
 
-/// Half a turn has small standard deviations, but doesn't separate the angle from errors that all ranges share.
+/// A fit to half a turn has small standard deviations, but can't tell the angle from errors that all ranges share.
 #[test]
-fn less_than_a_turn_is_refused_with_the_missing_seconds() {
+fn calibration_from_part_of_a_turn_is_refused_and_states_the_missing_seconds() {
     for (sector_deg, swept_deg, missing_s) in [(95.0, 95, 34), (175.0, 174, 13), (350.0, 349, 1)] {
         for (name, profile) in profiles() {
             let why = why(&Stand { sector_deg, ..Stand::new(profile, &[Wrong::default(); 2], 1) });

@@ -15,7 +15,7 @@ const HALVINGS: u32 = 40;
 /// if no speed meets `most_m`.
 pub(super) fn curve(planner: &Planner, mode: usize, most_m: f64, marked_m: Option<f64>) -> Vec<[f64; 2]> {
     let Some(least_m) = least_m(planner, mode, most_m) else { return Vec::new() };
-    // Speeds grow with the root of T above the smallest T, so points lie closer there.
+    // Above the smallest T, the speed grows with the square root of the excess of T, so points lie closer there.
     let grid = (0..=POINTS).map(|k| {
         let share = f64::from(k) / f64::from(POINTS);
         least_m + share * share * (most_m - least_m)

@@ -95,7 +95,7 @@ fn legend(chart: &Chart<'_>) {
     chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL);
 }
 
-/// A mode's curve: the spacing T, m, and the hours for the whole length at the largest speed that meets it.
+/// Points of a mode's curve: T, m, and the hours for the whole length at the largest speed that meets T.
 pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64, marked_m: f64) -> Vec<[f64; 2]> {
     let length_m = shown.planner.inspection().length_m;
     let points = advised::curve(shown.planner, mode.number, most_m, Some(marked_m));

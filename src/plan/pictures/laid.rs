@@ -62,7 +62,7 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
     }
 }
 
-/// Chainages between which all heads have samples: where the last head begins, and where the first head ends.
+/// Chainages between which all heads have samples: from the largest first chainage of a head to the smallest last one.
 ///
 /// If they span less than a turn, returns the ends of the whole pattern.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {

@@ -72,7 +72,7 @@ impl Around {
 
     /// Place of the widest strip that no head sees, and the spacing T across it.
     ///
-    /// `None` if that T would dwarf all other values.
+    /// `None` unless this T is the largest value in the chart, and less than three times the second largest.
     fn across_m(&self) -> Option<[f64; 2]> {
         let t_m = self.counted_m.filter(|t_m| *t_m > self.most_m() && *t_m < 3.0 * self.most_m())?;
         Some([self.unseen_m?, t_m])
@@ -168,8 +168,8 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     }
 }
 
-/// Writes captions above the stretches of wall that fewer heads see. A caption states how many heads see the
-/// stretch.
+/// Writes captions above the stretches of wall that fewer heads see than the best-covered part. A caption states how
+/// many heads see the stretch.
 fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {
@@ -253,7 +253,7 @@ fn line(chart: &Chart<'_>, places: &[WallPlace], of: impl Fn(&WallPlace) -> Opti
     }
 }
 
-/// Splits a curve into runs of neighbouring points that have a value.
+/// Splits a curve into pieces of neighbouring points that have a value.
 fn runs<V>(places: &[WallPlace], of: impl Fn(&WallPlace) -> Option<V>) -> Vec<Vec<(f64, V)>> {
     let mut runs = vec![Vec::new()];
     for place in places {

@@ -12,7 +12,7 @@ use super::modes::{self, Mode};
 use super::shown::Shown;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
-/// Number of speeds at which the spacing T is computed for the range of its axis.
+/// Number of speeds at which the spacing T is computed to find the range of the axis for T.
 const SPEEDS: u32 = 400;
 
 /// Draws the spacing T against speed for every mode, with the target and the requested speed.
@@ -76,7 +76,7 @@ fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     curves.iter().flat_map(|(_, points)| points).map(|[_, t_m]| *t_m).fold(0.0, f64::max)
 }
 
-/// A mode's curve: the largest speed that meets a spacing T, m/s, and this T, m.
+/// Points of a mode's curve: the largest speed that meets T, m/s, and T, m.
 pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64) -> Vec<[f64; 2]> {
     let points = advised::curve(shown.planner, mode.number, most_m, shown.question.target_m);
     points.into_iter().map(|[t_m, v_mps]| [v_mps, t_m]).collect()

@@ -106,7 +106,7 @@ fn perimeter_chart_names_curves_clock_hours_and_number_of_heads() {
 }
 
 #[test]
-fn perimeter_chart_of_sectors_shows_alternating_distances_and_unseen_strips() {
+fn perimeter_chart_for_sector_offset_shows_alternating_distances_and_unseen_strips() {
     let svg = draw(inspection(SECTORS), 1, 0.048, TARGET, "perimeter");
     says(
         &svg,
@@ -225,7 +225,7 @@ fn compare(planner: &Planner, target_m: f64, title: &str) {
 }
 
 #[test]
-fn labels_and_curves_agree_for_every_mode_of_the_shipped_vehicles() {
+fn labels_and_curves_agree_with_the_table_for_every_mode_of_the_shipped_vehicles() {
     let files = std::fs::read_dir("deploy/vehicles").unwrap().map(|file| file.unwrap().path());
     let mut vehicles = 0;
     for file in files.filter(|file| file.extension().is_some_and(|name| name == "toml")) {
@@ -249,7 +249,7 @@ fn duration_chart_without_a_target_uses_the_spacing_at_the_requested_speed() {
 }
 
 #[test]
-fn charts_show_and_name_modes_that_miss_the_target() {
+fn charts_label_modes_that_miss_the_target() {
     // In the corners, the angular step of the mode FASTEST alone gives a larger T than this target.
     let coarse = Question { target_m: Some(0.4), ..TARGET };
     for name in ["speeds", "hours"] {

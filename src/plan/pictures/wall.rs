@@ -39,8 +39,8 @@ impl Thin {
     }
 }
 
-/// Stretches that fewer heads see, for the nominal position of the vehicle. A stretch that crosses the seam
-/// is split.
+/// Stretches that fewer heads see than the best-covered part, with the vehicle at its nominal position. A stretch that
+/// crosses the seam is split.
 pub(super) fn thin(planner: &Planner) -> Vec<Thin> {
     let perimeter_m = planner.inspection().profile.perimeter_m();
     let strips = planner.nominal_strips().map(Strips::as_slice).unwrap_or_default();

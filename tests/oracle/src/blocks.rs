@@ -43,11 +43,12 @@ impl Blocks {
             let near = (begins_m - BEYOND_M)..(ends_m + BEYOND_M);
             let places =
                 truth.samples.iter().map(|sample| sample.place).filter(|[x_m, _]| near.contains(x_m));
-            // This never fails: `Wall::new` rejects only coordinates that aren't numbers, and true samples always are
-            // numbers.
+            // This never fails: `Wall::new` rejects only coordinates that aren't numbers or are far too large. True
+            // samples have neither fault.
             Wall::new(places, truth.perimeter_m).unwrap_or_default()
         });
-        // A larger circle could contain samples outside this block and its overlap, so its size is unknown.
+        // A circle with a radius of `BEYOND_M` or more may contain samples beyond this block and its overlap. Such a
+        // hole counts as infinite.
         Some(wall.hole_m(from_m, to_m)).filter(|hole_m| *hole_m < 2.0 * BEYOND_M).unwrap_or(f64::INFINITY)
     }
 }

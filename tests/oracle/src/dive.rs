@@ -299,7 +299,7 @@ fn scenery_of(simulation: &Simulation) -> Result<Scenery, TruthError> {
     })
 }
 
-/// Time, estimated chainage and estimated vehicle chainage of each placed sample.
+/// For each placed sample: its time, its estimated chainage, and the vehicle's estimated chainage.
 #[derive(Resource, Default)]
 struct Seen(Vec<(MonoNs, f64, f64)>);
 
@@ -332,14 +332,14 @@ impl Seen {
     }
 }
 
-/// Pairs for each sample: its estimated chainage, and the true minus estimated vehicle chainage, m. Sorted by
+/// For each sample: its estimated chainage, and the vehicle's chainage offset (true minus estimated), m. Sorted by
 /// chainage.
 #[derive(Default)]
 struct Shifts(Vec<(f64, f64)>);
 
 impl Shifts {
-    /// Median chainage offset (true minus estimated) of the samples near a section. If there are none near it, the
-    /// shift of the nearest sample; in a dive without samples, 0.
+    /// Median chainage offset (true minus estimated) of the samples near a section. If no sample is near, the offset of
+    /// the nearest sample. 0 in a dive without samples.
     fn about(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
         let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();

@@ -1,4 +1,5 @@
-//! Computes arc lengths from many points on a profile's outline, as the crossing of a ray with a chord.
+//! Computes arc lengths from many points on a profile's outline: at the crossing of a ray with the chord between two
+//! points.
 //!
 //! This method shares no ray casting with the program.
 

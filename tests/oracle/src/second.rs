@@ -1,14 +1,15 @@
 //! A second computation of D_true, which bounds the error of the first one.
 //!
 //! It uses no Voronoi vertices. For one chainage at a time, it finds the highest point of the lower envelope of
-//! distances to all samples. If a circle's centre moves, its radius grows by at most that movement. So stretches of
-//! chainage that can't hold a larger circle are dropped, and all others are halved.
+//! distances to all samples. If a circle's centre moves, its radius grows by at most that movement. So a stretch of
+//! chainage is dropped if it can't hold a circle larger than the largest one found so far. All other stretches are
+//! halved.
 
 use super::truth::Truth;
 use super::wall::Wall;
 use crate::error::TruthError;
 
-/// The search doesn't divide stretches of chainage with this half length or less, m.
+/// Stretches of chainage with at most this half length aren't halved again, m.
 const FINEST_M: f64 = 2e-10;
 
 /// D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and infinite
@@ -16,7 +17,7 @@ const FINEST_M: f64 = 2e-10;
 pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
     let radius_m = |x_m: f64| wall.largest_on(x_m).map_or(f64::INFINITY, |circle| circle.radius_m);
     let mut best_m = radius_m(from_m).max(radius_m(to_m));
-    // Middle and half length of each stretch of chainage that may hold a larger circle than found so far.
+    // Middle and half length of each stretch that may hold a circle larger than the largest one found so far.
     let mut stretches = vec![(f64::midpoint(from_m, to_m), (to_m - from_m) / 2.0)];
     while let Some((middle_m, half_m)) = stretches.pop() {
         let found_m = radius_m(middle_m);

@@ -140,8 +140,8 @@ fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError
     let mut circles: Vec<Circle> = triangles
         .inner_faces()
         .filter_map(|face| circle(face.positions().map(|at| [at.x, at.y])))
-        // Rounding may move a centre to either side of the seam. With the tolerance, at least one of the circle
-        // and its image across the seam is kept.
+        // Rounding may move the centre of a circle near the seam to either side of the seam. The tolerance keeps at
+        // least one of two circles: the circle itself or its image across the seam.
         .filter(|circle| (-ROUNDING_M..perimeter_m + ROUNDING_M).contains(&circle.centre[1]))
         .map(|Circle { centre: [x, sigma], radius_m }| Circle {
             centre: [x, math::wrap(sigma, perimeter_m)],

@@ -28,7 +28,7 @@ pub struct Vehicle {
     pub layout: &'static str,
     /// Default length of a dive, m. It is larger for vehicles whose passes are far apart.
     pub length_m: f64,
-    /// Factor by which the chainages of [`PLACES`] are reduced, except near the portal, for tunnels shorter than 7 km.
+    /// Factor for the chainages of [`PLACES`], except for the place near the portal. It is 1 in a tunnel of 7 km.
     pub far_share: f64,
     /// Noise of the inertial unit, unless a condition changes it.
     unit: Unit,
@@ -90,15 +90,16 @@ pub enum Condition {
     /// A MEMS inertial unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error; steel
     /// nearby.
     Poor,
-    /// Runs of lost returns, returns from objects in front of the wall, and second echoes.
+    /// Several lost returns in a row, returns from objects in front of the wall, and second echoes.
     Murk,
-    /// Objects in front of the wall, and second echoes in runs of several returns.
+    /// Objects in front of the wall, and several second echoes in a row.
     Fish,
     /// The wall is as rough as vehicle files allow for.
     Rough,
     /// The wall deviates from the design by some centimetres, inwards and outwards.
     AsBuilt,
-    /// On a stretch, the wall is wider by 5 or 10 %, or has a ditch, or a side tunnel that the vehicle file doesn't declare.
+    /// On a stretch, the wall is wider by 5 or 10 %, or has a ditch, or has a side tunnel that the vehicle file doesn't
+    /// declare.
     Altered,
     /// A pilot who wanders, stops and turns back.
     Lively,
@@ -266,7 +267,7 @@ impl Cell {
         self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
 
-    /// The broken device, and its fault, in the dive that belongs to a seed, with this length.
+    /// Broken device and its fault, in the dive with this seed and length.
     pub fn broken(&self, seed: u64, length_m: f64) -> DeviceFault {
         let plain = self.plain(seed, length_m);
         let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
@@ -460,7 +461,7 @@ impl Cell {
         }
     }
 
-    /// Limits an offset from the centre line, m, so that it keeps clear of the wall of a narrow pipe.
+    /// Limits an offset from the centre line, m, so that the vehicle keeps clear of the wall of a narrow pipe.
     fn aside_m(&self, most_m: f64) -> f64 {
         if self.vehicle.name == "pipe" { 0.3 * most_m } else { most_m }
     }
@@ -502,7 +503,7 @@ impl Cell {
         }
     }
 
-    /// Clusters of returns in front of the wall, and second echoes in runs of several returns.
+    /// Clusters of returns in front of the wall, and several second echoes in a row.
     fn fish(&self, heads: &str) -> String {
         if self.condition != Condition::Fish {
             return String::new();
@@ -517,8 +518,8 @@ impl Cell {
 
     /// Murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
     ///
-    /// In these stretches, 10 to 30 % of the heads' returns are missing, in runs. Clusters in front of the wall
-    /// cause 5 % of the returns, and second echoes cause some. Source: field.md, "murk".
+    /// In these stretches, 10 to 30 % of the heads' returns are missing, several in a row. Clusters in front of the
+    /// wall cause 5 % of the returns, and second echoes cause some. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();

@@ -66,14 +66,14 @@ pub struct Figures {
     pub verdicts_m: [f64; 4],
     /// Inner length with D_true within the target, m.
     pub passable_m: f64,
-    /// D minus D_true, and the standard deviation of D, m. Contains each inner section with a bounded hole of its
-    /// own.
+    /// One pair for each inner section with a bounded hole, unless the hole is centred on a boundary of the section: D
+    /// minus D_true, and the standard deviation of D, m.
     pub errors: Vec<[f64; 2]>,
     /// Number of measurements that the filter used, and sum of their normalised innovations squared, by kind of sensor.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
     /// Advised speeds, without those near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,
-    /// Length of the vehicle's trajectory, and length of its part with sections in the report, m.
+    /// Length of the vehicle's trajectory, and length of the part for which the report has sections, m.
     pub way_m: [f64; 2],
 }
 
@@ -186,7 +186,7 @@ impl Figures {
         }
     }
 
-    /// Adds the length of the trajectory, and the length of its part that has sections in the report.
+    /// Adds the length of the trajectory, and the length of the part for which the report has sections.
     fn tell(&mut self, dive: &JudgedDive) {
         let section_m = dive.report.section_m;
         let [Some(first), Some(last)] = [dive.sections.first(), dive.sections.last()] else {
@@ -207,7 +207,7 @@ impl Figures {
         self.way_m[1] += told as f64 * section_m;
     }
 
-    /// Fraction of the inner length with a verdict, given by number: 0 passed, 1 failed, 2 can't say, 3 open.
+    /// Fraction of the inner length with this verdict: 0 passed, 1 failed, 2 can't say, 3 open.
     pub fn share(&self, verdict: usize) -> f64 {
         self.verdicts_m[verdict] / self.inner_m
     }

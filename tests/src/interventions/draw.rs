@@ -318,8 +318,7 @@ impl Drawn {
             },
             Cause::Phase => {
                 let mut offsets_deg = vec![0.0; count];
-                // All heads look almost in the same direction as the first head at the same time, so their passes leave
-                // gaps.
+                // At any time, all heads look almost in the direction of the first head. So their passes leave gaps.
                 for (head, offset_deg) in offsets_deg.iter_mut().enumerate().skip(1) {
                     let together_deg = 360.0 * head as f64 / count as f64;
                     *offset_deg = math::wrap_signed(together_deg * draw.between(0.7, 1.0), 360.0);

@@ -27,7 +27,7 @@ pub struct Judged {
     pub right: Right,
     /// Displayed causes, sorted.
     pub told: Vec<Cause>,
-    /// Number of the run of sections to which the section belongs.
+    /// Number of the missed stretch (`run`) to which the section belongs.
     pub run: Option<u32>,
     /// Diameter of the section's hole, m.
     pub hole_m: f64,
@@ -81,7 +81,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// Number of displayed runs over which the stretch is spread.
+    /// Number of displayed missed stretches (`run`) that contain sections of this stretch.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();

@@ -1,4 +1,4 @@
-//! Upper bound on correct causes, from a reference that knows the injected causes.
+//! Upper bound on the fraction of correct causes. It comes from a reference that knows the injected causes.
 //!
 //! The reference simulates the same dive without each cause, but with other noise than the judged dive. Its fraction
 //! of right answers is an upper bound for any method.

@@ -50,7 +50,7 @@ pub struct Matrix {
     pub pairs: Count,
     /// As `pairs`, but a nearly right answer counts as right: see [`super::Judged::is_close`].
     pub close_pairs: Count,
-    /// Stretches; those displayed as at most one run of sections count as right.
+    /// Answers for stretches. An answer is right if the stretch is displayed as at most one missed stretch (`run`).
     pub one_run: Count,
     /// Number of dives without a failed section.
     pub idle: u32,

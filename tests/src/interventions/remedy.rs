@@ -1,4 +1,4 @@
-//! Simulates the displayed remedy of each run, to find out whether the run's sections then pass.
+//! Simulates the displayed remedy of each missed stretch, to find out whether the sections of the stretch then pass.
 
 use headrace_coverage::Action;
 use headrace_monitor::report::ReturnReport;
@@ -12,15 +12,15 @@ const ROOM_M: f64 = 2.0;
 /// Roll angle of a vehicle that hides the wall from its own heads, degrees.
 const ROLLED_DEG: f64 = 75.0;
 
-/// A run of failed sections with its displayed remedy, and the result of simulating the remedy.
+/// A missed stretch with its displayed remedy, and the result of simulating the remedy.
 #[derive(Debug, Clone)]
 pub struct Remedied {
-    /// Remedy that the program displays for the run.
+    /// Remedy that the program displays for the missed stretch.
     pub told: ReturnReport,
-    /// Start, and hole diameter after the remedy, of each section in the run, m; the diameter is infinite if it can't
-    /// be measured.
+    /// For each section of the stretch: its start, and its hole diameter after the remedy, m. The diameter is infinite
+    /// if it can't be measured.
     pub then_m: Vec<[f64; 2]>,
-    /// Whether all sections of the run meet the target after the remedy.
+    /// Whether all sections of the stretch meet the target after the remedy.
     pub clears: bool,
 }
 
@@ -40,7 +40,7 @@ fn mends(action: Action, injected: &Injected) -> bool {
     }
 }
 
-/// Simulates the displayed remedy of each run, except runs without any section that injected causes explain.
+/// Simulates the displayed remedy of each missed stretch. Skips stretches in which injected causes explain no section.
 pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
     let of_run = |told: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()

@@ -52,7 +52,8 @@ pub struct Cable {
     breaks: AtomicU64,
     /// Error that lines return after the last break, as an index of [`FAILURES`].
     failure: AtomicU64,
-    /// Number of times that the machine has opened the cable so far.
+    /// Number of breaks before the latest opening, plus one; 0 before the first opening. The connection is intact if
+    /// this number exceeds `breaks`.
     opened: AtomicU64,
     /// Number of unread datagrams that the machine has dropped since the last query.
     unread: AtomicU64,

@@ -33,7 +33,7 @@ pub struct SimulatedDisk {
     clock: Arc<Clock>,
     faults: Arc<[Window<DiskFault>]>,
     done: Arc<SegQueue<Done>>,
-    /// Number of disk operations that failed.
+    /// Fault of each disk operation that failed.
     failed: Arc<SegQueue<DiskFault>>,
     sabotage: Option<Sabotage>,
 }

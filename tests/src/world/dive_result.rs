@@ -29,7 +29,7 @@ pub struct DiveResult {
     pub longest_wait: DurNs,
 }
 
-/// Result of a replay of the remaining files.
+/// Result of a replay of the files that are left on the disk.
 pub struct Replayed {
     /// Packets that the loop took.
     pub consumed: Vec<Consumed>,

@@ -107,8 +107,8 @@ pub struct World {
     consumed: Vec<Consumed>,
     disk: SimulatedDisk,
     recorder: RecorderWorker,
-    /// Time and number of consumed packets at each moment when the recorder's queue was empty, since the last disk
-    /// failure.
+    /// Moments since the last disk failure at which the recorder's queue was empty, each with the number of packets
+    /// consumed by then.
     taken: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
     is_behind: bool,
@@ -328,9 +328,10 @@ impl World {
 }
 
 impl DiveResult {
-    /// Writes the remaining files to `folder` and replays them; `None` without files.
+    /// Writes the files that are left on the disk to `folder` and replays them. Then checks that a recording without an
+    /// orderly end can be continued.
     ///
-    /// Errors: the reason why the files can't be read as a log.
+    /// Errors: the files can't be read as a log, or the recording can't be continued.
     pub fn replay(&self, folder: &Folder) -> Result<Replayed, String> {
         let name = |path: &Path| folder.path(path.file_name().unwrap().to_str().unwrap());
         let files: Vec<PathBuf> = self.left.iter().map(|file| name(&file.path)).collect();
@@ -351,9 +352,9 @@ impl DiveResult {
     }
 }
 
-/// Continues a recording that did not end in order by some ticks, and replays both.
+/// If a recording has no orderly end, continues it for some ticks and replays the whole recording.
 ///
-/// Errors: packets of either are missing, or the interruption is not stated.
+/// Errors: packets from before or after the interruption are missing, or no loss states the interruption.
 fn resumed(recording: &Path, so_far: &Replayed) -> Result<(), String> {
     const TICKS: u64 = 20;
     let Some(unfinished) = Unfinished::read(recording).map_err(|error| error.to_string())? else {

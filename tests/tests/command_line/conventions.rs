@@ -70,7 +70,7 @@ fn colours_appear_only_on_terminals_that_support_them() {
     for arguments in outputs {
         let shown = |variables: &[(&str, &str)]| Screen::run(&folder, arguments, 100, variables).end().1;
         assert!(shown(&[]).contains("\x1b["), "{arguments:?}: no colours on a terminal");
-        assert!(shown(&[("NO_COLOR", "")]).contains("\x1b["), "{arguments:?}: empty is unset");
+        assert!(shown(&[("NO_COLOR", "")]).contains("\x1b["), "{arguments:?}: empty means unset");
         let plain = shown(&[("NO_COLOR", "1")]);
         // Output without colours may contain only one escape sequence, which overwrites the current line.
         assert!(!plain.replace("\r\x1b[K", "").contains('\x1b'), "{arguments:?}: {plain:?}");
@@ -94,7 +94,7 @@ fn quiet_option_keeps_results_and_errors() {
 }
 
 #[test]
-fn commands_over_2_s_show_the_remaining_time() {
+fn commands_longer_than_2_s_show_the_remaining_time() {
     let folder = Folder::new();
     let scene = root().join("deploy/scenes/seven-kilometres.toml");
     let simulate = ["simulate", scene.to_str().unwrap(), "-o", "long.mcap"];
@@ -162,7 +162,7 @@ fn lack_of_address_space_gives_an_error_and_no_abort() {
         assert_eq!(output.status.code(), Some(1), "{limit_kib}: {said}");
         assert!(said.contains("MiB of address space for the dive: the system refuses it"), "{said}");
     }
-    // A long tunnel needs more. With any limit the dive is refused or replayed, but never aborted.
+    // A dive in a long tunnel needs more address space. With any limit it is refused or replayed, but never aborted.
     folder.write("long.toml", headrace_tests::VEHICLE.replace("length_m = 100", "length_m = 20000"));
     let mut refused = 0;
     for limit_kib in [250_000, 400_000, 700_000, 1_000_000, 1_300_000, 1_700_000, 2_500_000] {

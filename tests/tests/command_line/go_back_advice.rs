@@ -48,14 +48,14 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     assert_eq!(cleared[0]["from_m"], flags[0]["from_m"]);
     let [from_m, to_m] = ["from_m", "to_m"].map(|key| figure(cleared[0], key));
     assert!(to_m - from_m > 4.0, "{from_m} to {to_m}");
-    // On the way back, new samples leave some sections undecided. They are decided when the vehicle passes them
-    // again.
+    // On the way back, new samples leave some sections undecided until the vehicle passes them again. Inside the missed
+    // stretch, no line may report this.
     let unsure = of(&lines, "cannot_say");
     let within = unsure.iter().filter(|line| (from_m..to_m).contains(&figure(line, "from_m")));
     assert_eq!(within.count(), 0, "{unsure:?}");
     let states = of(&lines, "state");
     let unsure_m = |state: &&&Value| figure(&state["metres"], "cannot_say_m");
-    assert!(states.iter().map(|state| unsure_m(&state)).fold(0.0, f64::max) > 1.0, "the test sees nothing");
+    assert!(states.iter().map(|state| unsure_m(&state)).fold(0.0, f64::max) > 1.0, "no section was unsure");
     let end = &of(&lines, "end")[0];
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }

@@ -103,7 +103,8 @@ fn report_overwrites_only_reports() {
     assert_eq!(folder.read("live.json"), before);
 }
 
-/// A name that promises another format is refused before anything is read: the log doesn't even exist.
+/// A report name with the extension of another format is refused before anything is read. Here the log doesn't even
+/// exist.
 #[test]
 fn report_with_another_extension_is_refused_before_the_dive_is_read() {
     let folder = Folder::with_dive();
@@ -282,7 +283,7 @@ fn output_that_links_to_an_input_is_refused() {
 #[test]
 fn two_outputs_of_a_command_must_differ() {
     let folder = Folder::with_dive();
-    // The recording has the name of a report, because a report may have no other.
+    // The recording is named like a report, because a report must have this extension.
     let run = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", "x.json"];
     let live = ["run", "vehicle.toml", "--for", "1", "--record", "x.json"];
     for run in [&run[..], &live] {
@@ -300,7 +301,7 @@ fn two_outputs_of_a_command_must_differ() {
     }
     let simulate = ["simulate", "scene.toml", "-o", "new.mcap", "--truth", "./new.mcap"];
     two_files(&folder, &simulate, &["-o new.mcap", "./new.mcap (--truth)"]);
-    // Two outputs may share a device, because it has no content to lose.
+    // Two outputs may name the same device file, because it has no content to lose.
     #[cfg(unix)]
     accepts(&folder, &["simulate", "scene.toml", "-o", "/dev/null", "--truth", "/dev/null"], "vehicle.toml");
 }

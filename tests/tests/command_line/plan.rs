@@ -284,7 +284,7 @@ fn pages_show_the_pictures_of_the_current_program() {
 }
 
 #[test]
-fn written_plan_lines_configure_the_best_mode() {
+fn lines_written_by_plan_configure_the_best_mode() {
     let folder = Folder::new();
     let written = plan(&folder, &["--vehicle", VITA_2, "--write"]);
     assert_eq!((written.code, written.stderr.as_str()), (Some(0), ""));

@@ -37,7 +37,7 @@ fn keys_control_and_end_a_replay() {
     let (code, shown) = screen.end();
     assert!(matches!(code, Some(0 | 1)), "{code:?}: {shown}");
     assert!(!shown.contains("xyzzy"), "{shown}");
-    assert!(shown.contains("NO COVERAGE"), "the summary at the dive's begin: {shown}");
+    assert!(shown.contains("NO COVERAGE"), "the summary at the beginning of the dive: {shown}");
     assert!(screen.is_in_order(), "the terminal is as before");
 }
 
@@ -47,7 +47,7 @@ fn ctrl_c_and_sigterm_restore_the_terminal() {
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
     screen.until("q quit");
     screen.press(b"\x03");
-    assert!(screen.end().0.is_some(), "the replay doesn't end by itself");
+    assert!(screen.end().0.is_some(), "Ctrl-C ends the replay with an exit code");
     assert!(screen.is_in_order());
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
     screen.until("q quit");
@@ -135,7 +135,7 @@ fn finished_demonstration_is_replayed_on_its_open_page_until_q() {
 }
 
 #[test]
-fn demonstration_with_exit_or_without_page_ends_by_itself() {
+fn demonstration_ends_by_itself_with_exit_option_or_without_page() {
     for option in ["--exit", "--no-page"] {
         let folder = Folder::new();
         let arguments = ["demo", "--speed", "max", "--no-open", "--out", "demo", option];

@@ -95,7 +95,7 @@ fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
 }
 
 /// If the cable swings by 11 cm but is declared taut, many sections stay undecided. This inertial unit can't tell
-/// whether a speed change of 5 cm/s is one of the cable or one of the vehicle. No section passes wrongly.
+/// whether a speed change of 5 cm/s comes from the cable or from the vehicle. No section passes wrongly.
 #[test]
 fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
     let (wandering, swinging) = ([WANDERING, "0.06 m"], [SWINGING, "0.11 m"]);

@@ -60,8 +60,8 @@ fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// Time, in seconds after the start, when the plane `behind_m` behind the vehicle is past a section's end by half the
-/// target.
+/// Time at which the plane `behind_m` behind the vehicle is half the target past a section's end, seconds after the
+/// start.
 fn left_s(section: &SectionRow, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
 }
@@ -350,8 +350,8 @@ fn dive_mostly_without_a_position_exits_with_1() {
     );
 }
 
-/// Wall that the heads scanned while the tether was silent has no verdict. The report tells for how long and about where.
-/// The vehicle drives at 0.11 m/s; the position is lost some seconds after the counter falls silent at 60 s.
+/// Wall that the heads scanned while the tether was silent has no verdict. The report tells for how long and about
+/// where. The vehicle drives at 0.11 m/s; the position is lost some seconds after the counter falls silent at 60 s.
 #[test]
 fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainage() {
     let noise = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -363,7 +363,7 @@ fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainag
         let begun_s = report.dive.start_s;
         let true_m = |at_s: f64| START_M + SPEED_MPS * (at_s - begun_s);
         let end_s = if is_over { 120.0 } else { 20.0 / SPEED_MPS };
-        // After the counter is back, its distance to the estimate is checked before there is a fix.
+        // When the counter is back, its reading is compared with the estimate before there is a fix.
         let late_s = gap.to_s - begun_s - end_s;
         assert!((-2.0..15.0).contains(&late_s) && gap.is_over == is_over, "{span}: {gap:?}");
         assert!((60.0..100.0).contains(&(gap.from_s - begun_s)), "{span}: {gap:?}");

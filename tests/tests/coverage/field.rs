@@ -37,7 +37,7 @@ fn print(name: &str, figures: &Figures) {
 
 /// No section far over the target passes. At most one in forty of all sections over the target passes.
 #[test]
-fn passed_sections_are_within_the_target() {
+fn no_section_far_over_the_target_passes_in_field_dives() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     for condition in [Condition::Clean, Condition::DataSheet, Condition::Lively] {
         for start_m in [16.0, 6900.0] {
@@ -59,10 +59,10 @@ fn passed_sections_are_within_the_target() {
     }
 }
 
-/// Fish and second echoes are no wall, so the sections that they hide don't pass. With `HEADRACE_FISH_SEEDS=5` dives of each
-/// cell, some do, see docs/why/field.md; the goal is none.
+/// Fish and second echoes aren't wall, so they must not make a section pass. With `HEADRACE_FISH_SEEDS=5`, the test
+/// runs five dives of each cell, and some of these sections pass (docs/why/field.md). The goal is none.
 #[test]
-fn fish_and_second_echoes_let_no_section_far_over_the_target_pass() {
+fn no_section_far_over_the_target_passes_with_fish_and_second_echoes() {
     let seeds = std::env::var("HEADRACE_FISH_SEEDS").map_or(1, |seeds| seeds.parse().unwrap());
     let mut sum = [0_u32; 5];
     for name in ["vita2-4", "vita2-2"] {
@@ -88,7 +88,7 @@ fn fish_and_second_echoes_let_no_section_far_over_the_target_pass() {
 /// On walls as rough as the vehicle file allows, the reported standard deviation of D is neither too small nor too
 /// large. An echosounder sees the same bump for seconds. The filter must not take the bump for a change of position.
 #[test]
-fn wall_bumps_do_not_bias_the_position() {
+fn reported_sd_of_d_is_right_on_rough_walls() {
     for name in ["vita2-4", "pipe", "bluerov2"] {
         let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == name).unwrap();
         let condition = Condition::Rough;
@@ -105,7 +105,7 @@ fn wall_bumps_do_not_bias_the_position() {
 /// During a stop of half a minute before the dive, the program learns the gyro bias. The vehicle then knows its
 /// heading sooner.
 #[test]
-fn stop_before_the_dive_leaves_fewer_metres_undecided() {
+fn stop_before_the_dive_reduces_the_undecided_metres() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let [at_once, stood] = [Driven::Planned, Driven::Stood].map(|driven| {
         let cell = Cell { vehicle, condition: Condition::DataSheet, start_m: 16.0, let_in_m: None, driven };
@@ -114,11 +114,11 @@ fn stop_before_the_dive_leaves_fewer_metres_undecided() {
         assert!(figures.passed_far == 0 && figures.false_passes() <= 0.025, "{driven:?}: {figures:?}");
         figures.share(2)
     });
-    assert!(at_once > 0.05, "{at_once}: there is nothing to gain");
+    assert!(at_once > 0.05, "{at_once}: without a stop, too few metres are undecided for a comparison");
     assert!(stood <= 0.02, "share of undecided metres: {stood} with a stop, {at_once} without");
 }
 
-/// With every verdict set to pass, all false passes are counted. With every verdict set to fail, all false fails are
+/// If every verdict is set to pass, all false passes are counted. If every verdict is set to fail, all false fails are
 /// counted.
 #[test]
 fn field_statistics_count_all_false_passes_and_false_fails() {
@@ -154,11 +154,10 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
     assert!((told_m - less.way_m[1] - judged.report.section_m).abs() < 1e-9, "{told_m} {less:?}");
 }
 
-/// Mounts of several heads. An error of 3 degrees is found by swinging; then no section passes. Errors as declared are
-/// contained in the standard deviation of D, and in the planned speed. With `HEADRACE_MOUNT_SEEDS=10` dives of each cell of
-/// all vehicles.
+/// Swinging finds an undeclared mount error of 3 degrees. Declared mount errors are included in the standard deviation
+/// of D and in the planned speed. `HEADRACE_MOUNT_SEEDS=10` tries all vehicles, with ten dives of each cell.
 #[test]
-fn heads_off_their_mounts_let_no_section_far_over_the_target_pass() {
+fn no_section_far_over_the_target_passes_with_wrong_mounts() {
     const ALL: [&str; 7] =
         ["vita2-2", "vita2-3", "vita2-4", "vita2-4-sectors", "pipe", "autopilot", "bluerov2"];
     let (names, seeds): (&[&str], u64) = match std::env::var("HEADRACE_MOUNT_SEEDS") {
@@ -197,10 +196,9 @@ fn heads_off_their_mounts_let_no_section_far_over_the_target_pass() {
     }
 }
 
-/// A section that passes during the dive passes in the report, too. With `HEADRACE_LIVE_CONDITIONS=all` in dives of all
-/// conditions.
+/// With `HEADRACE_LIVE_CONDITIONS=all`, the test runs dives of all conditions.
 #[test]
-fn sections_that_pass_live_pass_in_the_report() {
+fn section_that_passes_during_the_dive_passes_in_the_report() {
     let are_all = std::env::var("HEADRACE_LIVE_CONDITIONS").is_ok_and(|conditions| conditions == "all");
     let few = [Condition::DataSheet, Condition::Murk, Condition::Fish];
     let conditions = CONDITIONS.map(|(_, condition)| condition);

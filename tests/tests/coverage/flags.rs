@@ -1,7 +1,7 @@
 //! Checks the flags of two hundred short dives against their definition.
 //!
-//! A flag is raised when further forward motion can no longer undo a fail, and cleared when a later pass fills the
-//! hole. The oracle has the poses and all samples, but not the order in which the loop judges sections.
+//! A flag is raised when driving on can no longer undo a fail, and cleared when a later pass fills the hole. The oracle
+//! has the poses and all samples, but not the order in which the loop judges sections.
 
 use headrace_coverage::Verdict;
 use std::sync::LazyLock;
@@ -83,7 +83,7 @@ fn every_permanent_fail_is_flagged() {
 #[test]
 fn no_flag_is_raised_while_the_hole_can_still_be_filled() {
     every_flag(forward, |judged, due, _| {
-        is_early(judged, due).then_some("raised though going on could have undone it")
+        is_early(judged, due).then_some("raised although driving on could have undone it")
     });
 }
 
@@ -118,7 +118,7 @@ fn flag_is_raised_within_25_cm_of_the_point_of_no_return() {
             late.extend(is_late.filter(|is| *is).map(|_| format!("seed {}: {flag:?}", judged.seeded.seed)));
         }
     }
-    assert!(on_time > 60 && late.is_empty(), "{on_time} on time, not {late:#?}");
+    assert!(on_time > 60 && late.is_empty(), "{on_time} flags on time; late: {late:#?}");
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn filled_hole_has_no_flag() {
     every_flag(reversing, |judged, due, _| {
         let section = judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
         let stands = due.raised_s.is_some() && due.cleared_s.is_none();
-        (stands && section.verdict == Verdict::Pass).then_some("passes, and keeps its flag")
+        (stands && section.verdict == Verdict::Pass).then_some("passes but keeps its flag")
     });
 }
 
@@ -190,7 +190,7 @@ fn no_flag_is_raised_while_the_fail_can_still_be_undone() {
     // raised.
     every_flag(
         |judged| forward(judged) && direct(judged),
-        |judged, _, due| is_early(judged, due).then_some("raised though going on could have undone it"),
+        |judged, _, due| is_early(judged, due).then_some("raised although driving on could have undone it"),
     );
 }
 

@@ -90,7 +90,7 @@ fn declared_opening_is_listed_and_does_not_fail() {
 }
 
 #[test]
-fn several_targets_give_the_same_verdicts_as_single_runs() {
+fn replay_with_several_targets_gives_the_verdicts_of_single_replays() {
     let folder = Folder::with_dive();
     let (_, together) = folder.replay("dive.mcap", &["--target", "0.5,1.2,2", "--section", "0.25,1"]);
     let others = together["other_targets"].as_array().unwrap();

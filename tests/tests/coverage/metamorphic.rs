@@ -133,7 +133,7 @@ const HEADS: [[f64; 2]; 2] = [[0.4, 0.1], [-0.3, 0.05]];
 
 /// A mirrored vehicle in a mirrored tunnel sends the same bytes.
 #[test]
-fn wall_mirror_mirrors_the_report() {
+fn mirrored_wall_gives_a_mirrored_report() {
     let corners = [[-1.8, 0.0], [2.2, 0.0], [2.6, 1.4], [1.0, 3.0], [-1.4, 2.6], [-2.1, 1.0]];
     let [polygon, mirrored] = [1.0, -1.0].map(|side| {
         let lines: Vec<String> = corners.iter().map(|[y, z]| format!("{},{z}", side * y)).collect();

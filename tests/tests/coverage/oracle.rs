@@ -70,8 +70,8 @@ fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed and its hole's upper bound, from the samples of some visits alone, is at least this
-/// diameter. The oracle uses the samples of all visits, which can only make the hole smaller.
+/// Whether a section passed and this diameter is at most the upper bound of its hole. The bound may come from the
+/// samples of some visits only. The oracle uses the samples of all visits, which can only make the hole smaller.
 fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
@@ -110,19 +110,19 @@ fn reported_hole_position_is_right() {
 }
 
 #[test]
-fn verdicts_follow_from_hole_sigma_and_target() {
+fn verdicts_follow_from_hole_size_its_sd_and_the_target() {
     every_section(|dive, wall, section| {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let (hole_m, target_m, twice_m) =
             (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sd_m);
-        // A section stays open if further forward motion could still fill its hole.
+        // A section stays open if driving on could still fill its hole.
         let reached = reached(dive);
         let (rear_m, passed_m) = (reached.last()?.rear_m, all_passed_from_m(&reached));
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // Whether the first failing place changes if the start of the stretch that all heads have crossed moves by
-        // `NEAR_M`.
+        // The first failing place counts as near the start of the stretch that all heads have passed, if it changes
+        // when this start moves by `NEAR_M`.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
         // Tolerance for differences between oracle and program. The oracle finds the first failing place to within one
@@ -174,8 +174,8 @@ fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
 
 /// Whether a section has samples that deviate from the design by more than a tenth of the radius.
 ///
-/// Such returns wait for the next ones of their head, so other heads' later samples may be stored before them, and count
-/// as earlier passes.
+/// Such a return is stored only after the next returns of its head. So later samples of other heads may be stored
+/// before it, and count as earlier passes.
 fn has_run(section: &SectionRow, perimeter_m: f64) -> bool {
     let extremes_m = section.deviation.map(|deviation| [deviation.inmost_m, deviation.outmost_m]);
     extremes_m.into_iter().flatten().any(|off_m| off_m.abs() > 0.1 * perimeter_m / TAU)
@@ -218,8 +218,8 @@ fn spacings_of_every_section_match_their_definitions() {
             }
         }
     }
-    println!("{left_out} sections with runs, {sections} without");
-    assert!(10 * left_out < sections, "{left_out} sections with runs, {sections} without");
+    println!("{left_out} sections with large deviations, {sections} without");
+    assert!(10 * left_out < sections, "{left_out} sections with large deviations, {sections} without");
     assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without end points of series");
 }
 

@@ -31,8 +31,8 @@ fn sections(report: &Value, from_m: f64, to_m: f64) -> Vec<&Value> {
     all.filter(|section| (from_m..to_m).contains(&number(section, "start_m"))).collect()
 }
 
-/// From chainage 11 to 20 m, the radius is 23 % larger, and the wall is on average 0.66 m outside the design. The filter takes
-/// a part of it for a change of height.
+/// From chainage 11 to 20 m, the radius is 23 % larger than designed. The wall is on average 0.66 m outside the design.
+/// The filter takes a part of this deviation for a change of height.
 fn wider_wall() -> String {
     let stations = [(0, 1.0), (9, 1.0), (11, 1.23), (20, 1.23), (22, 1.0)];
     let station =
@@ -82,8 +82,8 @@ fn suggested_declaration_of_a_side_tunnel_clears_its_missed_stretch() {
     let (report, summary) = dive(&vehicle, &scene);
     let suggested = report["suggested_openings"].as_array().unwrap();
     assert_eq!(suggested.len(), 1, "{summary}");
-    // Beams that enter the side tunnel obliquely return from its own walls, so the patch without returns is smaller than
-    // the mouth: 10 to 14 m, 2 m up and down from the axis of the side tunnel.
+    // Beams that enter the side tunnel obliquely return from its own walls. So the patch without returns is smaller
+    // than the mouth, which extends from 10 to 14 m, and 2 m up and down from the axis of the side tunnel.
     let [from_m, to_m, clock_from, clock_to] =
         ["from_m", "to_m", "clock_from", "clock_to"].map(|key| number(&suggested[0], key));
     assert!(9.5 < from_m && from_m < 11.0 && 13.0 < to_m && to_m < 14.5, "{suggested:?}");
@@ -96,7 +96,7 @@ fn suggested_declaration_of_a_side_tunnel_clears_its_missed_stretch() {
     assert!(declared["suggested_openings"].as_array().unwrap().is_empty());
 }
 
-/// Returns lost all over the wall, or on a long stretch of one side, are no opening.
+/// If returns are lost all over the wall, or on a long stretch of one side, no opening is suggested.
 #[test]
 fn returns_lost_all_over_the_wall_suggest_no_opening() {
     let heads = "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\n";

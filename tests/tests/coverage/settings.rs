@@ -74,8 +74,8 @@ fn head_turned_about_its_axis_is_reported_with_angle() {
     }
 }
 
-/// Such an error changes the ranges while the vehicle yaws back and forth. With a single head it looks like a heading
-/// error.
+/// If a head is yawed or pitched on its mount, its ranges change while the vehicle yaws back and forth. With a single
+/// head, this looks like a heading error.
 #[test]
 fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
     let right = file("vita2-4.toml");
@@ -160,10 +160,10 @@ fn correct_settings_are_not_reported() {
     }
 }
 
-/// A head that sees only a round vault about its own axis can't observe its rotation. Without noise, its range errors
-/// of some millimetres are constant, and they must not be taken for a wrong setting.
+/// If a head sees only a round vault about its own axis, its rotation can't be observed. Without noise, its range
+/// errors of some millimetres are constant. They must not be taken for a wrong setting.
 #[test]
-fn range_errors_of_millimetres_in_a_round_sector_are_not_reported_as_rotation() {
+fn millimetre_range_errors_under_a_round_vault_are_not_reported_as_rotation() {
     for layout in ["sector_offset", "phase_shift"] {
         let scene = scenes::scene(&format!(
             "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.layout = {layout:?}\n[trajectory]\nstart_m = 5\n\
@@ -174,7 +174,7 @@ fn range_errors_of_millimetres_in_a_round_sector_are_not_reported_as_rotation() 
 }
 
 #[test]
-fn local_wall_deviations_are_not_reported_as_settings() {
+fn local_wall_deviations_are_not_reported_as_wrong_settings() {
     for name in ["collapse", "boulders", "steel", "vita1-field"] {
         let path = headrace_tests::root().join(format!("deploy/scenes/{name}.toml"));
         let text = std::fs::read_to_string(path).unwrap().replace("../vehicles/", "");

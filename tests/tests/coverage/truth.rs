@@ -138,7 +138,7 @@ fn ideal_dive_reports_true_holes() {
 }
 
 #[test]
-fn returns_from_anything_except_the_wall_fill_no_hole() {
+fn oracle_takes_only_returns_from_the_wall_as_samples() {
     let count = |effects: &str| dive(16.0, effects).truth.samples.len() as f64;
     let all = count("motion_within_turn = {}\n");
     for (effect, least, most) in [

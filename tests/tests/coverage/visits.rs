@@ -61,7 +61,7 @@ fn section_sampled_while_the_counter_is_stuck_passes_after_one_complete_visit() 
 }
 
 #[test]
-fn drive_back_revokes_no_pass() {
+fn driving_back_revokes_no_pass() {
     let out = dive(2, &[(12.0, 0.09)], "");
     let home = dive(2, &[(12.0, 0.09), (12.0, -0.4)], "");
     let where_m = [6.0, 15.0];

@@ -169,7 +169,7 @@ fn recovered_head_is_used_again() {
 }
 
 #[test]
-fn constant_range_on_a_swaying_vehicle_is_reported_even_within_tolerance() {
+fn constant_range_near_the_wall_is_reported_if_the_vehicle_sways() {
     let dive = dive(2, &format!("stuck_range = {{ range_m = 0.95, sensors = [\"sonar_1\"] }}\n{DRIFT}"));
     let alerts = named(&dive, "sonar_1");
     let constant = alerts.iter().find(|alert| alert.kind == "head_constant").unwrap();
@@ -178,7 +178,7 @@ fn constant_range_on_a_swaying_vehicle_is_reported_even_within_tolerance() {
 }
 
 #[test]
-fn no_section_passes_on_noise_and_one_noisy_head_of_two_is_reported() {
+fn head_with_random_ranges_passes_no_section_and_is_reported() {
     let effects = |head: &str| format!("outliers = {{ share = 1, near_m = 0.1, sensors = [\"{head}\"] }}\n");
     let alone = dive(1, &effects("sonar_0"));
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
@@ -194,7 +194,7 @@ fn no_section_passes_on_noise_and_one_noisy_head_of_two_is_reported() {
 }
 
 #[test]
-fn sound_heads_are_accepted_in_a_wider_pipe_and_while_swaying() {
+fn heads_without_faults_are_accepted_in_a_wider_pipe_and_on_a_swaying_vehicle() {
     let wider = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 1.06\n";
     for scene in [format!("{CREEP}{DRIFT}"), format!("{CREEP}{wider}")] {
         let dive = instrumented::dive(&pipe(2), &scene);
@@ -207,7 +207,7 @@ fn sound_heads_are_accepted_in_a_wider_pipe_and_while_swaying() {
 }
 
 #[test]
-fn sections_passed_in_murky_water_have_true_holes_within_the_target() {
+fn no_section_far_over_the_target_passes_in_murky_water() {
     let heads = "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]";
     let near =
         format!("outliers = {{ share = 0.05, near_m = 0.1, far_m = 0.8, {heads} }}\nmultipath = {{}}\n");

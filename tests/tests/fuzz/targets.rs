@@ -157,7 +157,7 @@ pub(crate) fn try_one(
     if corpus.said.iter().any(holds) {
         Ok(())
     } else {
-        Err(format!("{} messages, and no loss is said", said.len()))
+        Err(format!("{} messages, and no loss is reported", said.len()))
     }
 }
 
@@ -257,7 +257,7 @@ fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Largest number of errors listed for a file. It includes the line that says that there are more.
+/// Largest number of lines in the list of a file's errors, including the line that says that there are more.
 const MOST_ERRORS: usize = 101;
 
 /// Reads a vehicle file or a scene; returns its number of sensors. Errors: the list of errors in the file is faulty.

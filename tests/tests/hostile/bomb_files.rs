@@ -80,7 +80,7 @@ fn files() -> Vec<Bomb> {
             "has more errors; these are the first 100",
         ),
         (
-            "70,000 sensors of nothing",
+            "70,000 sensors without keys",
             VEHICLE.to_owned() + &"[[sensors]]\n".repeat(70_000),
             check,
             "tables; at most 2000 are allowed",
@@ -153,7 +153,7 @@ fn files() -> Vec<Bomb> {
             import("candump"),
             "",
         ),
-        ("telemetry of nothing but beginnings", "\0\0\0\0\0\0\0\0\u{7e}".repeat(1 << 20), import("tlog"), ""),
+        ("telemetry of entry beginnings only", "\0\0\0\0\0\0\0\0\u{7e}".repeat(1 << 20), import("tlog"), ""),
     ]
 }
 

@@ -57,12 +57,12 @@ fn chunks() -> Vec<Bomb> {
         bomb("8 GiB of zeros in a chunk", &[depth(), zeros(8 << 30)], TOO_LARGE),
         bomb("16 GiB of zeros in 500 chunks", &[depth(), zeros(31 * MIB).repeat(500)], SWELLS),
         bomb(
-            "100 bytes that are 1 GiB",
+            "1 GiB that claims to be 100 bytes",
             &[depth(), chunk("zstd", 100, &zstd(17, &[Part::Repeated(0, 1 << 30)]), (1, 2))],
             "can't be decompressed",
         ),
         bomb(
-            "31 MiB that are 100 bytes",
+            "100 bytes that claim to be 31 MiB",
             &[depth(), chunk("zstd", 31 * MIB, &zstd(17, &[Part::Repeated(0, 100)]), (1, 2)).repeat(1000)],
             "can't be decompressed|over 512 times",
         ),
@@ -77,7 +77,7 @@ fn chunks() -> Vec<Bomb> {
             "a chunk ",
         ),
         bomb(
-            "a million messages of nothing in a chunk",
+            "a million empty messages in a chunk",
             &[depth(), chunk("", small.len() as u64, &small, (0, MIB))],
             TOO_LARGE,
         ),
@@ -94,7 +94,7 @@ fn chunks() -> Vec<Bomb> {
         bomb("40 overlapping chunks of 15 MiB, packed", &[depth(), packed.repeat(40)], SWELLS),
         bomb("chunks in chunks", &[depth(), nested], ""),
         bomb(
-            "messages of 65,536 channels that there aren't",
+            "messages of 65,536 undefined channels",
             &[depth(), chunk("", undefined.len() as u64, &undefined, (5, 5)).repeat(4)],
             "messages of channel",
         ),
@@ -148,7 +148,7 @@ fn headers() -> Vec<Bomb> {
             "gone|definitions and metadata",
         ),
         bomb(
-            "half a million attachments of nothing",
+            "half a million empty attachments",
             &[depth(), attachment("a", b"").repeat(500_000)],
             ATTACHMENTS,
         ),
@@ -158,7 +158,7 @@ fn headers() -> Vec<Bomb> {
             ATTACHMENTS,
         ),
         bomb(
-            "600,000 chunks of nothing",
+            "600,000 empty chunks",
             &[depth(), chunk("", 0, b"", (0, 0)).repeat(600_000)],
             "more than 524288 chunks",
         ),
@@ -168,14 +168,14 @@ fn headers() -> Vec<Bomb> {
             "can't be decompressed",
         ),
         bomb(
-            "100,000 chunks packed otherwise",
+            "50,000 chunks with an unknown compression",
             &[depth(), chunk(&"z".repeat(900), 50, b"no frame at all", (0, 0)).repeat(50_000)],
             "zstd and lz4 are supported",
         ),
         bomb("a message of 100 MiB outside chunks", &[depth(), long], TOO_LARGE),
         bomb("messages 60 MiB apart", &[depth(), far.concat()], HEADERS),
         bomb(
-            "a part after four thousand million others",
+            "a part that claims to follow 4294967294 other parts",
             &[depth(), metadata("headrace.part", part)],
             "parts 1 to 4294967294 of the recording are missing",
         ),
@@ -225,7 +225,7 @@ fn pointers() -> Vec<Bomb> {
         bomb("statistics of 2^64-1 messages", some(&[record(11, &statistics)]), "bytes that aren't records"),
         bomb("ticks of 2^32-1 packets", log(&[depth(), channel(2, "/loop/tick", &[0; 4]), ticks]), ""),
         bomb(
-            "40 MB of results of nothing",
+            "40 MB of meaningless results",
             log(&[depth(), channel(3, "/result/poses", &[0; 4]), results]),
             "",
         ),

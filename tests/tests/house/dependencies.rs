@@ -24,7 +24,7 @@ fn packages() -> Vec<Value> {
     metadata["packages"].as_array().unwrap().clone()
 }
 
-/// Crates on which each package of this tree depends by a lock file.
+/// For each package of this tree, the crates on which it depends according to a lock file.
 fn locked_dependencies(lock_file: &str) -> BTreeMap<String, BTreeSet<String>> {
     let text = std::fs::read_to_string(root().join(lock_file)).unwrap();
     let lock: toml::Table = toml::from_str(&text).unwrap();
@@ -37,7 +37,7 @@ fn locked_dependencies(lock_file: &str) -> BTreeMap<String, BTreeSet<String>> {
     ours.map(|package| (name(&package["name"]), dependencies(package).iter().map(name).collect())).collect()
 }
 
-/// Crates that the build of each package of the workspace always needs.
+/// For each package of the workspace, the crates that its build always needs.
 fn built_dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let needs = |package: &Value| {
         let all = package["dependencies"].as_array().unwrap().iter();
@@ -115,7 +115,7 @@ fn crates_come_from_the_registry_or_this_tree() {
     }
 }
 
-/// With an old lock file, builds of `lab/` with `--locked` fail, and those without it change the file.
+/// With an old lock file, builds of `lab/` with `--locked` fail, and builds without `--locked` change the file.
 #[test]
 fn lock_file_of_the_lab_lists_the_dependencies_of_the_product() {
     let lab = locked_dependencies("lab/Cargo.lock");

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::workspace::{root, sources};
 
 const LIST: &str = "tests/tests/fuzz/entry_points";
-/// Signs that a file interprets external bytes: the traits of decoders and file formats, and the parsers of text and JSON.
+/// Signs that a file interprets external bytes: the traits of decoders and file formats, and the parsers of text and
+/// JSON.
 const SIGNS: [&str; 9] = [
     " Decoder for ",
     " Driver for ",
@@ -43,7 +44,7 @@ fn interprets_bytes(text: &str) -> bool {
 }
 
 #[test]
-fn every_reader_of_external_bytes_is_tried_with_broken_ones() {
+fn every_reader_of_external_bytes_is_tested_with_broken_bytes() {
     let mut found = BTreeSet::new();
     for folder in ["core", "plugins", "replay", "src"] {
         for (path, text) in sources(&root().join(folder)) {

@@ -15,14 +15,14 @@ fn every_hard_case_has_its_row_and_its_test() {
         .filter(|line| line.contains('|') && !line.starts_with("#!"))
         .map(|line| line.split('|').map(str::trim).collect())
         .collect();
-    assert_eq!(rows.len(), cases.len(), "tests/hard_cases/run makes docs/why/hard-cases.csv anew");
+    assert_eq!(rows.len(), cases.len(), "renew docs/why/hard-cases.csv with tests/hard_cases/run");
     assert!(cases.len() > 80, "{}", cases.len());
     for (row, case) in rows.iter().zip(&cases) {
         let [name, what, oracle, bound, file, test] = case[..] else { panic!("{case:?}") };
         assert_eq!(
             [&row[1], &row[2], &row[6], &row[7]],
             [what, oracle, file, test],
-            "tests/hard_cases/run makes the table anew"
+            "renew docs/why/hard-cases.csv with tests/hard_cases/run"
         );
         let text = read(file);
         assert!(text.contains(&format!("fn {test}(")), "{what}: no {test} in {file}");

@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn test_only_imports_are_left_out() {
+    fn imports_in_test_code_are_ignored() {
         let text = "#[cfg(test)]\nuse crate::a;\n#[cfg(test)]\n#[allow(dead_code)]\npub(crate) mod tests { use crate::b; mod c; }\n\
             #[cfg(all(test, unix))]\nmod d;\n#[cfg(not(test))]\nmod e;\nuse crate::f;";
         assert_eq!(used(text), ["crate::f"]);

@@ -42,7 +42,7 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// The crate that lists all device kinds. It may use the core as a device's crate does, and every device's crate.
+/// The crate that lists all device kinds. It may use the crates of all devices, and the core as these crates do.
 const DEVICES: &str = "plugins/devices";
 
 /// Rust packages in the workspace `lab`.
@@ -81,7 +81,7 @@ fn may_need(place: &Path, needed: &Path) -> bool {
 }
 
 #[test]
-fn dependencies_point_one_way() {
+fn crates_depend_only_on_allowed_crates() {
     let packages = workspace();
     for name in CORE {
         let folder = Path::new("core").join(name);

@@ -257,7 +257,7 @@ fn state_three_more(bytes: &mut [u8]) {
 }
 
 #[test]
-fn fewer_messages_than_stated_are_reported() {
+fn recording_with_fewer_messages_than_it_states_is_reported() {
     let folder = folder("");
     let (code, said) = changed(&folder, "humble.mcap", |bytes| state_three_more(bytes));
     assert_eq!(code, Some(3), "{said}");

@@ -105,7 +105,7 @@ fn failed_recording_is_reported_live_and_until_the_end() {
 }
 
 #[test]
-fn full_disk_leaves_a_truncated_log() {
+fn failing_syncs_leave_a_truncated_log() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
@@ -118,7 +118,7 @@ fn full_disk_leaves_a_truncated_log() {
 }
 
 #[test]
-fn failure_of_one_recording_keeps_the_other() {
+fn failure_of_one_recording_does_not_affect_the_other() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
@@ -257,7 +257,7 @@ fn signal(name: &str, dive: &Child) {
 }
 
 #[test]
-fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
+fn live_dive_goes_on_without_its_terminal_and_ends_on_a_signal() {
     let folder = Folder::with_dive();
     for (end, arguments) in [("TERM", ["--json-lines"]), ("INT", ["--json"])] {
         let mut dive = headrace_tests::program();

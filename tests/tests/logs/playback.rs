@@ -319,7 +319,7 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
 /// Other targets are judged in a second replay of the whole log. An unfinished replay covers less of the dive, so the
 /// figures wouldn't be comparable.
 #[test]
-fn stopped_replay_reports_no_other_targets() {
+fn stopped_replay_reports_the_first_target_only() {
     let folder = logs();
     let arguments = ["ticks.mcap", "--speed", "1x", "--target", "0.5,0.3", "--report", "left.json"];
     let answer = interactive(&folder, &arguments, "pause\nseek 12s\nend\n");

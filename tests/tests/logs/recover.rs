@@ -35,7 +35,7 @@ fn damaged_log_and_its_recovery_have_the_same_digest() {
         let loss = &told["losses"][0];
         assert!(loss["from_ns"].is_u64() && loss["what"].as_str().unwrap().contains("after "), "{told}");
         let ((before, damaged), (after, recovered)) = (folder.replay(&log, &[]), folder.replay(&fixed, &[]));
-        assert_eq!((before, after), (Some(3), Some(3)), "{name}: the loss is still said");
+        assert_eq!((before, after), (Some(3), Some(3)), "{name}: the loss is still reported");
         assert_eq!(recovered["digest"], damaged["digest"], "{name}");
         assert_eq!(recovered["sections"], damaged["sections"], "{name}");
         assert_eq!(recovered["log"]["messages"], damaged["log"]["messages"], "{name}");

@@ -1,5 +1,5 @@
-//! A dive that was interrupted is rebuilt from its log while new packets are only recorded. It then gives the same results
-//! as a dive that was not interrupted, bit for bit.
+//! A dive that was interrupted is rebuilt from its log. Meanwhile, new packets are only recorded. The dive then gives
+//! the same results as a dive that was not interrupted, bit for bit.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -68,7 +68,7 @@ fn with_ports(scene: &Scene) -> Loop {
     app.arm(scene.vehicle.navigation()).unwrap()
 }
 
-/// An interrupted dive, and what it should give.
+/// An interrupted dive, with the expected results of the whole dive.
 struct Interrupted {
     scene: Scene,
     log: PathBuf,
@@ -76,7 +76,7 @@ struct Interrupted {
     before: Vec<Packet>,
     /// Packets after the interruption.
     after: Vec<Packet>,
-    /// State of a dive that has consumed all of them.
+    /// Expected state: that of a dive that has consumed all these packets.
     expected: Vec<u8>,
     digest: u64,
 }
@@ -99,7 +99,8 @@ impl Interrupted {
         Self { scene, log, before, after, expected, digest }
     }
 
-    /// Continues the dive: `held` packets arrive while it is rebuilt, and `waiting` are in the rings when it goes on.
+    /// Continues the dive. `held` packets arrive while it is rebuilt, and `waiting` packets are in the rings when it
+    /// goes on.
     fn resume(&self, held: usize, waiting: usize, saved: &Path) -> (Loop, Rebuilt) {
         let unfinished = Unfinished::read(&self.log).unwrap().unwrap();
         assert_eq!(unfinished.files, std::slice::from_ref(&self.log));
@@ -144,7 +145,7 @@ impl Interrupted {
 }
 
 #[test]
-fn resumed_dive_gives_the_same_results_however_many_packets_arrive_meanwhile() {
+fn resumed_dive_equals_an_uninterrupted_one_however_many_packets_arrive_meanwhile() {
     let folder = Folder::new();
     let dive = Interrupted::new(&folder);
     let none = folder.path("none");
@@ -178,7 +179,7 @@ fn saved_state_shortens_the_replay_only_if_it_fits_the_log() {
     assert_eq!(rebuilt.saved_packets, part as u64);
     dive.is_as_expected(&resumed, "a state that fits");
 
-    // A packet differs, more packets than the log has, a damaged file, and another program.
+    // States that don't fit: one packet differs, more packets than in the log, a damaged file, and another program.
     let mut other = dive.before[..part].to_vec();
     other[part / 2].bytes[0] ^= 1;
     let longer: Vec<Packet> = dive.before.iter().chain(&dive.after[..2300]).cloned().collect();

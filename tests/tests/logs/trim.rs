@@ -1,5 +1,5 @@
-//! Trimmed logs. Without a cut, they contain the same dive. With a cut, they keep the verdicts of the remaining
-//! stretch. Anonymous logs contain no names.
+//! Trimmed logs. Without a cut, they contain the same dive. With a cut, they keep the verdicts of the stretch that is
+//! left. Anonymous logs contain no names.
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;

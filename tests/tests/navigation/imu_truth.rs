@@ -23,7 +23,7 @@ use headrace_tests::recordings;
 use nalgebra_of_peers as peers;
 
 const NAME: &str = "imu_broad/derived_12_undisturbed_slow_translation_C_95Hz.csv.gz";
-/// Names of the columns that the test reads. The full-length recording has further columns.
+/// Names of the columns that the test reads. The full-length recording has more columns.
 const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy", "qz", "movement"];
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const GRAVITY_MPS2: f64 = 9.81;

@@ -1,7 +1,7 @@
 //! Sensors that fall silent during a dive.
 //!
-//! Pings without a position are reported. No flag is raised for a hole that further forward motion fills. When the
-//! sensors return, the dive goes on.
+//! Pings without a position are reported. No flag is raised for a hole that driving on fills. When the sensors return,
+//! the dive goes on.
 
 use headrace_tests::{Folder, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -41,7 +41,7 @@ fn failed(report: &Value) -> Vec<&Value> {
 }
 
 #[test]
-fn tether_loss_without_a_filter_fails_sections_with_position_lost() {
+fn sections_fail_with_cause_position_lost_after_tether_loss_without_a_filter() {
     let report = without("direct", "tether", 25.0, 31.0);
     assert!(report["dive"]["samples_rejected"]["no_fix"].as_u64().unwrap() > 500);
     let failed = failed(&report);
@@ -63,7 +63,7 @@ fn short_tether_silence_is_bridged() {
 /// The dive is interrupted for half a minute, in which the vehicle drives on. Wall that no head
 /// saw does not pass. The stretch before is judged as usual.
 #[test]
-fn interrupted_dive_passes_nothing_that_was_not_seen() {
+fn wall_unseen_during_an_interruption_does_not_pass() {
     for way in ["direct", "filter"] {
         let report = without(way, "", 20.0, 50.0);
         let sections = report["sections"].as_array().unwrap();

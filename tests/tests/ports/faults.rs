@@ -142,8 +142,8 @@ fn device_plugged_in_later_is_used() {
     "#);
 }
 
-/// Runs an echosounder and a head on lines that are garbled at first and sound later. A third sensor must not be
-/// disturbed.
+/// Runs an echosounder and a head on lines that are garbled at first and without faults later. A third sensor must not
+/// be disturbed.
 fn garbled(change: fn(&mut Random, &[u8]) -> Vec<u8>) {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-ping-port0");
@@ -217,7 +217,7 @@ fn bursts_of_garbage_lose_no_frame() {
 }
 
 /// A device that stalls in the middle of every third frame. The stall is shorter than the usual pause between frames,
-/// is longer, or lasts for ever.
+/// or longer than it, or lasts for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);

@@ -134,7 +134,7 @@ fn two(folder: &Folder, connects: [&str; 2]) -> Vec<Value> {
 }
 
 #[test]
-fn two_sensors_on_one_device_are_refused() {
+fn second_sensor_on_a_device_is_refused() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-head-port0");
     let place = end.connect().to_string();

@@ -105,7 +105,7 @@ fn frame_carries_the_kernel_receive_time() {
 
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
-fn can_reader_gets_one_error_on_interface_down_and_frames_after_up() {
+fn can_reader_gets_one_error_when_the_interface_goes_down_and_frames_once_it_is_up() {
     let vcan = Interface::up("vcan6");
     let (sender, reader) = (vcan.socket(), vcan.socket());
 
@@ -219,7 +219,7 @@ fn counter_is_found_by_its_serial_number_and_read() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn unread_hid_reports_keep_the_first_63() {
+fn kernel_keeps_the_first_63_unread_hid_reports() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0003");
     let (reader, _) = open(&mut api, "HR-0003");

@@ -349,7 +349,7 @@ fn late_read_does_not_change_a_frame_timestamp() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
+fn every_frame_is_read_after_a_can_interface_was_down() {
     let vcan = Interface::up("vcan3");
     let (mut imu, mut tether) = (EmulatedPort::can(vcan.0).unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan3", COUNTER], &unchanged);

@@ -64,7 +64,8 @@ impl Drop for Running {
     }
 }
 
-/// Starts an emulator. Returns its process, its further lines, and the path of the vehicle file that it has written.
+/// Starts an emulator. Returns its process, the lines that it prints after the start, and the path of the vehicle file
+/// that it has written.
 pub(crate) fn emulate(
     folder: &Folder,
     scene: &Path,

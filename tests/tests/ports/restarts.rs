@@ -79,7 +79,7 @@ fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     assert_eq!(status.code(), Some(3), "data of the gaps is lost");
     let live = report(&folder.path("live.json"));
     let losses = live["log"]["losses"].as_array().unwrap();
-    // The interruptions of the recording that the report is about, and the last one of other recordings.
+    // The report lists each interruption of its own recording, and the last interruption of each other recording.
     assert_eq!(
         losses.len() as u64 + 1,
         restarts + logs.len() as u64,
@@ -128,8 +128,8 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     assert_eq!(verified.code, Some(3), "{}{}", verified.stdout, verified.stderr);
 }
 
-/// A kill may leave one recording longer than the other. The dive goes on from the longer one, so live results that
-/// come later may differ from a replay of the other.
+/// A kill may leave one recording longer than the other. The dive goes on from the longer one. So later live results
+/// may differ from a replay of the shorter one.
 #[ignore = "takes a minute at real speed; .ci/run runs it beside other tests"]
 #[test]
 fn dive_with_two_recordings_goes_on_in_both() {
@@ -138,7 +138,7 @@ fn dive_with_two_recordings_goes_on_in_both() {
 
 #[ignore = "needs the time of .ci/run's rehearsal step"]
 #[test]
-fn unfinished_dive_is_offered_and_declined() {
+fn run_refuses_to_begin_beside_an_unfinished_dive_without_resume_or_new() {
     let folder = Folder::new();
     folder.write("vehicle.toml", headrace_tests::VEHICLE);
     let run = |further: &[&str]| {

@@ -155,7 +155,7 @@ fn ends_and_reports(mut run: Running, folder: &Folder) {
 }
 
 #[test]
-fn terminal_blocked_from_the_start_does_not_keep_a_dive_from_ending() {
+fn dive_ends_even_if_the_terminal_is_blocked_from_the_start() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let full = Terminal::open(100);
@@ -183,7 +183,7 @@ fn dive_ends_even_if_the_terminal_blocks_in_the_middle_of_a_screen() {
 const PIPE: usize = 1 << 16;
 
 #[test]
-fn blocked_pipe_at_any_byte_does_not_keep_a_dive_from_ending() {
+fn dive_ends_even_if_its_output_pipe_blocks_at_any_byte() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let whole = folder.headrace(&RUN).stdout.len();
@@ -240,7 +240,7 @@ impl Fault for Short {
 }
 
 #[test]
-fn reports_shorter_than_configured_are_reported() {
+fn hid_reports_shorter_than_configured_are_flagged_as_wrong() {
     let folder = Folder::new();
     let end = End::udp();
     folder.write("vehicle.toml", vehicle(&[("counter", COUNTER, &end.connect().to_string())]));

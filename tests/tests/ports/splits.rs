@@ -220,7 +220,7 @@ fn frames_completed_by_the_next_read_are_all_used() {
 }
 
 #[test]
-fn blocks_of_64_bytes_lose_nothing() {
+fn stream_read_in_blocks_of_64_bytes_loses_no_frame() {
     let mut random = Random(22);
     for text in STREAMS {
         let frames = frames(device(text).as_ref(), &mut random);

@@ -45,8 +45,8 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 let (h, noise) = (row(case), case.of_any_size(-10, 10).abs());
                 let before = p.variance_along(&h);
                 let gain = p.measure(&h, noise);
-                // The innovation variance is the sum of both variances. The remaining variance is v noise / (v +
-                // noise).
+                // The innovation variance is the sum of both variances. The variance after the measurement is
+                // v noise / (v + noise).
                 let (sum, left) = (before + noise, before / (1.0 + before / noise));
                 let after = p.variance_along(&h);
                 let size: f64 = (0..N).map(|i| h[i] * h[i] * p.variance(i)).sum();

@@ -9,7 +9,7 @@ use crate::cases::{Case, few, many, within};
 /// edge's end lies, the program subtracts nearly equal numbers. The error is then comparable with the edge's length.
 const OFF_M: f64 = 1e-8;
 
-/// Corners of a polygon that is star-shaped about (0, 3), with repeated points, slivers, corners and straight runs.
+/// Corners of a polygon that is star-shaped about (0, 3). Some corners coincide, or are 1e-12 or 1e-7 of a turn apart.
 fn points(case: &mut Case) -> Vec<Yz> {
     let count = 3 + case.below(60);
     let mut turns: Vec<f64> = (0..count).map(|k| (k as f64 + 0.9 * case.unit()) / count as f64).collect();

@@ -17,7 +17,8 @@ const TICK: DurNs = DurNs(20_000_000);
 /// Chainage at which dives begin; the second constant is the length of the part that the test evaluates. Both are in m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// Cases whose median hole exceeds this fraction of the predicted T must fail sections at a tenth more speed.
+/// Cases whose median hole exceeds this fraction of the predicted T must fail sections at a speed that is a tenth
+/// higher.
 const NEAR: f64 = 0.95;
 /// Number of advice updates at the end of a dive that the test ignores, because the vehicle is stopping.
 const BRAKING: usize = 15;
@@ -345,7 +346,7 @@ fn advice_compensates_lost_returns() {
 }
 
 #[test]
-fn advice_states_that_a_lower_speed_does_not_help() {
+fn advice_says_so_if_a_lower_speed_does_not_help() {
     let coarse = Case { mode: "fastest", target_m: 0.3, ..VITA1 };
     for speed_mps in [0.1, 0.03] {
         let dive = coarse.dive(speed_mps, speed_mps);

@@ -65,8 +65,8 @@ impl Rig {
         self.hull_m.iter().zip(&self.aft).map(spec).collect()
     }
 
-    /// Simulates a dive at `speed_mps` with heads laid out for `planned_mps`. The dive is longer than the hull by some
-    /// turns.
+    /// Simulates a dive at `speed_mps` with heads laid out for `planned_mps`. The dive is longer than the hull by the
+    /// distance of some turns.
     fn dive(&self, layout: HeadLayout, planned_mps: f64, speed_mps: f64) -> Dive {
         let [back_m, front_m] = ends(&self.hull_m);
         let ping_m = speed_mps * self.ping_s();
@@ -249,7 +249,7 @@ fn phase_shifted_heads_pass_each_angle_at_equal_distances() {
 }
 
 #[test]
-fn heads_in_sector_layout_sweep_in_phase_with_alternating_pass_distances() {
+fn sector_heads_stay_in_phase_and_their_pass_distances_alternate() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;

@@ -28,7 +28,7 @@ fn way(scene: &Scene) -> Vec<f64> {
 }
 
 #[test]
-fn advised_pilot_is_repeatable() {
+fn dive_of_an_advised_pilot_is_repeatable() {
     let scene = scene(HURRY);
     let all = || {
         let (mut simulation, mut all) = (simulation(&scene), Vec::new());

@@ -170,7 +170,7 @@ fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
 /// The report must show no influence for one effect and a large influence for another. It also shows the CPU time of
 /// each effect.
 #[test]
-fn explain_worth_shows_which_effects_change_the_result() {
+fn explain_worth_option_reports_which_effects_change_the_result() {
     let folder = folder();
     let effects = "motion_within_turn = {}\nimu_noise = { gyro_degps_rthz = 1e-7 }\nmissing_returns = { share = 0.5, mean_run = 9 }";
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));

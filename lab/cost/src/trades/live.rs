@@ -167,8 +167,8 @@ struct Marker {
 }
 
 impl Prepared {
-    /// Prepares a scene. Also returns two speeds, m/s: the difference between the two references, and the median
-    /// advised speed.
+    /// Prepares a scene. Also returns the difference in advised speed between the two reference settings, m/s, and the
+    /// median advised speed, m/s.
     fn of(inputs: &Inputs<'_>, name: &'static str, text: &str) -> Result<(Self, f64, f64), CostError> {
         let settings = settings();
         let seeds = inputs.effort.pick(1, 3);
@@ -312,7 +312,7 @@ impl Ran {
     }
 }
 
-/// Figures of a setting's dives against the references'.
+/// Differences between a setting's dives and the reference dives, and the CPU times of the setting's ticks.
 #[derive(Default)]
 struct Against {
     off_mps: Vec<f64>,

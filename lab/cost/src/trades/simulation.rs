@@ -22,7 +22,8 @@ const RAYS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Default number of rays per beam.
 const USUAL_RAYS: u32 = 16;
 const MANY_RAYS: u32 = 1024;
-/// Number of rays of a second reference. It is as good as [`MANY_RAYS`], with rays at other directions within the beam.
+/// Number of rays of a second reference, which is as good as [`MANY_RAYS`]. Its rays have other directions within the
+/// beam.
 const OTHER_RAYS: u32 = 769;
 /// Change of D that can change a decision, m: a tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;
@@ -430,8 +431,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let mut left_out = vec![
         LeftOut {
             what: "step lengths of a ray".to_owned(),
-            why: "in a bent or narrowing tunnel, the bound on the wall's slope decides each step, and the ray ends within 1e-11 m of the wall \
-                  (`LEAST_STEP_M` and `ROOT_M` of the tube): shorter steps would change no result, and longer steps would miss walls"
+            why: "shorter steps would change no result, because a ray already ends within 1e-11 m of the wall; longer steps would miss walls"
                 .to_owned(),
         },
         LeftOut {

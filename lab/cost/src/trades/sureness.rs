@@ -86,7 +86,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let mut left_out = vec![LeftOut {
         what: "other modes and targets".to_owned(),
         why: format!(
-            "the shipped file is VITA 2 with four heads, mode {MODE} and target {TARGET_M} m; the part Survey has other modes and targets"
+            "all hours are one way, for the shipped file: VITA 2 with four heads, mode {MODE}, target {TARGET_M} m; the part Survey has other modes and targets"
         ),
     }];
     left_out.extend(inputs.effort.pick(
@@ -180,7 +180,7 @@ fn advice(points: &[Point], calm_m: f64) -> String {
     let [fine_m, coarse_m] = [0.01, 0.02];
     format!(
         "In a calm dive (displacement between passes known to {calm_m:.4} m), a confidence of two standard deviations instead of one costs \
-         {:.1} h over 7 km, and three cost {:.1} h more. With two, a displacement known to {fine_m} m instead of {coarse_m} m saves {:.1} h.",
+         {:.1} h over 7 km one way, and three cost {:.1} h more. With two, a displacement known to {fine_m} m instead of {coarse_m} m saves {:.1} h.",
         hours(2, calm_m) - hours(1, calm_m),
         hours(3, calm_m) - hours(2, calm_m),
         hours(2, coarse_m) - hours(2, fine_m),

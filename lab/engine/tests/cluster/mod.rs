@@ -65,7 +65,7 @@ fn executors_give_the_same_tables_and_answers_as_threads() {
     assert_eq!(stderr(&remote), stderr(&local));
     let all = files(&here);
     assert_eq!(all.len(), 5 * 8);
-    assert!(files(&there) == all, "executors make other files than threads");
+    assert!(files(&there) == all, "executors and threads make different files");
     assert_eq!(finished(&there), 5);
 
     for sql in [
@@ -83,7 +83,7 @@ fn executors_give_the_same_tables_and_answers_as_threads() {
         // Every run tries the unreadable log again.
         assert!(summary.contains(" 1 replayed, 5 from the cache"), "{summary}");
     }
-    assert!(files(&there) == files(&here), "executors make other files of another target than threads");
+    assert!(files(&there) == files(&here), "with another target, executors and threads make different files");
 }
 
 #[test]

@@ -155,8 +155,8 @@ pub(super) fn sectors(figure: &Sectors) -> String {
         measured(&chart, [*from_m, *to_m], figure.line_m, look, (&words, -13.0));
     }
     if let [from_m, _, to_m, ..] = figure.at_line.as_slice() {
-        /// Vertical distance between the wall line on which passes are measured and the dimension line of their sum,
-        /// pixels.
+        /// Distance of a dimension line below the wall line on which passes are measured, pixels. It shows the sum of
+        /// two distances.
         const BELOW_PX: f64 = 30.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.line_m, BELOW_PX);

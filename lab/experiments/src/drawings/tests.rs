@@ -21,11 +21,11 @@ fn figure_6_shows_evenly_spaced_passes_and_a_faster_head() {
     assert!((figure.t_x_m - 0.197 * 4.8).abs() < 1e-9);
     assert_eq!(figure.at_crown.len(), 8);
     for pair in figure.at_crown.windows(2) {
-        // Adjacent heads ping the crown at slightly different angles. A ping one step of 2.4 degrees early or late
-        // shifts a pass by 0.006 m.
+        // The distances aren't exact, because adjacent heads ping the crown at slightly different angles. One step of
+        // 2.4 degrees shifts a pass by 0.006 m.
         assert!((pair[1].1 - pair[0].1 - spaced_m).abs() < 0.1 * spaced_m, "{:?}", figure.at_crown);
     }
-    assert_eq!(figure.faster.len(), 8, "a way for each turn");
+    assert_eq!(figure.faster.len(), 8, "one track for each turn");
     let svg = patterns::phase_shift(&figure);
     assert_eq!(svg, patterns::phase_shift(&figures::phase_shift().unwrap()));
     check(
@@ -69,7 +69,7 @@ fn drawn(configurations: &[(u8, &'static str, bool, bool)]) -> (Walls, String) {
     for panel in &figure.panels {
         assert_eq!(panel.distances_m.len(), 40 * 100);
         let close = panel.distances_m.iter().filter(|m| **m <= figure.most_m).count();
-        assert!(close * 100 >= panel.distances_m.len() * 90, "the scale takes in {close} cells");
+        assert!(close * 100 >= panel.distances_m.len() * 90, "the scale covers only {close} cells");
     }
     (figure, svg)
 }

@@ -74,7 +74,7 @@ impl Window {
 fn add_step(ways: &mut Vec<Way>, head: u16, perimeter_m: f64, from: [f64; 2], to: [f64; 2]) {
     for [begin, end] in polyline::over_seam(perimeter_m, from, to) {
         match ways.last_mut() {
-            // If a step ends on the seam, its second part has no length.
+            // If a step ends on the seam, its second part has no length and is skipped.
             _ if (begin[0] - end[0]).abs() + (begin[1] - end[1]).abs() <= 0.0 => (),
             Some(way) if way.head == head && way.points.last() == Some(&begin) => way.points.push(end),
             _ => ways.push(Way { head, points: vec![begin, end] }),

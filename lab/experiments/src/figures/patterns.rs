@@ -13,7 +13,8 @@ use crate::spacing::passes_of;
 const BEFORE_M: f64 = 4.0;
 /// Chainage at which the simulated dives start, m.
 const START_M: f64 = 5.0;
-/// Position within the sector at which the two distances are shown, as a share of the sector.
+/// Place of the line on which the two distances between passes are shown: share of head 0's sector, counted from the
+/// floor's centre.
 const SHARE: f64 = 0.8;
 /// Angle between consecutive drawn points of the faster head's track, degrees.
 const FASTER_STEP_DEG: u32 = 2;

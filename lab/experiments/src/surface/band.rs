@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn band_product_along_an_axis_equals_the_product_of_each_line() {
+    fn band_matrix_times_an_array_equals_the_products_with_its_single_lines() {
         let band = Band::mass(3);
         let source: Vec<f64> = (0..2 * 5 * 3).map(f64::from).collect();
         let mut target = vec![0.0; 30];

@@ -8,7 +8,8 @@ use super::Xyz;
 use super::wall::Stretch;
 use crate::Spread;
 
-/// Coordinates closer to zero become zero, since the triangulation's exact predicates refuse values below 1e-142.
+/// Coordinates closer to zero than this become zero, since the triangulation's exact predicates refuse values below
+/// 1e-142.
 const TINY_M: f64 = 1e-100;
 
 /// A sample on the unrolled wall.

@@ -125,7 +125,7 @@ mod tests {
     const FINE: Grid = Grid { origin: [1.0, -2.0, 0.5], cell_m: 0.5, cells: [8, 5, 6] };
 
     #[test]
-    fn refining_keeps_all_values() {
+    fn refining_the_grid_keeps_all_field_values() {
         let coarse = FINE.coarser();
         let field: Vec<f64> = (0..coarse.len()).map(|k| math::sin(k as f64 * 1.7)).collect();
         let refined = FINE.refined(&coarse, &field);

@@ -35,7 +35,7 @@ const ALPHAS: [f64; 4] = [0.10, 0.05, 0.02, 0.01];
 const NONE: usize = 99;
 
 #[test]
-fn critical_values_match_published_ones() {
+fn critical_values_match_published_tables() {
     for (n, row) in CRITICAL {
         for (critical, alpha) in row.into_iter().zip(ALPHAS) {
             let p = |w: usize| exact(n, w as f64)[0];

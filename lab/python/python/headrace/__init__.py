@@ -7,8 +7,8 @@
     >>> tables = headrace.replay("dive.mcap", target_m=0.3)
     >>> polars.DataFrame(tables.sections)
 
-Units are in names: ``target_m`` are metres, ``log_time_ns`` nanoseconds of the log's clock. Terms are headrace's own
-(docs/reference/glossary.md).
+Names contain the units: ``target_m`` is in metres, ``log_time_ns`` in nanoseconds of the log's clock.
+docs/reference/glossary.md explains the terms.
 """
 
 from . import sampling

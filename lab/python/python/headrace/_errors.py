@@ -1,4 +1,4 @@
-"""Exceptions of headrace. Each names the file that it is about, and the place in it, where there is one."""
+"""Exceptions of headrace. Each states the file that caused it and the place in that file, if known."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Optional
 
 
 class HeadraceError(Exception):
-    """What headrace can't do, and why.
+    """Base class of all errors of headrace. The message says what failed and why.
 
-    ``file`` is the file that it is about, ``place`` the place in it (``"byte 1024"``, ``"line 7, target_m"``); None where there is
-    none.
+    ``file`` is the file that caused the error, ``place`` the place in that file (``"byte 1024"``, ``"line 7, target_m"``). Each is
+    None if unknown.
     """
 
     def __init__(self, message: str, file: Optional[str] = None, place: Optional[str] = None) -> None:
@@ -23,16 +23,16 @@ class HeadraceError(Exception):
 
 
 class LogError(HeadraceError):
-    """A log can't be read as a whole. Damage within one isn't an error: see ``Log.losses``."""
+    """A log can't be read as a whole. Damage within a log isn't an error: see ``Log.losses``."""
 
 
 class ConfigError(HeadraceError):
-    """A vehicle file can't be read, or keys of it are wrong: all of them in the message, place and file of the first."""
+    """A vehicle file can't be read, or has wrong keys. The message lists all of them; file and place are those of the first."""
 
 
 class ReplayError(HeadraceError):
-    """A dive can't be replayed: no vehicle file, no filter to smooth with, or the loop can't be armed."""
+    """A dive can't be replayed: it has no vehicle file, or no filter for smoothing, or the loop can't be armed."""
 
 
 class SamplingError(HeadraceError, ValueError):
-    """Sampling theory has no answer: an argument out of range, or a target that no speed meets."""
+    """The sampling equations have no solution: an argument is out of range, or no speed meets the target."""

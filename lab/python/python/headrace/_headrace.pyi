@@ -1,4 +1,4 @@
-# What Python sees of the compiled part; its documentation is in the classes and functions themselves: help(headrace.Log).
+# Types of the compiled part. Its classes and functions contain their own documentation: help(headrace.Log).
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path

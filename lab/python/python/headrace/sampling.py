@@ -1,7 +1,7 @@
-"""Sampling theory: the spacing of samples on the wall, and how fast a vehicle may go.
+"""Sampling theory: the spacing of samples on the wall, and the largest speed of a vehicle.
 
-The closed forms are those of Jorge et al., Sensors 2021, 21, 1900; ``Profile.t_y_at_rest_m`` is the general case, and ``plan``
-answers for a vehicle file with all of its margins.
+The closed forms are those of Jorge et al., Sensors 2021, 21, 1900. ``Profile.t_y_at_rest_m`` covers any profile. ``plan`` plans
+for a vehicle file and allows for all margins.
 
     >>> from math import radians
     >>> from headrace.sampling import Turn, speed_for_target_mps, t_y2_m
@@ -55,7 +55,7 @@ __all__ = [
 
 
 class Spacing(TypedDict):
-    """Distances between samples at a speed, m."""
+    """Distances between samples at the speed ``speed_mps`` of the answer, m."""
 
     advance_m: float
     pitch_m: float
@@ -72,10 +72,11 @@ class Spacing(TypedDict):
 
 
 class Margins(TypedDict):
-    """The largest speeds with the margins added one after the other, m/s: v_max is ``losses_mps``.
+    """The largest speed after each margin, m/s. Each value also includes all margins before it, so ``losses_mps`` is v_max.
 
-    ``geometry_mps`` is that of heads evenly phased on a wall that all of them see; then what the vehicle hides, the heads' phases and
-    places, swing, errors of position, whose standard deviation between two passes is ``pass_error_m``, and lost returns, of which a plan knows none.
+    ``geometry_mps`` has no margin: the heads are evenly phased, and all of them see the whole wall. The margins are the wall that the
+    vehicle hides, the heads' phases and positions, swing, position errors, and lost returns (none in a plan). ``pass_error_m`` is the
+    standard deviation of the displacement between two passes, m.
     """
 
     geometry_mps: float
@@ -88,7 +89,7 @@ class Margins(TypedDict):
 
 
 class Answer(TypedDict):
-    """A plan's answer for one mode, as ``modes`` of ``headrace plan --json``; docs/why/coverage.md has the terms."""
+    """The plan for one mode, with the keys of ``modes`` in ``headrace plan --json``. docs/why/coverage.md explains the terms."""
 
     mode: str
     step_deg: float
@@ -124,12 +125,13 @@ def plan(
     yaw_rad: float = 0.0,
     yaw_rate_radps: float = 0.0,
 ) -> List[Answer]:
-    """The answers for all modes of a vehicle's heads, as ``headrace plan --vehicle`` gives them.
+    """Plans for all modes of a vehicle's heads, as ``headrace plan --vehicle`` does.
 
-    ``target_m`` is that of the vehicle file if not given. ``speed_mps`` or ``time_s`` (for the whole tunnel) ask whether they meet
-    it. ``drift_m``, ``yaw_rad`` and ``yaw_rate_radps`` are what the vehicle may be off the middle, off the axis, and turning.
+    ``target_m`` defaults to the vehicle file's. With ``speed_mps`` or ``time_s`` (for the whole tunnel), the answers state whether it
+    meets the target. ``drift_m`` is the largest offset from the tunnel's middle, ``yaw_rad`` the largest constant yaw from its axis,
+    and ``yaw_rate_radps`` the largest yaw rate.
 
-    Raises ConfigError for a vehicle file that can't be read or is wrong; SamplingError for an argument out of range.
+    Raises ConfigError if the vehicle file can't be read or is wrong, SamplingError for an argument out of range.
     """
     answers: List[Answer] = json.loads(
         plan_json(

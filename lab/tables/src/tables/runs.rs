@@ -1,11 +1,11 @@
-//! The table `runs`: adjacent flagged sections with one cause, and the advice for passing them again.
+//! The table `runs`: missed stretches, and the advice for passing them again.
 
 use headrace_monitor::report::{Report, ReturnReport, RunReport};
 
 use super::sections::words;
 use crate::column::{Column, Get, Table, count};
 
-/// A run of flagged sections and, until it is cleared, the advice for returning to it.
+/// A missed stretch and, until it is cleared, the advice for returning to it.
 pub(crate) struct Run<'a> {
     run: &'a RunReport,
     back: Option<&'a ReturnReport>,

@@ -142,7 +142,7 @@ pub(crate) fn sections() -> Table<SectionRow> {
     }
 }
 
-/// A hole, and the run of adjacent sections that share it as their largest hole.
+/// A hole, and the adjacent sections that share it as their largest hole.
 pub(crate) struct Hole<'a> {
     section: &'a SectionRow,
     end_m: f64,

@@ -1,10 +1,10 @@
-//! `switch LIST.json`: puts all mutants of the listed sources behind a switch, so that a single build contains them
-//! all.
+//! `switch LIST.json`: puts all mutants of the listed sources behind a switch, so that a single build contains all of
+//! them.
 //!
-//! LIST.json is the output of `cargo mutants --list --json` with a number (`id`) added to each mutant. Each file in
-//! it is rewritten in place, relative to the current folder:
-//! `a + b` becomes `if crate::switched::on(7) { a - b } else { a + b }`. The program prints the ids of mutants that can't be switched: code evaluated at compile time, and
-//! conditions that bind a name.
+//! LIST.json is the output of `cargo mutants --list --json` with a number (`id`) added to each mutant. Each file in it
+//! is rewritten in place, relative to the current folder. For example, `a + b` becomes
+//! `if crate::switched::on(7) { a - b } else { a + b }`. The program prints the ids of mutants that can't be switched.
+//! These mutants are in code that is evaluated at compile time, or in conditions that bind a name.
 
 use std::collections::BTreeMap;
 use std::error::Error;

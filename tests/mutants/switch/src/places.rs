@@ -14,7 +14,7 @@ use crate::{Position, start};
 /// A place that a mutant may change. Ranges are in bytes.
 pub(crate) struct Place {
     pub(crate) range: Range<usize>,
-    /// Position of the place in cargo-mutants' list.
+    /// Line and column at which cargo-mutants lists the place.
     pub(crate) named_at: Position,
     pub(crate) kind: Kind,
 }

@@ -13,8 +13,8 @@ fn figure(point: &Point, name: &str) -> Option<f64> {
     point.errors.iter().find(|error| error.name == name).map(|error| error.interval.middle)
 }
 
-/// Worst case of a method: its largest lateral position error, m, and the smallest share of displacements within two of
-/// their stated standard deviations, %.
+/// Worst case of a method: its largest lateral position error, m, and the smallest share of displacements whose error
+/// is within two stated standard deviations, %.
 fn worst(points: &[Point], method: &str) -> Option<[f64; 2]> {
     let of = |name: &'static str| {
         points.iter().filter(|point| point.value == method).filter_map(move |point| figure(point, name))
@@ -55,7 +55,7 @@ pub(super) fn reasons(points: &[Point]) -> Vec<String> {
     reasons
 }
 
-/// Advice about the default, from the data of the last scene.
+/// Advice about the default, from the points of `scene`.
 pub(super) fn advice(points: &[Point], scene: &str) -> String {
     let of = |value: &str| points.iter().find(|point| point.scene == scene && point.value == value);
     let (Some(cable), Some(usual)) = (of(CABLE), of(USUAL)) else {

@@ -18,7 +18,7 @@ fn settings(depth: u32) -> Settings {
 }
 
 #[test]
-fn sphere_is_matched_to_a_twentieth_of_a_cell() {
+fn sphere_is_reproduced_within_a_twentieth_of_a_cell() {
     let surface = Surface::through(&sphere(5000, 3.0), &settings(5)).unwrap();
     let mesh = surface.mesh();
     let spread = Spread::of(mesh.vertices.iter().map(|p| norm(*p) - 3.0));
