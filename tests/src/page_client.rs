@@ -171,7 +171,7 @@ pub struct Viewer {
     schema: Value,
 }
 
-/// Violations, in a text message, of the schema for the message's type.
+/// Returns how a text message violates the schema of its type.
 fn faults(schema: &Value, text: &Value) -> Vec<String> {
     let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
         let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();

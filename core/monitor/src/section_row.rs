@@ -88,7 +88,8 @@ pub struct DeviationReport {
     pub outmost_m: f64,
     /// Ratio of the cross-section area to the design's; `None` without sweeps.
     pub area_ratio: Option<f64>,
-    /// Whether most samples deviate by more than the contradiction limit, and no other head found that wall.
+    /// Whether most samples deviate from the design profile by more than the contradiction limit, and no other head
+    /// measured the wall at the same place.
     pub contradicts: bool,
 }
 

@@ -139,7 +139,7 @@ pub enum Margin {
     Swing,
     /// Uncertain position of the vehicle.
     Position,
-    /// Returns that the heads lose by chance.
+    /// Sonar returns that the heads lose by chance.
     Losses,
 }
 

@@ -214,7 +214,7 @@ fn verdict_lengths_add_up_in_random_dives() {
 
 /// Short dives out and back that reach beyond a short tunnel and end at any place in a section.
 #[test]
-fn verdict_lengths_add_up_wherever_a_dive_begins_turns_and_ends() {
+fn lengths_of_all_verdicts_add_up_in_dives_out_and_back() {
     let vehicle = SHORT.replace("length_m = 100", "length_m = 8");
     let (mut outside, mut not_inspected_m) = (0, 0.0);
     for seed in 0..60 {

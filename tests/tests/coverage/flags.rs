@@ -33,8 +33,8 @@ static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     DIVES.iter().map(judge).collect()
 });
 
-/// Checks every section with `wrong`. This function gets the section's due flags by both definitions, and may return an
-/// error.
+/// Calls `wrong` for every section with two flags: due if the hole exceeds the target, and due if it does so by two
+/// standard deviations. `wrong` returns the fault, if any.
 #[track_caller]
 fn every_flag(
     dives: impl Fn(&Judged) -> bool,

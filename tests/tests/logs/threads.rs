@@ -236,7 +236,7 @@ fn see(inbox: Res<'_, Inbox>, mut seen: ResMut<'_, Seen>) {
 }
 
 #[test]
-fn plugins_see_every_packet_and_slow_outlets_change_no_result() {
+fn slow_output_plugin_changes_no_result() {
     let scene = scene();
     let packets = packets(&scene);
     let expected = dived(0, &scene, 20, &packets, End::Last).report;

@@ -19,7 +19,7 @@ struct Turning {
 struct Count {
     wall: usize,
     doubtful: usize,
-    /// Returns at wall that another head has found, too.
+    /// Sonar returns at wall that another head has found, too.
     confirming: usize,
     named: Vec<Distrust>,
 }

@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn cable_disagreement_at_a_changing_count_reverts_the_last_second_of_corrections() {
+    fn cable_disagreement_while_the_cable_moves_reverts_the_last_second_of_corrections() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -210,7 +210,7 @@ mod tests {
     /// to the position error permanently. Short stops do not count, because a slow vehicle with coarse counter steps
     /// makes many of them.
     #[test]
-    fn stuck_wheel_loss_in_a_long_stop_remains_after_the_count_changes_again() {
+    fn position_error_keeps_the_length_that_a_stuck_wheel_lost_in_a_long_stop() {
         for (readings, slips) in [(15, false), (50, true)] {
             let mut corrections = stood(readings, 0.0, [0.0; 2]);
             let before_m = corrections.lost_m();

@@ -12,7 +12,7 @@ use headrace_geometry::math;
 const MOST_BUMPS: f64 = 0.9;
 /// Maximum number of passes over the same bumps that is counted.
 ///
-/// Returns from repeated bumps must keep some weight, because on gyros alone the estimate would drift.
+/// Sonar returns from repeated bumps must keep some weight, because on gyros alone the estimate would drift.
 const MOST_PASSES: f64 = 10.0;
 
 /// Counts how often the heads have passed over the bumps that they see now.

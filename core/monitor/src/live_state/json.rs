@@ -147,7 +147,7 @@ pub struct MetresJson {
     /// Metres by verdict.
     #[serde(flatten)]
     pub by_state: Metres,
-    /// Sum of the metres by verdict.
+    /// Length of the whole coverage extent, m: the sum over all verdicts.
     pub way_m: f64,
 }
 

@@ -72,7 +72,7 @@ impl PositionState {
     }
 }
 
-/// An observation that holds now.
+/// An observation that applies at present.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ActiveObservation {
     pub(crate) kind: ObservedKind,
@@ -81,7 +81,7 @@ pub(crate) struct ActiveObservation {
     pub(crate) occurrences: Occurrences,
 }
 
-/// List of all observations that hold now.
+/// List of all observations that apply at present.
 pub(crate) type ActiveObservations = [Option<ActiveObservation>; MOST_OBSERVATIONS];
 
 /// Slowest practical speed, m/s. A lower advised speed counts as no speed.
@@ -170,7 +170,7 @@ pub struct LiveState {
     /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
     /// way there.
     pub back_to_m: Option<f64>,
-    /// Observations about the dive that hold now.
+    /// Observations about the dive that apply at present.
     pub(crate) observations: ActiveObservations,
     /// Bitmask of the sources that are profiling heads.
     pub heads: u64,
@@ -315,7 +315,7 @@ impl LiveState {
         (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
     }
 
-    /// Bitmask of the kinds of observations that hold now.
+    /// Bitmask of the kinds of observations that apply at present.
     pub(crate) fn observation_bits(&self) -> u64 {
         self.observations.iter().flatten().fold(0, |bits, known| bits | 1 << known.kind as u64)
     }

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn fail_raises_a_missed_stretch_and_unsure_section_joins_a_stretch_without_verdict() {
+    fn judgements_form_missed_stretches_and_stretches_without_verdict() {
         let mut coverage = coverage();
         let (notices, runs) = judged(&mut coverage, 40, -20.0);
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };

@@ -298,7 +298,7 @@ fn wrong_tokens_in_all_headers_share_one_budget() {
 }
 
 #[test]
-fn right_tokens_use_no_guess() {
+fn correct_tokens_do_not_count_as_guesses() {
     let served = served(&[]);
     for _ in 0..50 {
         assert_eq!(served.ask("GET /state.json", OPERATOR, "").0, 200);
@@ -306,7 +306,7 @@ fn right_tokens_use_no_guess() {
 }
 
 #[test]
-fn repeated_wrong_token_uses_one_guess() {
+fn repeated_wrong_token_counts_as_one_guess() {
     let served = served(&[]);
     for _ in 0..50 {
         assert_eq!(served.ask("GET /state.json", "Cookie: headrace_token=of-yesterday\r\n", "").0, 401);

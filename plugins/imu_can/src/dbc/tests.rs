@@ -211,7 +211,7 @@ proptest! {
 }
 
 #[test]
-fn dbc_readings_equal_the_preset_readings() {
+fn readings_by_a_dbc_file_equal_those_by_the_preset_of_the_device() {
     let [(mapping, set), ..] = &*MAPPINGS;
     let packets: Vec<Vec<u8>> = [
         frame(0x05, &[0, 0, 0x27, 0x10]),

@@ -1,4 +1,4 @@
-//! Returns from objects in front of the wall, in clusters.
+//! Sonar returns from objects in front of the wall, in clusters.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.near_returns]\n{keys}"));
         assert!(refusal("").contains("share: must be above zero"));

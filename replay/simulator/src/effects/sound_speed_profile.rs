@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
         assert!(refusal.contains("is missing; give floor_mps, per_metre_mps or both"), "{refusal}");

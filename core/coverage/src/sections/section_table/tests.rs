@@ -44,7 +44,7 @@ fn each_section_counts_once_in_the_metres_of_its_latest_verdict() {
 ///
 /// A section without pings has the largest error of the sections within half the target.
 #[test]
-fn section_without_pings_has_the_largest_position_error_nearby() {
+fn section_without_pings_has_the_largest_position_error_of_nearby_sections() {
     let error_of = |placed_in: i64, asked: i64| {
         let mut sections = sections();
         for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
