@@ -282,7 +282,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn autopilot_clock_unwraps_and_may_step_back() {
+    fn autopilot_clock_may_wrap_or_step_back() {
         let mut clock = BootClock::default();
         for (time_ms, since_boot_ms) in
             [(4_294_967_000, 4_294_967_000), (4_294_966_990, 4_294_966_990), (4, 4_294_967_300_i64)]

@@ -174,7 +174,7 @@ fn pressures_match_the_emulated_pressures_within_half_a_quantum() {
 }
 
 #[test]
-fn distances_match_the_emulated_distances_and_a_missing_echo_gives_no_distance() {
+fn decoded_distances_match_the_emulated_distances() {
     let own = "part = \"distance\"\norientation = 25\nsensor_id = 3\nsound_speed_mps = 1500\n";
     let device = configured(own).unwrap();
     assert_eq!(device.sense(), Sense::Echosounder);
@@ -353,7 +353,7 @@ fn heartbeat_of(system_id: u32, mavtype: MavType, autopilot: MavAutopilot) -> Ve
 }
 
 #[test]
-fn first_autopilot_is_used_and_others_are_counted() {
+fn only_the_autopilot_received_first_is_used() {
     let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
     let station = heartbeat_of(255, MavType::MAV_TYPE_GCS, MavAutopilot::MAV_AUTOPILOT_INVALID);
     let other = heartbeat_of(3, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);

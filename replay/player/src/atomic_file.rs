@@ -300,7 +300,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_permissions_are_kept_and_devices_are_written_in_place() {
+    fn replaced_file_keeps_its_link_and_permissions() {
         use std::os::unix::fs::{PermissionsExt as _, symlink};
         let folder = folder("links");
         let (path, link) = (folder.join("real.json"), folder.join("link.json"));

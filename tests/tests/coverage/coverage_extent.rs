@@ -290,7 +290,7 @@ fn stretch_without_a_position_fails_once_the_vehicle_has_left_it() {
 }
 
 #[test]
-fn dive_without_a_position_has_no_verdicts_and_says_so_first() {
+fn dive_without_a_position_reports_first_that_it_has_no_verdicts() {
     for (sensor, lacking, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")]
     {
         let folder = Folder::new();

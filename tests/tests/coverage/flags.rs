@@ -167,7 +167,7 @@ fn filled_hole_has_no_flag() {
 }
 
 #[test]
-fn flags_of_the_way_out_do_not_depend_on_a_later_way_back() {
+fn flags_of_the_way_out_do_not_depend_on_the_way_back() {
     every_flag(
         |judged| judged.seeded.kind == Kind::Reversing && direct(judged),
         |judged, due, _| {

@@ -30,7 +30,7 @@ fn other_hosts_and_origins_are_refused() {
 }
 
 #[test]
-fn client_without_a_token_gets_nothing_and_a_viewer_token_is_read_only() {
+fn client_without_a_token_gets_nothing_of_the_dive() {
     let folder = Folder::with_dive();
     folder.write("tokens", TOKENS);
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY, "--page-token-file", "tokens"]);

@@ -178,7 +178,7 @@ fn dive_is_compared_with_a_second_target() {
 }
 
 #[test]
-fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
+fn resumed_viewer_shows_the_same_as_a_new_viewer() {
     let folder = Folder::with_dive();
     let (serving, mut lost) = replayed(&folder);
     // A seek back restarts the dive with fewer sections. Afterwards the connection is lost, while the dive goes on.
@@ -220,7 +220,7 @@ fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
 }
 
 #[test]
-fn samples_are_sent_for_a_range_of_chainages_and_follow_seeks() {
+fn sent_samples_are_those_before_the_time_of_a_seek() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let count = || {

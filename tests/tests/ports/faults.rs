@@ -362,7 +362,7 @@ impl Fault for Babbling {
 }
 
 #[test]
-fn babbling_device_disturbs_no_other_and_is_used_afterwards() {
+fn babbling_device_does_not_disturb_other_devices() {
     let folder = Folder::new();
     let sensors = vec![sensor(HEAD, End::tcp(), Babbling(Random(5))), healthy()];
     let mut rig = Rig::recorded(sensors, Some(&folder.path("babble.mcap")));

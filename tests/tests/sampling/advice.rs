@@ -204,7 +204,7 @@ fn row(case: &Case, followed: &Followed) {
 }
 
 #[test]
-fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
+fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
     let mut broken = Vec::new();
     let (mut near, mut within) = (0, 0);
     for case in &STEADY {

@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_of_speed_limit_and_margin_agree_with_each_other_and_with_the_condition() {
+    fn speed_limit_and_margin_agree_with_the_condition() {
         let texts = [(0.0904, 0.0939), (0.0939, 0.0939), (0.0945, 0.0939), (0.0965, 0.0939), (0.1, 0.0939)]
             .map(|(speed_mps, v_max_mps)| shown(speed_mps, v_max_mps));
         insta::assert_snapshot!(texts.join("\n"), @r"

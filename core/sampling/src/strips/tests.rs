@@ -80,7 +80,7 @@ fn hidden_strip_across_the_seam_is_one_strip() {
 }
 
 #[test]
-fn fewer_passes_on_a_hidden_strip_lower_the_speed() {
+fn strip_hidden_from_some_heads_lowers_the_speed() {
     let hidden = [arc(7.0, 1.7)];
     let views = [all_around(&hidden), all_around(&[]), all_around(&hidden), all_around(&[])];
     let some = strips(&views);

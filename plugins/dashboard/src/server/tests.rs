@@ -353,7 +353,7 @@ fn flood_of_wrong_tokens_gets_at_most_26_guesses_in_5_s() {
 }
 
 #[test]
-fn accepted_actions_are_passed_on_and_excess_actions_refused() {
+fn actions_beyond_the_limit_are_refused() {
     let served = served(&[]);
     let mut stream = served.connect();
     let (mut done, mut refused) = (0, 0);

@@ -146,7 +146,7 @@ fn nack_keeps_its_readable_text() {
 }
 
 #[test]
-fn unknown_message_is_kept_and_cannot_be_sent_under_a_known_id() {
+fn unknown_message_cannot_be_sent_under_a_known_id() {
     let other = |id| Addressed {
         source: 1,
         destination: 0,

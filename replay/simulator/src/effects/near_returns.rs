@@ -178,7 +178,7 @@ mod tests {
     /// The wall is 3 m away, so half of the clusters from 2 to 4 m are in front of the wall. A ping that the sonar
     /// loses has no return, even if it hit a cluster.
     #[test]
-    fn clusters_beyond_the_wall_have_no_effect_and_lost_pings_stay_lost() {
+    fn near_return_clusters_beyond_the_wall_have_no_effect() {
         let dive = Dive { seconds: 400.0, ..Dive::with_sounder() };
         let keys = "[effects.near_returns]\nshare = 0.4\nnear_m = 2\nfar_m = 4\nspread_m = 0\n";
         let (base, with) = (dive.dive("").ranges_m(0), dive.dive(keys).ranges_m(0));

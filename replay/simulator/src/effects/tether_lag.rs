@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn cable_count_is_constant_within_the_threshold_and_lags_equally_both_ways() {
+    fn cable_count_lags_equally_in_both_directions() {
         let mut winding = winding();
         for k in 0..1000 {
             let travelled_m = 3.0 + 0.49 * math::sin(f64::from(k) * 0.05);

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn cable_slips_have_the_given_rate_and_size_and_are_permanent() {
+    fn cable_slips_have_the_given_rate_and_size() {
         let slips = slips((0..4_000_000).map(|k| f64::from(k) * 0.025));
         let n = slips.len() as f64;
         assert!((n - 5000.0).abs() < 5.0 * math::sqrt(5000.0 * 0.95), "{n}");

@@ -97,7 +97,7 @@ fn each_description_implies_its_effects() {
 }
 
 #[test]
-fn named_effects_override_implied_effects_and_the_key_leave_omits_effects() {
+fn named_effects_override_implied_effects() {
     let text = format!(
         "{MURK}[effects]\ntake = \"called\"\nleave = [\"beam_cone\"]\nrange_noise = {{ sd_m = 0.2 }}\n"
     );

@@ -292,7 +292,7 @@ fn intact_messages_are_read_despite_thousands_of_losses() {
 }
 
 #[test]
-fn channels_are_known_after_loss_of_their_chunk_and_the_summary() {
+fn channels_stay_known_if_their_chunk_and_the_summary_are_lost() {
     let (bytes, seen, places) = log();
     let mut bytes = bytes[..places[CHUNKS - 1]].to_vec();
     let definitions = super::places(&bytes, op::CHUNK)[0];
