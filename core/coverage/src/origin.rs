@@ -115,7 +115,7 @@ mod tests {
     /// Checks the probability that a run is wall in clear water. A boulder is as high as it is wide, and a side tunnel
     /// is wider than deep. Fish and second echoes are small and far from the wall.
     #[test]
-    fn wide_runs_near_the_wall_are_wall_and_small_runs_far_from_it_are_not() {
+    fn wide_runs_near_the_wall_are_wall_but_small_runs_far_from_it_are_not() {
         for (width_m, off_m, confirmed, least, most) in [
             (3.0, 0.5, 0.0, 0.999, 1.0),
             (3.0, 3.0, 0.0, 0.99, 1.0),

@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn small_swing_is_attenuated_continuously_and_large_swing_counts_fully() {
+    fn small_swing_is_attenuated_but_large_swing_counts_fully() {
         let ramp = |rad: f64| {
             let (looks, now) = looks(40.0, move |t| [rad * math::sin(TAU * t / 4.0), 0.0]);
             looks.swing(now, 2.0, 0.0).rate_radps * 2.0

@@ -312,7 +312,7 @@ fn wrong_keys_of_the_vehicle_file_are_named() {
 }
 
 #[test]
-fn anonymising_removes_positions_and_ids_and_keeps_readings() {
+fn anonymising_removes_positions_and_ids_but_keeps_readings() {
     // The removed messages are GLOBAL_POSITION_INT in both versions; the one in version 2 is signed.
     let first = [&[0xFE, 28, 0, 1, 1, 33][..], &[7; 28], &[0, 0]].concat();
     let second = [&[0xFD, 20, 1, 0, 0, 1, 1, 33, 0, 0][..], &[7; 20], &[0, 0], &[9; 13]].concat();

@@ -317,7 +317,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn pipes_are_written_to_a_slow_reader_and_refused_without_a_reader() {
+    fn pipes_are_written_to_a_slow_reader_but_refused_without_a_reader() {
         use rustix::fs::{CWD, FileType, Mode, mknodat};
         let folder = folder("pipe");
         let pipe = folder.join("pipe");

@@ -269,7 +269,7 @@ fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
 }
 
 #[test]
-fn advised_speed_is_lower_for_a_swinging_vehicle_and_meets_the_target() {
+fn advised_speed_of_a_swinging_vehicle_is_lower_than_that_of_a_steady_one() {
     let mut broken = Vec::new();
     for case in &SWINGING {
         let followed = case.followed();

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn sd_of_a_stuck_wheel_loss_is_0_3_of_the_corrections_beyond_chance() {
+    fn sd_of_the_length_lost_by_a_stuck_wheel_is_0_3_of_the_corrections_beyond_chance() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
         // The predicted standard deviation makes half of the corrections count as chance.

@@ -179,7 +179,7 @@ fn backward_travel_has_its_own_phases_and_remaining_length() {
 }
 
 #[test]
-fn advice_has_the_speed_of_each_mode_and_says_whether_the_remaining_time_suffices() {
+fn advice_has_for_each_mode_the_speed_and_whether_the_remaining_time_suffices() {
     let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     assert_eq!(case.advice().left.suffices_at(1.0), None);
     case.left_s = Some(3000.0);

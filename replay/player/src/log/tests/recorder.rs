@@ -193,7 +193,7 @@ impl Write for SmallMedium {
 }
 
 #[test]
-fn full_medium_is_reported_and_does_not_stop_the_loop() {
+fn full_medium_is_reported_but_does_not_stop_the_loop() {
     let room = Arc::new(AtomicUsize::new(1 << 20));
     let (mut port, handle) = Recorder::start(SmallMedium(Arc::clone(&room)), &header(true), 0).unwrap();
     room.store(0, Ordering::Relaxed);
