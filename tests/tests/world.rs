@@ -38,7 +38,7 @@ fn count(plan: &Plan, faults: &mut BTreeMap<String, usize>) {
 }
 
 #[test]
-fn faults_lose_nothing_silently() {
+fn every_loss_caused_by_a_fault_is_reported() {
     let folder = Folder::new();
     let (mut faults, mut failures, mut skipping) = (BTreeMap::new(), 0, 0);
     for seed in seeds() {

@@ -1,4 +1,4 @@
-//! One section as the report, the page and the tables give it. All three encode this row.
+//! Row of one section for the report, the page and the tables. All three encode this row.
 
 use serde::{Serialize, Serializer};
 

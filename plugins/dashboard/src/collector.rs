@@ -47,7 +47,7 @@ const WAY_STEP_M: f64 = 0.5;
 /// Minimum interval between two lists of missed stretches to go back to.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
 
-/// The last ping of an echosounder.
+/// The latest ping of an echosounder.
 #[derive(Debug, Clone, Copy)]
 struct Ping {
     at: MonoNs,
@@ -90,7 +90,7 @@ pub struct Collector {
     skips: bool,
     back_due: bool,
     notes_due: bool,
-    /// The last list of missed stretches that was sent, with its time and the length of the way.
+    /// The most recently sent list of missed stretches, with its time and the length of the coverage extent.
     back_told: Option<(MonoNs, f64, Value)>,
     /// Depth by the last reading of the pressure sensor, m.
     depth_m: Option<f64>,

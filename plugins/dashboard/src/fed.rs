@@ -89,7 +89,7 @@ pub struct PoseJson {
     pub yaw_deg: f64,
 }
 
-/// The last ping of an echosounder.
+/// The latest ping of an echosounder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EchoJson {
     /// Sensor id.

@@ -116,7 +116,7 @@ fn network_device_that_returns_is_used_again() {
 }
 
 #[test]
-fn device_plugged_in_later_is_used() {
+fn device_plugged_in_during_the_dive_is_used() {
     let folder = Folder::new();
     let serial = End::serial(&folder.path(""), "usb-head-port0").absent();
     let sensors = vec![sensor(HEAD, serial, Healthy), sensor(PING, End::tcp().absent(), Healthy), healthy()];

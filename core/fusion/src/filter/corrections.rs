@@ -193,9 +193,9 @@ mod tests {
         );
     }
 
-    /// After the first 20 s, corrections have the opposite sign, as for a hovering vehicle.
+    /// After the first 20 s of the stop, corrections have the opposite sign, as for a hovering vehicle.
     #[test]
-    fn corrections_after_20_s_of_a_stop_add_no_stuck_wheel_loss() {
+    fn corrections_after_20_s_of_a_stop_do_not_increase_the_possibly_lost_length() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");

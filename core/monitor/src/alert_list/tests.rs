@@ -303,7 +303,7 @@ fn silence_of_all_sensors_raises_only_one_alert() {
 }
 
 #[test]
-fn higher_priority_needs_a_new_acknowledgement() {
+fn alert_with_increased_priority_needs_a_new_acknowledgement() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
     let mut beat = |bench: &mut Bench, at_s: u64, pct: f64| {

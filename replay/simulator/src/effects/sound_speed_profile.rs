@@ -140,7 +140,7 @@ mod tests {
     /// At a gradient of -50 m/s per metre, the speed would be zero about thirty metres up. The mean slowness is
     /// computed with at least a third of the speed at the floor.
     #[test]
-    fn speed_of_sound_never_falls_below_a_third_of_the_floor_value() {
+    fn speed_of_sound_never_falls_below_a_third_of_the_speed_at_the_tunnel_floor() {
         let profile = Parameters { floor_mps: 1440.0, per_metre_mps: -50.0, assumed_mps: 1440.0 };
         let expected = 1.5 * math::ln(3.0);
         for height_m in [20.0, 40.0, 400.0] {
