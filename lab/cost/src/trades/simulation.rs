@@ -499,7 +499,10 @@ fn advice(points: &[Point]) -> String {
     let idle = left_out().filter(within).max_by(|a, b| figure(a, "saved").total_cmp(&figure(b, "saved")));
     let most = most.map(|point| {
         let by_m = figure(point, "change of D");
-        format!("Leaving out `{}` changes D most: by {by_m:+.3} m in the scene `{}`.", point.value, point.scene)
+        format!(
+            "Leaving out `{}` changes D most: by {by_m:+.3} m in the scene `{}`.",
+            point.value, point.scene
+        )
     });
     let idle = idle.map(|point| {
         let saved_ns = figure(point, "saved");
