@@ -18,6 +18,8 @@ pub enum LossKind {
     Truncated,
     /// Bytes that aren't records, because lengths are wrong or bytes were overwritten.
     Framing,
+    /// Another log in the same file, which isn't read.
+    AnotherLog,
     /// A chunk with a wrong checksum. None of its messages is delivered.
     Checksum,
     /// A chunk that can't be unpacked, or has content other than records. None of its messages is delivered.
@@ -181,6 +183,7 @@ impl fmt::Display for LossKind {
         match self {
             Self::Truncated => out.write_str("the file ends before its closing records"),
             Self::Framing => out.write_str("bytes that aren't records"),
+            Self::AnotherLog => out.write_str("another log begins in the same file and isn't read: save it as a file"),
             Self::Checksum => out.write_str("a chunk that fails its checksum"),
             Self::Contents => out.write_str("a chunk that can't be decompressed"),
             Self::Unreadable(error) => write!(out, "the medium can't read them: {error}"),

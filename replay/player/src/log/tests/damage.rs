@@ -51,6 +51,19 @@ fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
 }
 
 #[test]
+fn log_that_follows_another_one_in_a_file_is_reported_and_not_read() {
+    let (bytes, seen, places) = log();
+    for cut in places[0]..=bytes.len() {
+        let (alone, _) = read(&bytes[..cut]);
+        let (got, losses) = read(&[&bytes[..cut], &bytes].concat());
+        assert_eq!(got, alone, "cut at {cut}");
+        assert_eq!(got, seen[..got.len()], "cut at {cut}");
+        let is_told = losses.iter().any(|loss| loss.kind == LossKind::AnotherLog);
+        assert!(is_told, "cut at {cut}: {losses:?}");
+    }
+}
+
+#[test]
 fn log_cut_anywhere_delivers_messages_before_the_cut() {
     let (bytes, seen, places) = log();
     for cut in places[CHUNKS - 2]..bytes.len() {
