@@ -107,6 +107,8 @@ pub struct SensorHealth {
     pub bytes: u64,
     /// Number of readings decoded.
     pub readings: u64,
+    /// Number of readings decoded but withheld.
+    pub withheld: u64,
     /// Receive times of the first and last packet.
     pub span: Option<(MonoNs, MonoNs)>,
     /// Longest time between two packets of the sensor.

@@ -156,12 +156,15 @@ fn dive_is_compared_with_a_second_target() {
     let section_m = viewer.hello["section_m"].as_f64().unwrap();
     let mut apart_m = 0.0;
     for (other, key) in [(0, "open_m"), (1, "pass_m"), (2, "fail_m"), (3, "cannot_say_m")] {
-        let of = |key: &str| report["other_targets"][1][key].as_f64().unwrap();
-        // The page shows sections that aren't inspected as open.
-        let reported_m = of(key) + if key == "open_m" { of("not_inspected_m") } else { 0.0 };
+        // The wall shows sections of the second target that aren't inspected as open.
+        let with_not_inspected = |all: &Value| {
+            let of = |key: &str| all[key].as_f64().unwrap();
+            of(key) + if key == "open_m" { of("not_inspected_m") } else { 0.0 }
+        };
+        let reported_m = with_not_inspected(&report["other_targets"][1]);
         let sections = viewer.sections.values().filter(|section| section.compared == Some(other)).count();
         let shown_m = sections as f64 * section_m;
-        let summed_m = viewer.state["compared"][key].as_f64().unwrap();
+        let summed_m = with_not_inspected(&viewer.state["compared"]);
         assert!((shown_m - summed_m).abs() < 1e-6, "{key}: {shown_m}, {summed_m}");
         apart_m += (shown_m - reported_m).abs() / 2.0;
     }
@@ -175,6 +178,8 @@ fn dive_is_compared_with_a_second_target() {
         report["other_targets"]
     );
     assert!(report["other_targets"][1]["fail_m"].as_f64() > report["other_targets"][0]["fail_m"].as_f64());
+    let not_inspected_m = viewer.state["compared"]["not_inspected_m"].as_f64().unwrap();
+    assert!(not_inspected_m > 0.0, "{}", viewer.state["compared"]);
 }
 
 #[test]

@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::condition::Condition;
 use super::speed_band::SpeedBand;
-use super::state::LiveState;
+use super::state::{LiveState, SensorState};
 use crate::pilot_text::{limit_steps, speed_steps, station};
-use crate::words::verdict_words;
+use crate::words::{verdict_words, withheld_text};
 use headrace_coverage::Verdict;
 
 /// Texts of the speed and its limit, each without its unit.
@@ -64,6 +64,12 @@ impl LiveState {
             _ => "at the limit".to_owned(),
         });
         SpeedTexts { speed: speed.map(text), limit: limit.map(text), margin }
+    }
+
+    /// Number of a sensor's withheld readings, with the reason; `None` unless they make it useless.
+    pub fn withheld_text(&self, source: usize) -> Option<String> {
+        let is_useless = self.sensor(source) == SensorState::Withheld;
+        self.withheld(source).filter(|_| is_useless).map(withheld_text)
     }
 
     /// Text about missed stretches: their length, and where the first one begins; `None` if there are none.

@@ -284,6 +284,13 @@ impl LossKind {
 }
 
 impl Loss {
+    /// The loss with its times in dive time, from the beginning of the log at `begun`.
+    #[must_use]
+    pub fn in_dive_time(&self, begun: MonoNs) -> Self {
+        let dive_time = |at: MonoNs| MonoNs(at.0.saturating_sub(begun.0));
+        Self { from: self.from.map(dive_time), to: self.to.map(dive_time), ..self.clone() }
+    }
+
     /// Whether the loss is the cut-off end of the dive's last file.
     pub(crate) fn is_open_end(&self) -> bool {
         let kind = match &self.kind {
