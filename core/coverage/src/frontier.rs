@@ -152,7 +152,7 @@ pub struct Outlook {
     pub not_passed: Option<Reach>,
     /// Stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub through: Option<Reach>,
-    /// The zone, if it has been unchanged for longer than [`SILENT_AFTER`].
+    /// Zone of the sections within reach of the heads, if it has been unchanged for longer than [`SILENT_AFTER`].
     ///
     /// The vehicle is then nearly stationary.
     pub still_zone: Option<Range<i64>>,
@@ -353,7 +353,8 @@ impl Frontier {
         let course_now = course.to(middle_m, count);
         self.turns += u32::from(course_now.astern != course.astern);
         self.course = Some(course_now);
-        // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
+        // L is the section length. Section k spans [kL, (k+1)L). It is behind the reach if (k+1)L + margin <= from, and
+        // ahead of the reach if kL - margin >= to.
         let first = math::floor_to_i64((all.from_m - margin_m) / section_m);
         let end = -math::floor_to_i64(-(all.to_m + margin_m) / section_m);
         debug_assert!(first <= end, "a zone begins before it ends: {all:?} gives {first} to {end}");

@@ -34,9 +34,9 @@ pub struct Run {
     pub to: i64,
     /// Number of the stretch's sections that fail.
     pub failed: u32,
-    /// Section with the largest hole, and this hole.
+    /// Index of the section with the largest hole, and this hole.
     ///
-    /// In a cleared missed stretch, both are from the time before the stretch was cleared.
+    /// In a cleared missed stretch, section and hole are from the time before the stretch was cleared.
     pub worst: (i64, Hole),
     /// Time at which the stretch was first flagged.
     pub raised: MonoNs,
@@ -216,7 +216,8 @@ impl Runs {
         }
     }
 
-    /// Whether a stretch is closed, or begins and ends with its own sections and is too far from others to be joined.
+    /// Whether a stretch is closed, or consistent: it begins and ends with its own sections, and no other stretch is
+    /// near enough to be joined.
     fn is_consistent(&self, id: RunId) -> bool {
         let is_own = |section: i64| self.of(section) == Some(id);
         let is_apart = |section: i64| self.of(section).is_none_or(|of| of == id);

@@ -24,7 +24,7 @@ pub struct WallStretch {
     pub outmost_m: f64,
 }
 
-/// Neighbouring sections that deviate to the same side, with the sections between them.
+/// Sections that deviate to the same side and are near each other, with the sections between them.
 struct Candidate {
     from: i64,
     to: i64,

@@ -27,9 +27,10 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Diameter D of the largest hole from all candidate maxima of f, without any code of the search under test.
+/// Diameter of the largest hole, from all places where the distance to the samples may be largest, without any code of
+/// the search under test.
 ///
-/// Candidates are the circumcentres of three samples (or of their images), and points on the section's two ends that
+/// These places are the circumcentres of three samples (or of their images), and points on the section's two ends that
 /// are equidistant from two samples.
 fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
     let images: Vec<(f64, f64)> =
@@ -101,7 +102,8 @@ proptest! {
     /// The exact diameter D lies within the bounds found by a search with a tolerance. The bounds are at most
     /// the tolerance apart.
     ///
-    /// A verdict from these bounds equals the verdict from the exact D, or is undecided if T lies between the bounds.
+    /// A verdict from these bounds equals the verdict from the exact D, or is undecided if the target T lies between
+    /// the bounds.
     #[test]
     fn bounds_of_a_search_with_tolerance_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
