@@ -18,7 +18,7 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Time between two messages on the coverage extent and its metres by verdict, in data time.
+/// Time between two messages on the coverage extent and the length of each verdict in it, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
 /// A further cause of a missed stretch is reported only if it applies to at least this length, m.
@@ -51,7 +51,7 @@ pub enum LiveMessage {
         from_m: f64,
         /// End of the missed stretch.
         to_m: f64,
-        /// Metres of the stretch that fail at present.
+        /// Length of the stretch's sections that fail at present.
         failed_m: f64,
     },
     /// The vehicle has driven through a missed stretch again, and none of its sections fails any more.
@@ -79,13 +79,13 @@ pub enum LiveMessage {
     },
     /// A note was added.
     Note(NoteJson),
-    /// The coverage extent at present, with its metres by verdict.
+    /// The present coverage extent, with the length of each verdict in it.
     Way {
         /// Beginning of the extent.
         from_m: f64,
         /// End of the extent.
         to_m: f64,
-        /// Metres of the extent by verdict.
+        /// Length of each verdict within the extent.
         metres: Metres,
     },
 }
@@ -352,7 +352,7 @@ impl LiveMessages {
 
     /// Reports a missed stretch again if at least a metre of it fails for a cause not reported yet.
     ///
-    /// A pilot who follows only the earlier advice may miss that wall again.
+    /// A pilot who follows only the earlier advice may miss the same wall again.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let sections = &dive.view().coverage().sections;
         let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };

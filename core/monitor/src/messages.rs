@@ -147,7 +147,7 @@ pub struct PlacedItem {
 /// Coverage results and observations at an advice update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
-    /// Metres of the coverage extent by verdict.
+    /// Length of each verdict within the coverage extent.
     pub metres: Metres,
     /// Chainage at which the first missed stretch begins, m; `None` if no stretch is missed.
     pub missed_from_m: Option<f64>,

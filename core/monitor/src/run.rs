@@ -162,7 +162,7 @@ impl Loop {
         self.ahead = Some((placer, adviser));
     }
 
-    /// Runs the rest of a tick from the values of placer and adviser. The advice is swapped with that of the
+    /// Runs the rest of a tick from the values of placer and adviser. In exchange, `advised` gets the advice of the
     /// previous tick.
     ///
     /// Returns false if a lagging outlet holds back the tick's packets. The call then counts as a tick
@@ -275,8 +275,8 @@ impl Loop {
     /// Judges the sections whose verdict may still change, at the end of a dive, when no more samples will
     /// come.
     ///
-    /// `hear` gets the notices in batches, with the loop's state after each batch. All notices of a long dive
-    /// at once would take more memory than its samples.
+    /// `hear` gets the notices in batches, with the loop's state after each batch. All notices of a long dive at once
+    /// would take more memory than the dive's samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         if let Some((placer, _)) = &mut self.ahead {
             placer.end();
@@ -305,7 +305,7 @@ impl Loop {
         self.list_last_observations(hear);
     }
 
-    /// Lists the observations made at the end of a dive.
+    /// Adds alerts for the observations made at the end of a dive.
     fn list_last_observations(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         let at = self.last_packet();
         self.alerter.take_observations_at_end(self.surveyor.observations(), at);

@@ -209,7 +209,7 @@ fn quote(json: &mut String, key: &str, text: &str) {
 }
 
 impl Values {
-    /// Builds the command from the values read. All of its keys must be present, and no others.
+    /// Builds the command from the values read. All keys of the command must be present, and no other keys.
     fn command(self) -> Result<Command, &'static str> {
         let Self { what, alert, by, text, fails, battery_pct, id, seconds } = self;
         let what = what.ok_or("the key \"do\"")?;

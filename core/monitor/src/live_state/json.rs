@@ -51,7 +51,7 @@ pub struct LiveStateJson {
     pub turn: Option<TurnJson>,
     /// Every sensor, in the order of the vehicle file.
     pub sensors: Vec<SensorJson>,
-    /// Metres of the coverage extent by verdict. `way_m` is their sum.
+    /// Length of each verdict within the coverage extent, and the sum `way_m` of these lengths.
     pub metres: MetresJson,
     /// Last judged stretch without a verdict.
     pub cannot_say: Option<StretchJson>,
@@ -141,13 +141,13 @@ pub struct SensorJson {
     pub is_head: bool,
 }
 
-/// Metres of the coverage extent by verdict, and their sum.
+/// Length of each verdict within the coverage extent, and the sum of these lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MetresJson {
-    /// Metres by verdict.
+    /// Length of each verdict, m.
     #[serde(flatten)]
     pub by_state: Metres,
-    /// Sum of the metres by verdict.
+    /// Total length over all verdicts, m.
     pub way_m: f64,
 }
 

@@ -22,8 +22,8 @@ use headrace_sampling::passes::Situation;
 
 /// Time without a ping at a new angle after which a head's samples count as missing.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);
-/// Some angles are assumed to be occluded. This number of latest pings at these angles decides whether they are,
-/// and this share of lost pings confirms it.
+/// Number of latest pings at angles assumed to be occluded that decide whether the angles are really occluded, and
+/// share of lost pings that confirms it.
 const HIDDEN_PINGS: u16 = 600;
 const HIDDEN_SHARE: f64 = 0.7;
 /// Maximum number of pings without a fix that are kept. It suffices for over two minutes of four heads.

@@ -30,7 +30,8 @@ pub struct PositionGap {
     pub from_m: Option<f64>,
     /// Chainage at the end of the gap, m; `None` if it can't be predicted.
     ///
-    /// After the gap this is the first fix. Until then it is predicted from the mean speed before the gap.
+    /// After the gap, it is the chainage of the first fix. Until then it is predicted from the mean speed before the
+    /// gap.
     pub to_m: Option<f64>,
     /// Whether a fix has ended the gap, so that `to_m` is measured.
     pub is_over: bool,
