@@ -34,8 +34,8 @@ const OVER_PLAN: f64 = 1.15;
 ///
 /// The speed then comes from the inertial unit alone, and is less accurate.
 const OVER_LOST: f64 = 1.4;
-/// Speed counts as a factor if it exceeds both the planned speed and the largest speed that meets the target by this
-/// ratio.
+/// Least ratio of the speed to the planned speed, and to the largest speed that meets the target, at which speed counts
+/// as a factor.
 ///
 /// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;

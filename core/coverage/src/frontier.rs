@@ -82,7 +82,7 @@ pub struct Frontier {
     ///
     /// Heads count whether they ping or not.
     way: Option<Reach>,
-    /// Stretch where all heads, pinging or not, have been: the whole combined reach has moved across it.
+    /// Stretch where all heads, pinging or not, have been: the whole combined reach has moved across this stretch.
     ///
     /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
     through: Option<Reach>,
@@ -140,7 +140,8 @@ pub struct Outlook {
     pub at: MonoNs,
     /// Coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
-    /// Stretch that every awaited head has covered, except heads that never pinged; `None` if empty.
+    /// Stretch that every awaited head has covered; `None` if empty. A head is awaited if its samples may still land.
+    /// Heads that never pinged are left out.
     pub swept_by_all: Option<Reach>,
     /// Whether no head is alive: no head has pinged for longer than [`SILENT_AFTER`].
     pub none_alive: bool,

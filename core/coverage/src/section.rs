@@ -1,4 +1,4 @@
-//! One section: its statistics, hole, verdict and flag; and the metres of tunnel by verdict.
+//! One section: its statistics, hole, verdict and flag. Also the length of tunnel by verdict.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ pub enum Verdict {
     Open,
     /// Pass: D + k sd <= T, with hole diameter D, its standard deviation sd, target T and confidence k.
     Pass,
-    /// Fail: D - k sd > T, with the symbols of [`Self::Pass`].
+    /// Fail: D - k sd > T, with the symbols of [`Verdict::Pass`].
     Fail,
     /// Can't say: neither a pass nor a fail, although no more samples will land.
     CannotSay,

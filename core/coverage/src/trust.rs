@@ -41,7 +41,7 @@ pub(super) struct Others {
 
 /// Disagreement of a return with the returns before it.
 pub(super) struct Disagreement {
-    /// Difference from the previous return, m; `None` if both agree.
+    /// Difference from the previous return, m; `None` if the two returns agree.
     pub(super) jump_m: Option<f64>,
     /// Number of waiting returns that this return made doubtful.
     pub(super) doubtful: u32,

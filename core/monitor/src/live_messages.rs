@@ -67,8 +67,8 @@ pub enum LiveMessage {
     CannotSay(UnsureStretch),
     /// The end of a stretch without a verdict is known.
     CannotSayEnds(UnsureStretch),
-    /// Some heads have not been at the place where the vehicle began or turned back, and the vehicle is now
-    /// well away from it.
+    /// Some heads have not been at the place where the vehicle began or turned back, and the vehicle is now well away
+    /// from this place.
     NotInspected(UnsureStretch),
     /// An alert has changed.
     AlertChange {
@@ -175,7 +175,7 @@ impl LiveMessages {
             let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
             tell(LiveMessage::Way { from_m, to_m, metres: state.metres });
         }
-        // Diameter of the circle whose perimeter equals the tunnel's.
+        // Diameter of the circle that has the tunnel's perimeter.
         let width_m = 2.0 * dive.mission().profile.perimeter_m() / TAU;
         if let (Some(ends), Some(x_m)) = (self.at_ends, state.chainage_m) {
             let off_m = (sections.bounds_m(ends.from).0 - x_m).max(x_m - sections.bounds_m(ends.to).0);

@@ -91,8 +91,8 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping a turn ago counts, because the head detected the wall at this angle both before and
-            // after it.
+            // The ping a turn ago counts, because the head detected the wall at this angle a turn before that ping and
+            // a turn after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {

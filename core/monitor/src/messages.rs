@@ -58,8 +58,7 @@ pub enum Outcome {
         /// Arc length of the end point, m.
         arc_m: f64,
     },
-    /// No sample, for this reason. The aim is the point at which the beam meets the design profile, if it is
-    /// known.
+    /// No sample, for this reason. The aim is the point at which the beam meets the design profile; `None` if unknown.
     Lost(Loss, Option<WallPoint>),
     /// A return that can't be placed, with the reason for the missing fix.
     Unplaced(NoFix),

@@ -121,8 +121,8 @@ impl CauseFigures {
 
     /// Speed for passing the stretch again, m/s. `v_max_mps` is the speed advised now.
     ///
-    /// If the heads have to be mended or set first, it is the speed computed for the stretch with the heads
-    /// as scheduled. Otherwise it is the lower of that speed and `v_max_mps`.
+    /// If the heads have to be mended or set first, the result is the speed computed for the stretch with the heads as
+    /// scheduled. Otherwise the result is the lower of this speed and `v_max_mps`.
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
         let mended =
             [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];
@@ -238,7 +238,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
-        // The exact speed is stated, because below it heads at different places along the hull are out of
+        // The exact speed is stated, because below this speed, heads at different places along the hull are out of
         // phase again.
         Action::InPhase if at_most_mps > 0.0 => {
             return format!("{back}, then with the heads in phase, at {}", limit_text(at_most_mps));

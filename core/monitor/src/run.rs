@@ -30,7 +30,7 @@ use headrace_vehicle::Mission;
 /// next batch.
 const FINISHED_AT_ONCE: usize = 256;
 
-/// The three worlds (placer, adviser, surveyor) and the alerter of which a loop consists.
+/// Parts of a loop: the three worlds (placer, adviser, surveyor) and the alerter.
 pub(super) struct Parts {
     pub(super) placer: Placer,
     pub(super) surveyor: Surveyor,
@@ -88,7 +88,7 @@ impl Loop {
 
     /// Processes the waiting packets. Returns the number of packets consumed.
     ///
-    /// `now` is the end of the tick's time. The loop only records it; no result depends on it.
+    /// `now` is the end of the tick's time. The loop only records this time; no result depends on it.
     ///
     /// Panics: if parts of the loop are split off. Allocates: never.
     pub fn tick(&mut self, now: MonoNs) -> usize {

@@ -289,8 +289,8 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
         let then = without(causes, all_turn);
         assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
     }
-    // A longer range doubles the time between passes, and a finer mode increases it by half. Both factors
-    // scale all times that depend on the turn period.
+    // A longer range doubles the time between passes, and a finer mode increases this time by half. Both factors scale
+    // all times that depend on the turn period.
     for (causes, slower, finer) in [
         (&[Cause::OutOfRange][..], 2.0, 1.0),
         (&[Cause::AngularStep], 1.5, 0.5),

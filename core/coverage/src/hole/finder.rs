@@ -204,7 +204,7 @@ impl Default for HoleFinder {
 stateful!(HoleFinder { state: last_m; fixed: tolerance_m, laid_m, window, tiles, division; });
 
 impl HoleFinder {
-    /// Creates a finder of D with a tolerance, m; zero means an exact search.
+    /// Creates a finder that measures hole diameters with a tolerance, m; zero means an exact search.
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(tolerance_m: f64) -> Self {

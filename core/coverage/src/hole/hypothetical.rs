@@ -45,7 +45,7 @@ impl WallChanges {
 
 /// Returns a stretch and its mirror image, in ascending order.
 ///
-/// If the two stretches meet, they are joined. A gap between them belongs to neither.
+/// If the two stretches meet, they are joined. A gap between the two stretches belongs to neither of them.
 fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
     let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
     if image_m[0] > to_m {

@@ -28,7 +28,7 @@ pub struct Request {
     pub section: i64,
     /// Time at which the request was made.
     pub at: MonoNs,
-    /// Stretch that every awaited head had swept at this time.
+    /// Stretch that every awaited head had swept at this time. A head is awaited if its samples may still land.
     pub swept_by_all: Option<Reach>,
     /// Whether no head was alive at this time.
     pub none_alive: bool,

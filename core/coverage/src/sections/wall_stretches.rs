@@ -131,7 +131,7 @@ mod tests {
     }
 
     /// A slow head sees only a part of the wall in each section. The stretch has the mean deviation of all these parts.
-    /// It begins and ends with a section that deviates.
+    /// The stretch begins and ends with a section that deviates.
     #[test]
     fn sections_of_one_slow_turn_form_a_stretch_if_their_mean_deviates() {
         let ditch = [0.0, 0.6, 0.0, 0.0, 0.6, 0.0, 0.0, 0.6, 0.0];

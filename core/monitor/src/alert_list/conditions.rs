@@ -16,8 +16,8 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Grace period after the first advice update. Data or positions that haven't arrived by its end count as
-/// missing.
+/// Grace period after the first advice update. Data or positions that haven't arrived by the end of this period count
+/// as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
 /// Time for which the alerts `CannotSay` and `ComputerStalled` stay active after their situation last occurred.
 const GROWS: DurNs = DurNs(10_000_000_000);
@@ -310,7 +310,7 @@ impl AlertList {
         self.timers.get(timer::place(kind, source)).is_some_and(|timer| timer.number != 0)
     }
 
-    /// Updates the timer of a situation, and raises or ends its alert when that is due.
+    /// Updates the timer of a situation, and raises or ends the situation's alert when due.
     pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);

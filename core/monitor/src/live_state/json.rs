@@ -57,7 +57,7 @@ pub struct LiveStateJson {
     pub cannot_say: Option<StretchJson>,
     /// Counts of the alerts that have not ended.
     pub alert_counts: AlertCountsJson,
-    /// Text of the setting that would allow a higher speed; `None` if there is none.
+    /// Text of the change that would allow a higher speed; `None` if there is none.
     pub remedy: Option<String>,
     /// Remaining cable, time and charge. An unknown amount is `None`.
     pub left: LeftJson,
@@ -107,7 +107,7 @@ pub struct MarginsJson {
     /// It is the confidence times the standard deviation of the position at one pass relative to the next
     /// pass.
     pub position_m: Option<f64>,
-    /// Share of lost returns; `None` unless they limit the speed.
+    /// Share of lost returns; `None` unless lost returns limit the speed.
     pub lost_share: Option<f64>,
 }
 

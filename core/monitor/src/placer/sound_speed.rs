@@ -1,5 +1,4 @@
-//! Speed of sound during the dive, from the temperature of a depth sensor. Sonar readings are corrected for
-//! it.
+//! Speed of sound during the dive, from the temperature of a depth sensor. Sonar readings are corrected for this speed.
 
 use bevy_ecs::prelude::Resource;
 

@@ -20,7 +20,8 @@ pub struct AdviceReport {
     /// Speed below which heads at different places along the hull run out of phase, m/s; zero if a lower
     /// speed always helps.
     pub from_mps: f64,
-    /// Speed nearest to the present speed that meets the target, m/s; `None` if the present speed meets it.
+    /// Speed that meets the target and is nearest to the present speed, m/s; `None` if the present speed meets the
+    /// target.
     pub nearest_mps: Option<f64>,
     /// Factor that limits the speed.
     pub reason: &'static str,

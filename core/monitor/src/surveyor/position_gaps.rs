@@ -10,7 +10,7 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::passes::Situation;
 
-/// Maximum number of listed gaps. Beyond it, the two oldest gaps become one.
+/// Maximum number of listed gaps. Beyond this number, the two oldest gaps become one.
 const MOST_GAPS: usize = 32;
 /// Duration of the shortest listed gap. The alignment of the filter takes a second at the start of a dive.
 const SHORTEST: DurNs = DurNs(5_000_000_000);

@@ -333,8 +333,8 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
-    /// All returns but the first are from a rock. Pings that arrive while the first return waits take effect when
-    /// it is classified.
+    /// All returns but the first are from a rock. Pings that arrive while the first return waits take effect when that
+    /// return is classified.
     #[test]
     fn lost_ping_after_an_undecided_return_interrupts_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {

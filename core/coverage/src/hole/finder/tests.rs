@@ -193,8 +193,8 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// D depends neither on the order of the samples, nor on the seam of the unrolled wall, nor on the origin
-    /// of the chainage.
+    /// The diameter D depends neither on the order of the samples, nor on the seam of the unrolled wall, nor on the
+    /// origin of the chainage.
     #[test]
     fn hole_is_independent_of_sample_order_seam_and_chainage_origin(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
@@ -252,7 +252,7 @@ fn hole_of_samples_with_nanometre_and_metre_spacings_is_correct() {
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel, D is the same to within the floating-point precision at that chainage.
+/// Far along the tunnel, the diameter D is the same to within the floating-point precision at that chainage.
 #[test]
 fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =
