@@ -334,7 +334,7 @@ fn higher_priority_needs_a_new_acknowledgement() {
     assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
 }
 
-/// A dive begins with unverified mounts. The vehicle may swing during the first 30 s. Only then the alert asks for a
+/// A dive begins with unverified mounts. The vehicle may swing during the first 30 s. After that, the alert asks for a
 /// swing.
 #[test]
 fn unverified_mounts_raise_a_caution_after_the_grace_period_until_they_are_verified() {

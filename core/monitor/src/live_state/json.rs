@@ -57,7 +57,7 @@ pub struct LiveStateJson {
     pub cannot_say: Option<StretchJson>,
     /// Counts of the alerts that have not ended.
     pub alert_counts: AlertCountsJson,
-    /// Text of the change that would allow a higher speed; `None` if there is none.
+    /// Text of the setting that would allow a higher speed; `None` if there is none.
     pub remedy: Option<String>,
     /// Remaining cable, time and charge. An unknown amount is `None`.
     pub left: LeftJson,
