@@ -37,7 +37,7 @@ const HEIGHT_SHARE: f64 = 0.7;
 const HEIGHT_LN_SD: f64 = 0.7;
 /// Share of wall features whose height or depth does not depend on their width: posts, ladders and boreholes.
 const SLENDER_SHARE: f64 = 0.01;
-/// Natural logarithm of the ratio of the largest to the smallest width of wall features, which is thirty.
+/// Natural logarithm of thirty, which is the ratio of the largest to the smallest width of wall features.
 ///
 /// All logarithms of the width are equally likely.
 const WIDTHS_LN: f64 = 3.4;

@@ -79,9 +79,9 @@ pub struct Occurrences {
     pub first_m: f64,
     /// Largest deviation in any occurrence, m.
     ///
-    /// Outside the tunnel: distance from its end. Contradicted profile: mean deviation of a section from the
-    /// design. Head: mean difference between successive returns, constant range, or mean deviation from the
-    /// design. Cable counter: difference from the other source. Setting: 0.
+    /// Outside the tunnel: distance from its end. Contradicted profile: mean deviation of a section from the design.
+    /// Distrusted head: mean difference between successive returns, constant range, or mean deviation from the design,
+    /// depending on the kind. Cable counter: difference from the inertial unit or velocity log. Setting: 0.
     pub worst_m: f64,
 }
 

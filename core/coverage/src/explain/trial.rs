@@ -19,7 +19,8 @@ const MARGIN: f64 = 0.85;
 /// A finer step or a longer range takes longer per turn, which stretches the wall.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// If the hole exceeds this multiple of the target even without all present factors, the cause of the hole is unknown.
+/// If the hole exceeds this multiple of the target even with all present factors removed, the cause of the hole is
+/// unknown.
 const AT_MOST: f64 = 1.3;
 /// Maximum number of bisection steps in the search for the hole's diameter with all missing samples put back.
 const SEARCHED: u32 = 5;

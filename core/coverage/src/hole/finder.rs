@@ -227,7 +227,7 @@ impl HoleFinder {
 
     /// Returns the largest hole among the samples of visits from `first_visit` on.
     ///
-    /// The hole's `least_m` is then no lower bound: full cells don't store a sample near one of an earlier visit.
+    /// The hole's `least_m` is then no lower bound: full cells don't store a sample near a sample of an earlier visit.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
