@@ -7,7 +7,7 @@ use super::cause::{Cause, Causes};
 /// Speed for passing a missed stretch again, and whether a lower speed helps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Again {
-    /// Largest speed that meets the target in every section, except in sections where no speed meets it, m/s.
+    /// Largest speed that meets the target in all sections in which some speed meets it, m/s.
     ///
     /// Zero if more than half of the sections have no speed that meets the target.
     pub at_most_mps: f64,
@@ -30,7 +30,7 @@ pub struct Failing {
 /// Counts of failed sections by remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
-    /// Number of sections in which some speed meets the target, and the lowest of their speeds, m/s.
+    /// Number of sections in which some speed meets the target, and the lowest of these sections' speeds, m/s.
     mended: u32,
     least_mps: f64,
     /// Number of sections that lose so many returns that no speed makes up for the losses.

@@ -27,8 +27,8 @@ impl Deviation {
     /// Adds a sample at `point` with arc length `arc_m`.
     ///
     /// `before` is the previous sample of the same head, one step earlier, with its arc length. Deviation and arc
-    /// length are both measured along the ray from the profile's reference point. `is_confirming` means that
-    /// another head has found wall with the same deviation there.
+    /// length are both measured along the ray from the profile's reference point. `is_confirming` means that another
+    /// head has found wall with the same deviation at the same place.
     pub fn add(
         &mut self,
         profile: &Profile,

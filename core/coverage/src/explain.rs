@@ -26,16 +26,16 @@ use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 /// Speed counts as a factor if the spacing T exceeds this multiple of the target, even if the vehicle kept to the
 /// planned speed.
 ///
-/// T is the spacing at the driven speed with all heads as scheduled. D would then be at most T.
+/// T is the sample spacing at the driven speed with all heads at their scheduled angles. No hole is then larger than T.
 const WELL_OVER: f64 = 1.2;
 /// Ratio of the speed to the planned speed above which the vehicle did not follow the plan.
 const OVER_PLAN: f64 = 1.15;
 /// Ratio that replaces `WELL_OVER` and `OVER_PLAN` if there is no position.
 ///
-/// The speed is then known from the inertial unit alone.
+/// The speed then comes from the inertial unit alone, and is less accurate.
 const OVER_LOST: f64 = 1.4;
-/// Speed counts as a factor if it exceeds both the planned speed and the largest speed that meets the target by this
-/// ratio.
+/// Least ratio of the speed to the planned speed, and to the largest speed that meets the target, at which speed counts
+/// as a factor.
 ///
 /// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;
@@ -71,7 +71,7 @@ pub fn explain<'a>(
     let is_lossy = causes.has(Cause::MissingReturns);
     let here =
         if is_lossy { sampled.passes_needed(iter::once(LossRate::independent(missing_share))) } else { 1.0 };
-    // If other causes contribute, lost returns need to explain only a hole as wide as the target.
+    // If other causes contribute, lost returns need to explain only a hole as large as the target.
     let times = if causes.len() > 1 { 1.0 } else { WIDEST };
     let hole_m = case.hole.diameter_m.min(times * case.target_m);
     let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);

@@ -83,7 +83,7 @@ pub struct Frontier {
     ///
     /// Heads count whether they ping or not.
     way: Option<Reach>,
-    /// Stretch where all heads, pinging or not, have been: the whole combined reach has moved across it.
+    /// Stretch where all heads, pinging or not, have been: the whole combined reach has moved across this stretch.
     ///
     /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
     through: Option<Reach>,
@@ -141,7 +141,8 @@ pub struct Outlook {
     pub at: MonoNs,
     /// Coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
-    /// Stretch that every awaited head has covered, except heads that never pinged; `None` if empty.
+    /// Stretch that every awaited head has covered; `None` if empty. A head is awaited if its samples may still land.
+    /// Heads that never pinged are left out.
     pub swept_by_all: Option<Reach>,
     /// Whether no head is alive: no head has pinged for longer than [`SILENT_AFTER`].
     pub none_alive: bool,
@@ -153,7 +154,7 @@ pub struct Outlook {
     pub not_passed: Option<Reach>,
     /// Stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub through: Option<Reach>,
-    /// The zone, if it has been unchanged for longer than [`SILENT_AFTER`].
+    /// Zone of the sections within reach of the heads, if it has been unchanged for longer than [`SILENT_AFTER`].
     ///
     /// The vehicle is then nearly stationary.
     pub still_zone: Option<Range<i64>>,
@@ -354,7 +355,8 @@ impl Frontier {
         let course_now = course.to(middle_m, count);
         self.turns += u32::from(course_now.astern != course.astern);
         self.course = Some(course_now);
-        // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
+        // L is the section length. Section k spans [kL, (k+1)L). It is behind the reach if (k+1)L + margin <= from, and
+        // ahead of the reach if kL - margin >= to.
         let first = math::floor_to_i64((all.from_m - margin_m) / section_m);
         let end = -math::floor_to_i64(-(all.to_m + margin_m) / section_m);
         debug_assert!(first <= end, "a zone begins before it ends: {all:?} gives {first} to {end}");

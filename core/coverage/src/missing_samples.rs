@@ -1,7 +1,7 @@
 //! Missing samples: places where a ping would have left a sample, and the causes of each loss.
 //!
 //! If the samples that a factor has cost are put back, the hole is as it would have been without this factor. Only the
-//! most recent missing samples are kept, because fails are explained soon after the vehicle has left their place.
+//! most recent missing samples are kept, because a fail is explained soon after the vehicle has left the section.
 
 use serde::{Deserialize, Serialize};
 

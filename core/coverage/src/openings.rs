@@ -16,7 +16,7 @@ pub struct Opening {
     pub from_m: f64,
     /// Chainage of the opening's end, m.
     pub to_m: f64,
-    /// Arc length at which the opening begins, and its length along the perimeter, m.
+    /// Arc length at which the opening begins, and the opening's length along the perimeter, m.
     ///
     /// `None` for the whole perimeter.
     pub arc_m: Option<(f64, f64)>,
@@ -24,17 +24,17 @@ pub struct Opening {
 
 /// Maximum spacing of the samples that fill an opening, m.
 ///
-/// The spacing is at most a tenth of the target.
+/// For targets below half a metre, the spacing is a tenth of the target.
 const SPACING_M: f64 = 0.05;
 
 impl Opening {
-    /// Returns the opening's extent along the perimeter: arc length of its beginning and its length, m.
+    /// Returns the opening's extent along the perimeter, m: the arc length at which it begins, and its length.
     fn arc(&self, perimeter_m: f64) -> (f64, f64) {
         self.arc_m.map_or((0.0, perimeter_m), |(from_m, length_m)| (from_m, length_m.min(perimeter_m)))
     }
 
-    /// Returns the numbers of intervals between filling samples along the tunnel and the perimeter, for a
-    /// given spacing.
+    /// Returns the number of intervals between filling samples, along the tunnel and along the perimeter, for a given
+    /// spacing.
     fn counts(&self, perimeter_m: f64, spacing_m: f64) -> (i64, i64) {
         let over = |length_m: f64| (-math::floor_to_i64(-length_m / spacing_m)).max(1);
         (over(self.to_m - self.from_m), over(self.arc(perimeter_m).1))

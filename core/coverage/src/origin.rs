@@ -25,26 +25,27 @@ pub(super) struct Extent {
 // The figures below are assumptions about tunnels and water. They are not fitted to data.
 // docs/decisions/0004-verdicts-and-causes.md describes their effect.
 
-/// Mean width of objects in the water and of echoes by a second path, m; in narrow tunnels at most this share of the
-/// equivalent radius.
+/// Mean width of objects in the water and of echoes by a second path, m. In narrow tunnels, the width is at most the
+/// share below of the equivalent radius.
 const OBJECT_WIDTH_M: f64 = 0.3;
 const OBJECT_WIDTH_SHARE: f64 = 0.1;
-/// Median height or depth of a wall feature as a share of its width, and standard deviation of its logarithm.
+/// Median height or depth of a wall feature as a share of its width, and standard deviation of the natural logarithm of
+/// this share.
 ///
 /// A half-buried boulder has half its width as height, and a niche is about as deep as wide.
 const HEIGHT_SHARE: f64 = 0.7;
 const HEIGHT_LN_SD: f64 = 0.7;
 /// Share of wall features whose height or depth does not depend on their width: posts, ladders and boreholes.
 const SLENDER_SHARE: f64 = 0.01;
-/// Natural logarithm of the ratio of the largest to the smallest width of wall features, which is thirty.
+/// Natural logarithm of thirty, which is the ratio of the largest to the smallest width of wall features.
 ///
 /// All logarithms of the width are equally likely.
 const WIDTHS_LN: f64 = 3.4;
-/// Growth of the log odds when another pass confirms a run.
+/// Growth of the log odds that a run is wall, for each pass that confirms the run.
 ///
 /// Nearly every pass meets wall again. For objects and second echoes, 3 % of passes are assumed to meet them again.
 const CONFIRMS: f64 = 3.5;
-/// Growth of the log odds when an end of a run slopes to the wall.
+/// Growth of the log odds that a run is wall, for each of its ends that slopes to the wall.
 ///
 /// Half of the ends of wall features are assumed to slope, and 7 % of the ends of objects and second echoes.
 const SLOPES: f64 = 2.0;
@@ -62,7 +63,7 @@ pub(super) struct Experience {
 const REMEMBERED_RUNS: f64 = 50.0;
 /// Runs that are added to the runs of the dive. They stand for clear water, in which five of six runs are wall.
 ///
-/// They limit the odds: however many runs of one kind there were, the kind of the next run is not certain.
+/// They limit the odds: however many runs were wall, or were something else, the next run is never certain.
 const PRIOR: Experience = Experience { wall: 2.5, other: 0.5 };
 
 impl Experience {

@@ -141,10 +141,10 @@ impl Drive {
 
     /// Whether the heads are out of phase because the vehicle is slower than planned.
     ///
-    /// True if passes are farther apart, by a factor above `over`, than at the planned speed with the heads
-    /// at their scheduled angles. Heads at different places along the hull are in phase only near the planned
-    /// speed. The planned speed must also meet the target. Heads that were started with wrong phases do not count,
-    /// because no speed helps them.
+    /// True if the distance between passes is more than `over` times the distance at the planned speed with the heads
+    /// at their scheduled angles, and if the planned speed meets the target. Heads at different places along the hull
+    /// are in phase only near the planned speed. Heads that were started with wrong phases do not count, because no
+    /// speed helps them.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;

@@ -13,7 +13,7 @@ use headrace_sampling::head::MAX_HEADS;
 
 /// Number of bins around the perimeter; a bin is about as wide as the step of a head.
 const BINS: i64 = 128;
-/// Number of bins along the tunnel. Each is half of `WallLimits::reach_m` long.
+/// Number of bins along the tunnel. Each bin is half of `WallLimits::reach_m` long.
 ///
 /// In a tunnel of 6 m radius, all bins together are 9 m long, which exceeds the distance between heads.
 const SLABS: i64 = 32;
@@ -44,7 +44,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// A return of a pass, after `confirmed` earlier passes that met the same thing.
+    /// Creates the record of a return, after `confirmed` earlier passes that met the same thing.
     pub(super) fn new(placed: &PlacedReturn, is_wall: bool, confirmed: u8, pass: Pass) -> Self {
         Self { placed: *placed, is_wall, passes: confirmed.saturating_add(1), pass }
     }
@@ -71,7 +71,8 @@ pub struct Ballot {
     agreed: u32,
     /// Number of bins in which the head contradicts the design, while other heads agree with it.
     outvoted: u32,
-    /// Sum of the deviations in the bins where the head was outvoted, m, and the range of their chainages.
+    /// Sum of the deviations in the bins where the head was outvoted, m, and the chainages between which these bins
+    /// lie, m.
     off_sum_m: f64,
     between_m: Option<[f64; 2]>,
 }
@@ -199,8 +200,8 @@ impl Relief {
     /// Counts the votes that follow from a head's return: on this head, and on other heads that have seen the same bin.
     pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
         let (slab, bin) = place(placed, limits);
-        // Returns between half and the whole contradiction limit don't vote, because noise would make heads
-        // disagree at a single limit.
+        // Returns that deviate by half to all of the contradiction limit don't vote. With a single limit, noise would
+        // make heads disagree.
         let as_designed = placed.off_m.abs() <= limits.contradiction_m / 2.0;
         if !as_designed && placed.off_m.abs() <= limits.contradiction_m {
             return;

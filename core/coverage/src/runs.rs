@@ -34,9 +34,9 @@ pub struct Run {
     pub to: i64,
     /// Number of the stretch's sections that fail.
     pub failed: u32,
-    /// Section with the largest hole, and this hole.
+    /// Index of the section with the largest hole, and this hole.
     ///
-    /// In a cleared missed stretch, both are from the time before the stretch was cleared.
+    /// In a cleared missed stretch, section and hole are from the time before the stretch was cleared.
     pub worst: (i64, Hole),
     /// Time at which the stretch was first flagged.
     pub raised: MonoNs,

@@ -1,4 +1,4 @@
-//! One section: its statistics, hole, verdict and flag; and the metres of tunnel by verdict.
+//! One section: its statistics, hole, verdict and flag. Also the length of tunnel by verdict.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,14 +16,12 @@ use headrace_sampling::Target;
 /// Coverage verdict on a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Undecided: samples may still land, or some heads have not been in the section.
-    ///
-    /// Samples count only if they may land without the vehicle turning back.
+    /// Undecided: more samples may land without the vehicle turning back, or some heads have not been in the section.
     #[default]
     Open,
-    /// Pass: D + k sd <= T, for hole diameter D, target T and confidence k.
+    /// Pass: D + k sd <= T, with hole diameter D, its standard deviation sd, target T and confidence k.
     Pass,
-    /// Fail: D - k sd > T.
+    /// Fail: D - k sd > T, with the symbols of [`Verdict::Pass`].
     Fail,
     /// Can't say: neither a pass nor a fail, although no more samples will land.
     CannotSay,
@@ -125,10 +123,10 @@ pub struct Section {
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
-    /// Whether the verdict is final on the present course: no more samples can change the verdict, or the hole of a
-    /// failed section.
+    /// Whether the verdict is final unless the vehicle turns back. No more samples can then change the verdict, or a
+    /// failed section's hole.
     pub settled: bool,
-    /// Whether the section is open although no sample can change it without the vehicle turning back.
+    /// Whether the section is open and stays open unless the vehicle turns back.
     ///
     /// The vehicle began or turned back in this section, so some heads have not been in it.
     pub not_inspected: bool,
@@ -146,7 +144,7 @@ pub struct Section {
     pub t_x_m: Spread,
     /// T_y of the section's samples: distance between neighbouring samples of one sweep, m.
     pub t_y_m: Spread,
-    /// T of the section's samples: lattice diagonal of T_x and T_y, m.
+    /// Diagonal T of the lattice formed by the section's samples, from T_x and T_y, m.
     pub t_m: Spread,
     /// Number of samples on the section's wall.
     pub samples: u32,
@@ -154,17 +152,16 @@ pub struct Section {
     pub deviation: Deviation,
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// Whether the section must be judged again: since its last judgement, a sample has landed on it or less than
-    /// the target T away from it, or the section became suspect.
+    /// Whether the section must be judged again. Since its last judgement, a sample has landed within the target T of
+    /// the section, or the section became suspect.
     pub(super) stale: bool,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,
-    /// Whether doubtful returns would fill every hole over the target if they were wall.
+    /// Whether every hole over the target would be filled if the section's doubtful returns were wall.
     pub(super) filled_by_doubtful: bool,
     /// Whether the section holds samples of a head that was distrusted soon after.
     pub suspect: bool,
-    /// Number of the vehicle's newest visit to the section at the time when a head with samples there became
-    /// distrusted.
+    /// Number of the vehicle's newest visit at the time when a head with samples in the section became distrusted.
     suspected_in: u32,
     /// Visits of the vehicle with samples within the target T of the section.
     pub(super) visits: Visits,
@@ -176,9 +173,9 @@ pub struct Section {
 const FEW: u32 = 20;
 /// Share of the wall covered by openings above which a section counts as having no wall.
 const ALL_MASKED: f64 = 0.999;
-/// Plausible ratios of the cross-section area to the design's area.
+/// Plausible ratios of the measured cross-section area to the design's area. Beyond them, the section can't pass.
 ///
-/// A deviation of a tenth of the radius gives 0.8 to 1.2.
+/// A wall that deviates by a tenth of the radius has a ratio between 0.8 and 1.2.
 const AREA_RATIO: core::ops::RangeInclusive<f64> = 0.6..=1.6;
 
 impl Section {
@@ -189,7 +186,8 @@ impl Section {
 
     /// Whether verdict, hole, flag and evidence of a section that was just judged agree.
     ///
-    /// A pass has a hole with D + k sd <= T. A fail has evidence and a flag. Only open sections are `not_inspected`.
+    /// A pass has a hole diameter D with D + k sd <= T. A fail has evidence and a flag. Only open sections are
+    /// `not_inspected`.
     pub(super) fn is_consistent(&self, target: Target) -> bool {
         let error_m = target.error_m(self.hole_sd_m);
         let is_judged = self.hole.is_some_and(|hole| hole.is_consistent()) && error_m >= 0.0;
@@ -213,7 +211,7 @@ impl Section {
         matches!(self.wall_doubt(), Some(Unsure::ContradictedProfile | Unsure::OtherSize))
     }
 
-    /// Records the error between passes at a ping that has a fix in the section.
+    /// Records the position error between two passes, for a ping with a fix in the section.
     pub fn note_pass(&mut self, visit: &Visit, profile: &Profile) {
         if self.passed_in != visit.number {
             self.visits.note_earlier(self.passage.pass_error.worst_m(profile));
@@ -276,7 +274,8 @@ impl Section {
 
     /// Records that the section holds samples of a distrusted head.
     ///
-    /// The section then can't pass, and is due for judging. Returns false if this was known for its newest visit.
+    /// The section then can't pass, and is due for judging. Returns false if its newest visit was recorded as suspect
+    /// before.
     pub fn suspect(&mut self) -> bool {
         let is_new = !self.suspect || self.suspected_in != self.visits.newest();
         if is_new {
@@ -302,30 +301,30 @@ impl Section {
     }
 }
 
-/// Metres of tunnel by verdict. Each metre is counted once.
+/// Length of tunnel by verdict, m. Each metre counts for one verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Metres {
-    /// Metres that have passed.
+    /// Length of the sections that passed.
     pub pass_m: f64,
-    /// Metres that have failed.
+    /// Length of the sections that failed.
     pub fail_m: f64,
-    /// Metres that neither pass nor fail, although no more samples will land.
+    /// Length of the sections that neither pass nor fail, although no more samples will land.
     pub cannot_say_m: f64,
-    /// Metres that are still open: driving on may fill their holes.
+    /// Length of the sections that are still open: driving on may fill their holes.
     pub open_m: f64,
-    /// Metres at the ends of the coverage extent where some heads have not been.
+    /// Length of the sections at the ends of the coverage extent where some heads have not been.
     ///
-    /// Driving on does not change them.
+    /// Driving on does not change this length.
     pub not_inspected_m: f64,
 }
 
 impl Metres {
-    /// Length of all metres together, m.
+    /// Total length over all verdicts, m.
     pub fn way_m(&self) -> f64 {
         self.pass_m + self.fail_m + self.cannot_say_m + self.open_m + self.not_inspected_m
     }
 
-    /// Adds metres of tunnel with a verdict.
+    /// Adds a length of tunnel that has this verdict.
     pub fn add(&mut self, verdict: Verdict, metres_m: f64) {
         *match verdict {
             Verdict::Pass => &mut self.pass_m,

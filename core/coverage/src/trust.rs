@@ -41,7 +41,7 @@ pub(super) struct Others {
 
 /// Disagreement of a return with the returns before it.
 pub(super) struct Disagreement {
-    /// Difference from the previous return, m; `None` if both agree.
+    /// Difference from the previous return, m; `None` if the two returns agree.
     pub(super) jump_m: Option<f64>,
     /// Number of waiting returns that this return made doubtful.
     pub(super) doubtful: u32,
@@ -56,7 +56,7 @@ struct HalfTurn {
     jumps: u32,
     jump_sum_m: f64,
     turned_rad: f64,
-    /// Sums over the half turn: range, its square, and the square of its change from the previous return, m and m2.
+    /// Sums over the half turn, m and m2: range, squared range, and squared change of range from the previous return.
     range_sum_m: f64,
     range_square_m2: f64,
     change_square_m2: f64,
@@ -124,7 +124,7 @@ impl HalfTurn {
 /// Over half a turn, independent noise has a ratio of 2 +- 0.2. The range to a wall has a much smaller ratio, unless
 /// the vehicle is in the centre of a round tunnel.
 const NOISE_RATIO: f64 = 1.0;
-/// Resolution of a profiling sonar's range, m. Smaller changes show nothing.
+/// Resolution of a profiling sonar's range, m. Smaller changes of range are no evidence.
 const RESOLUTION_M: f64 = 0.002;
 /// Minimum number of returns in half a turn for a decision on the head.
 const FEW: u32 = 20;

@@ -15,7 +15,8 @@ pub enum Unsure {
     ///
     /// Some heads have not been in the section.
     NotInspected,
-    /// The hole's diameter differs from the target by less than its error, because position errors are too large.
+    /// The difference between hole diameter and target is less than the diameter's error, because position errors are
+    /// too large.
     Position,
     /// The section holds samples of several navigation segments.
     SeveralStretches,
@@ -129,7 +130,8 @@ const JOIN_M: f64 = 2.0;
 impl Stretch {
     /// Creates an unsure stretch from one section.
     ///
-    /// The figures are the diameter of the section's hole, the error of this diameter, and its standard deviation, m.
+    /// The figures are the diameter of the section's hole, the diameter's error, and the diameter's standard deviation,
+    /// m.
     pub fn one(why: Unsure, index: i64, [hole_m, error_m, sd_m]: [f64; 3], driven: Driven) -> Self {
         let section = Largest { sections: 1, hole_m: [hole_m, sd_m], driven };
         let is_error = error_m > MOSTLY_ERROR * hole_m;

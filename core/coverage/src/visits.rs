@@ -11,9 +11,10 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Limits for the time between two samples. Below the first limit, the error between successive passes applies.
+/// Limits for the time between two samples. Up to the first limit, the error between successive passes applies.
 ///
-/// Above the second limit, the error relative to a much earlier visit applies. Between the limits, both are mixed.
+/// From the second limit on, the error relative to a much earlier visit applies. Between the limits, both errors are
+/// mixed.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 

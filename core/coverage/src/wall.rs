@@ -205,9 +205,9 @@ impl HeadWall {
     /// Classifies a head's new return and the returns that wait for it.
     ///
     /// `confirmed` is the number of earlier passes that met the same thing. `agrees` means that the new return agrees
-    /// with the head's previous return. `slopes` means that it agrees with one of the two previous returns, and that
-    /// this one is wall. Output: the run of waiting returns, its classification (`None` if undecided), and the
-    /// classification of the new return.
+    /// with the head's previous return. `slopes` means that the new return agrees with one of the two previous returns,
+    /// and that this previous return is wall. Returns the run of waiting returns, its classification (`None` if
+    /// undecided), and the classification of the new return.
     fn decide(
         &mut self,
         (placed, confirmed): (&PlacedReturn, u8),

@@ -32,7 +32,8 @@ const TOLERANCE_SHARE: f64 = 0.1;
 /// Minimum tolerance, m: three times the resolution and noise of profiling sonars.
 const LEAST_TOLERANCE_M: f64 = 0.03;
 
-/// Approximate number of steps of a head in a turn, and least width of a step as a share of its width at the wall.
+/// Approximate number of steps of a head in a turn, and least width of a step as a share of the step's width at the
+/// wall.
 const STEPS: f64 = 128.0;
 const STEPS_SHARE: f64 = 0.05;
 

@@ -23,9 +23,9 @@ use headrace_sampling::head::HeadSet;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Largest share of the target that position errors may use up. Above it, the position is doubtful.
+/// Largest share of the target that position errors may use up. Above this share, the position is doubtful.
 const SPREAD_SHARE: f64 = 0.2;
-/// Number of notices per alert and tick that have room. An alert may change several times in a tick.
+/// Number of notices per alert for which a tick has room. An alert may change several times in a tick.
 const NOTICES_PER_ALERT: usize = 4;
 
 /// Alerts, notes and the live state.
@@ -106,7 +106,7 @@ impl Alerter {
         }
     }
 
-    /// Brings the metres by verdict up to date after the last judgement of a dive.
+    /// Updates the length of each verdict after the last judgement of a dive.
     pub(super) fn take_metres_at_end(&mut self, coverage: &Coverage) {
         self.state.metres = coverage.metres();
         self.state.missed_from_m = coverage.sections.missed_from_m();

@@ -15,7 +15,7 @@ use headrace_vehicle::{CONSOLE_ID, Mission};
 
 /// A plugin: an addition to the loop, such as an outlet or a system.
 pub trait Plugin {
-    /// Registers sources, outlets, and resources and systems of a world.
+    /// Registers sources and outlets, and resources and systems of the loop's worlds.
     ///
     /// Errors: a requirement of the plugin is missing or duplicated.
     fn build(&self, app: &mut App) -> Result<(), PluginError>;

@@ -58,7 +58,7 @@ pub struct ConsolePort {
 type DiveClock = dyn Fn() -> MonoNs + Send + Sync;
 
 impl ConsolePort {
-    /// Hands a command to the loop, stamped with the dive's clock. The loop takes it at its next tick.
+    /// Hands a command to the loop, stamped with the dive's clock. The loop takes the command at the next tick.
     ///
     /// Errors: too many commands are waiting, or the report has no room for another note. The command is
     /// dropped.

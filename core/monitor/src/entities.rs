@@ -33,7 +33,7 @@ use headrace_sensor::reading::SourceId;
 pub struct Navigator {
     /// Method that computes fixes from readings.
     pub navigation: Box<dyn Navigation>,
-    /// Time of the next update, a multiple of the advice period; `None` before the first packet.
+    /// Time of the next advice update, a multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
     /// Detectors of stuck sensors, by source.
     pub repeats: Vec<StuckSensor>,

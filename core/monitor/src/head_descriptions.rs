@@ -11,8 +11,8 @@ pub struct HeadDescriptions {
     names: Vec<String>,
     /// Scan mode with a finer step for all heads, if there is one.
     finer: Option<ModeName>,
-    /// Range setting at which all heads reach all wall from the tunnel's centre, m; `None` if the present
-    /// setting does.
+    /// Range setting at which all heads reach all wall from the tunnel's centre, m; `None` if the present setting
+    /// reaches it.
     longer_m: Option<f64>,
 }
 
@@ -23,8 +23,7 @@ pub struct HeadSettings {
     pub name: String,
     /// Scan mode with a finer step, if there is one.
     pub finer: Option<ModeName>,
-    /// Range setting that reaches all wall from the tunnel's centre, m; `None` if the head's own setting
-    /// does.
+    /// Range setting that reaches all wall from the tunnel's centre, m; `None` if the head's own setting reaches it.
     pub longer_m: Option<f64>,
 }
 

@@ -115,7 +115,7 @@ impl HeadHealth {
 
     /// Share of the head's latest returns that are away from the design wall, from 0 to 1.
     ///
-    /// The share is 1 until a whole turn gave returns, and again after a whole turn without any.
+    /// The share is 1 until a whole turn gave returns, and again after a whole turn without any return.
     pub fn elsewhere(&self) -> f64 {
         let is_known = self.heard_rad >= TAU && !self.hears_nothing();
         if is_known { self.elsewhere } else { 1.0 }

@@ -12,12 +12,11 @@ const SAME_ANGLE_RAD: f64 = 1e-6;
 /// Minimum angle over which the turn rate is measured, radians. Until the head has turned that far, the whole
 /// angle so far is used.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
-/// Multiple of the usual angular step between pings. A longer step counts as several steps, because pings
-/// were skipped.
+/// A step longer than this multiple of the usual angular step counts as several steps, because pings were skipped.
 const LONG_STEP: f64 = 1.5;
 
-/// Multiples of the usual angular step between pings, and of the angle expected at the turn rate. A step that
-/// exceeds both shows that the head has restarted at another angle.
+/// Multiples of the usual angular step between pings, and of the angle expected at the turn rate. A step that exceeds
+/// both multiples shows that the head has restarted at another angle.
 ///
 /// A head that lags behind its programmed angle catches up in steps of at most eight times the usual step.
 const ELSEWHERE_STEPS: f64 = 10.0;
@@ -49,7 +48,7 @@ pub struct MeasuredMotion {
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,
-    /// Total unsigned angle turned through, radians. The rate is measured between two points, `anchors`.
+    /// Total unsigned angle turned through, radians. The turn rate is measured between the two points `anchors`.
     turned_rad: f64,
     anchors: [Option<(MonoNs, f64)>; 2],
     step_rad: Option<f64>,

@@ -18,7 +18,7 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Time between two messages on the coverage extent and its metres by verdict, in data time.
+/// Time between two messages on the coverage extent and the length of each verdict in it, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
 /// A further cause of a missed stretch is reported only if it applies to at least this length, m.
@@ -51,7 +51,7 @@ pub enum LiveMessage {
         from_m: f64,
         /// End of the missed stretch.
         to_m: f64,
-        /// Metres of the stretch that fail at present.
+        /// Length of the stretch's sections that fail at present.
         failed_m: f64,
     },
     /// The vehicle has driven through a missed stretch again, and none of its sections fails any more.
@@ -67,8 +67,8 @@ pub enum LiveMessage {
     CannotSay(UnsureStretch),
     /// The end of a stretch without a verdict is known.
     CannotSayEnds(UnsureStretch),
-    /// Some heads have not been at the place where the vehicle began or turned back, and the vehicle is now
-    /// well away from it.
+    /// Some heads have not been at the place where the vehicle began or turned back, and the vehicle is now well away
+    /// from this place.
     NotInspected(UnsureStretch),
     /// An alert has changed.
     AlertChange {
@@ -79,13 +79,13 @@ pub enum LiveMessage {
     },
     /// A note was added.
     Note(NoteJson),
-    /// The coverage extent at present, with its metres by verdict.
+    /// The present coverage extent, with the length of each verdict in it.
     Way {
         /// Beginning of the extent.
         from_m: f64,
         /// End of the extent.
         to_m: f64,
-        /// Metres of the extent by verdict.
+        /// Length of each verdict within the extent.
         metres: Metres,
     },
 }
@@ -175,7 +175,7 @@ impl LiveMessages {
             let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
             tell(LiveMessage::Way { from_m, to_m, metres: state.metres });
         }
-        // Diameter of the circle whose perimeter equals the tunnel's.
+        // Diameter of the circle that has the tunnel's perimeter.
         let width_m = 2.0 * dive.mission().profile.perimeter_m() / TAU;
         if let (Some(ends), Some(x_m)) = (self.at_ends, state.chainage_m) {
             let off_m = (sections.bounds_m(ends.from).0 - x_m).max(x_m - sections.bounds_m(ends.to).0);

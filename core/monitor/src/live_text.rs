@@ -203,8 +203,8 @@ fn turn_text(what: &str, state: &LiveState) -> String {
     }
 }
 
-/// Share of lost returns, if it limits the speed. In that case the turn's forecast, which assumes no losses,
-/// means little.
+/// Text of the share of lost returns, if lost returns limit the speed. In that case the turn's forecast, which assumes
+/// no losses, means little.
 fn losses_text(state: &LiveState) -> Option<String> {
     state.lost_share().map(|share| format!("{:.0} % of returns lost", 100.0 * share))
 }
@@ -218,7 +218,7 @@ fn forecast_text(state: &LiveState) -> Option<String> {
     })
 }
 
-/// Metres of the coverage extent by verdict, without zeros.
+/// Text of the length of each verdict within the coverage extent. Verdicts with a length of zero are left out.
 pub fn metres_text(metres: &Metres) -> String {
     let Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [

@@ -14,14 +14,14 @@ const WORDS: usize = BINS / 64;
 const WINDOW: u32 = 4096;
 /// Minimum divisor, in pings, of a loss share. With fewer pings, a single loss would count too much.
 const LEAST: u32 = 100;
-/// Weight of the overall loss share, in pings, in the estimate of the loss share after a lost ping. It
-/// matters while few pings are lost.
+/// Weight of the overall loss share, in pings, in the estimate of the loss share after a lost ping. This weight matters
+/// while few pings are lost.
 const USUAL: f64 = 50.0;
 /// Share of lost pings above which a head hardly detects the wall. Hardly any angle then gives a return in two
 /// successive turns.
 const NEARLY_ALL: f64 = 0.75;
 
-/// Number of pings, and number of those that gave no return.
+/// Number of pings, and number of pings among them that gave no return.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Count {
     all: u32,
@@ -71,8 +71,8 @@ pub struct LossCount {
     heard_before: Angles,
     /// For each angle: whether the ping just before the last ping at that angle was lost.
     followed_lost: Angles,
-    /// Three counts: all pings at wall within range; the counted pings, see above; and the counted pings that
-    /// followed a lost ping.
+    /// Three counts: all pings at wall within range; the pings that count for losses by chance; and those of the latter
+    /// that followed a lost ping.
     any: Count,
     by_chance: Count,
     after_lost: Count,
@@ -91,8 +91,8 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping a turn ago counts, because the head detected the wall at this angle both before and
-            // after it.
+            // The ping a turn ago counts, because the head detected the wall at this angle a turn before that ping and
+            // a turn after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {

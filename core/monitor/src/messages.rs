@@ -58,8 +58,7 @@ pub enum Outcome {
         /// Arc length of the end point, m.
         arc_m: f64,
     },
-    /// No sample, for this reason. The aim is the point at which the beam meets the design profile, if it is
-    /// known.
+    /// No sample, for this reason. The aim is the point at which the beam meets the design profile; `None` if unknown.
     Lost(Loss, Option<WallPoint>),
     /// A return that can't be placed, with the reason for the missing fix.
     Unplaced(NoFix),
@@ -147,7 +146,7 @@ pub struct PlacedItem {
 /// Coverage results and observations at an advice update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
-    /// Metres of the coverage extent by verdict.
+    /// Length of each verdict within the coverage extent.
     pub metres: Metres,
     /// Chainage at which the first missed stretch begins, m; `None` if no stretch is missed.
     pub missed_from_m: Option<f64>,

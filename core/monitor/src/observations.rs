@@ -61,9 +61,9 @@ impl ObservedKind {
 /// An occurrence of an observation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Occurrence {
-    /// Chainage, m.
+    /// Chainage of the occurrence, m.
     pub x_m: f64,
-    /// Deviation, m; see [`Occurrences::worst_m`].
+    /// Deviation in this occurrence, m; see [`Occurrences::worst_m`].
     pub off_m: f64,
 }
 
@@ -77,11 +77,11 @@ pub struct Occurrences {
     pub count: u64,
     /// Chainage of the first occurrence, m.
     pub first_m: f64,
-    /// Largest deviation, m.
+    /// Largest deviation in any occurrence, m.
     ///
-    /// Outside the tunnel: distance from its end. Contradicted profile: mean deviation of a section from the
-    /// design. Head: mean difference between successive returns, constant range, or mean deviation from the
-    /// design. Cable counter: difference from the other source. Setting: 0.
+    /// Outside the tunnel: distance from its end. Contradicted profile: mean deviation of a section from the design.
+    /// Distrusted head: mean difference between successive returns, constant range, or mean deviation from the design,
+    /// depending on the kind. Cable counter: difference from the inertial unit or velocity log. Setting: 0.
     pub worst_m: f64,
 }
 
@@ -110,7 +110,7 @@ impl Observations {
 
     /// Records an occurrence that concerns a head, or the velocity log that the cable counter differs from.
     ///
-    /// Returns true for the first one.
+    /// Returns true for the first occurrence.
     pub(crate) fn note_of(
         &mut self,
         source: Option<SourceId>,

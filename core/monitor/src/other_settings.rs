@@ -1,6 +1,6 @@
 //! Predicted effect of alternative head settings: a finer angular step or a longer range.
 //!
-//! With either, a turn takes longer. The prediction of a section's hole allows for that.
+//! With either setting, a turn takes longer. The prediction of a section's hole allows for the longer turn.
 
 use bevy_ecs::prelude::World;
 
@@ -32,8 +32,8 @@ impl HeadSpecification {
     pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
         let [_, own_m] = self.spec.range_m;
         let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
-        // The live advice uses the same number of rays. Its mode and this mode appear on the same screen, so
-        // they must agree.
+        // The live advice uses the same number of rays. The mode in the advice and the mode found here appear on the
+        // same screen, so they must agree.
         let rays = Looks::default().ring;
         let ring = self.ring_in_the_middle(profile, rays).unwrap_or_default();
         let finer = self.finer(target_m, |step_rad| ring.largest_step_m(Ring::stride(step_rad, rays)));
@@ -44,8 +44,8 @@ impl HeadSpecification {
         }
     }
 
-    /// Returns the scan mode with a finer step that allows the highest speed. If no such mode meets the target,
-    /// returns the finest.
+    /// Returns the scan mode with a finer step that allows the highest speed. If no such mode meets the target, returns
+    /// the finest mode.
     ///
     /// `t_y_m` converts a step of the head, radians, to the step along the wall, m.
     fn finer(&self, target_m: f64, t_y_m: impl Fn(f64) -> f64) -> Option<&HeadMode> {

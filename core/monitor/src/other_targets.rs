@@ -5,22 +5,22 @@ use serde::Serialize;
 
 use super::run::Loop;
 
-/// Metres by verdict, for another target or another section length.
+/// Length of tunnel by verdict, for another target or another section length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OtherTargetReport {
     /// Coverage target T, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Metres of sections that would pass.
+    /// Length of the sections that would pass.
     pub pass_m: f64,
-    /// Metres of sections that would fail.
+    /// Length of the sections that would fail.
     pub fail_m: f64,
-    /// Metres of sections that would be undecided within the error of the hole.
+    /// Length of the sections that would neither pass nor fail, although no more samples will land.
     pub cannot_say_m: f64,
-    /// Metres of sections that would still be open.
+    /// Length of the sections that would still be open.
     pub open_m: f64,
-    /// Metres of sections where some heads would not have been.
+    /// Length of the sections where some heads would not have been.
     pub not_inspected_m: f64,
 }
 

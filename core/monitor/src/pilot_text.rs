@@ -34,11 +34,11 @@ pub(crate) fn speed_steps(limit_mps: f64) -> (usize, f64) {
 
 /// Speed limit in whole steps, rounded down.
 pub(crate) fn limit_steps(limit_mps: f64, steps_per_mps: f64) -> f64 {
-    // Without the small addition, 0.29 m/s would become 28 steps.
+    // Because of rounding, 0.29 m/s would become 28 steps without the small addition.
     (limit_mps * steps_per_mps + 1e-6).floor()
 }
 
-/// Speed limit with its unit, rounded down, so that a pilot who drives at the stated speed stays within it.
+/// Speed limit with its unit, rounded down, so that a pilot who drives at the stated speed stays within the limit.
 pub fn limit_text(limit_mps: f64) -> String {
     let (decimals, steps) = speed_steps(limit_mps);
     format!("{:.decimals$} m/s", limit_steps(limit_mps, steps) / steps)
@@ -121,8 +121,8 @@ impl CauseFigures {
 
     /// Speed for passing the stretch again, m/s. `v_max_mps` is the speed advised now.
     ///
-    /// If the heads have to be mended or set first, it is the speed computed for the stretch with the heads
-    /// as scheduled. Otherwise it is the lower of that speed and `v_max_mps`.
+    /// If the heads have to be mended or set first, the result is the speed computed for the stretch with the heads as
+    /// scheduled. Otherwise the result is the lower of this speed and `v_max_mps`.
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
         let mended =
             [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];
@@ -192,7 +192,8 @@ pub fn actions_text(
     if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
         two.reverse();
     }
-    // Either the stated speed covers this action, or the first action already states that slower won't help.
+    // The action "slower" is left out if the stated speed covers it, or if the first action states that slower won't
+    // help.
     if let [first, Action::Slower] = two.as_slice()
         && (at_most_mps > 0.0 || matches!(first, Action::FinerMode | Action::HigherGain))
     {
@@ -237,7 +238,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
-        // The exact speed is stated, because below it heads at different places along the hull are out of
+        // The exact speed is stated, because below this speed, heads at different places along the hull are out of
         // phase again.
         Action::InPhase if at_most_mps > 0.0 => {
             return format!("{back}, then with the heads in phase, at {}", limit_text(at_most_mps));
@@ -270,10 +271,10 @@ pub(super) fn no_position_text(lacking: NoFix) -> String {
     condition_words(Condition::NoPosition(lacking)).text()
 }
 
-/// Text of the setting that allows a higher speed.
+/// Text of the change that allows a higher speed.
 ///
-/// If a lower speed doesn't help, the setting is the remedy. If no head sees a part of the wall, it is a longer
-/// range. Otherwise it is a mode that all heads have and that allows a higher speed.
+/// If a lower speed doesn't help, the change is the remedy. If no head sees a part of the wall, the change is a longer
+/// range. Otherwise the change is to a mode that all heads have and that allows a higher speed.
 pub fn gain_text(advice: &Advice, heads: &HeadDescriptions) -> Option<String> {
     if advice.remedy.is_some() {
         return Some(remedy_text(advice.remedy));
@@ -291,7 +292,7 @@ pub fn gain_text(advice: &Advice, heads: &HeadDescriptions) -> Option<String> {
     })
 }
 
-/// Text of a speed to keep; empty if there is none.
+/// Text of a speed to keep; empty if the speed is zero.
 pub(super) fn speed_text(what: &str, mps: f64) -> String {
     if mps > 0.0 { format!("{what} {}", limit_text(mps)) } else { String::new() }
 }

@@ -85,7 +85,7 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Metres of the coverage extent by verdict.
+    /// Length of each verdict within the coverage extent.
     pub fn metres(&self) -> Metres {
         self.sections.metres(self.frontier.way())
     }

@@ -7,7 +7,8 @@
 use super::digest::Digest;
 use headrace_geometry::snapshot::stateful;
 
-/// Capacity of a stream per tick, words. Words beyond it are hashed, but they are not kept and count as lost.
+/// Capacity of a stream per tick, words. Words beyond this capacity are hashed, but they are not kept and count as
+/// lost.
 const MAX_TICK_WORDS: usize = 1 << 16;
 
 /// Kind of a record in a result stream.
@@ -50,7 +51,7 @@ pub enum WordKind {
     Number,
 }
 
-/// Words of a sample, and of a doubtful return.
+/// Names and types of the words in the record of a sample or a doubtful return.
 const SAMPLE: [(&str, WordKind); 7] = [
     ("received_ns", WordKind::Integer),
     ("source", WordKind::Integer),
@@ -60,14 +61,14 @@ const SAMPLE: [(&str, WordKind); 7] = [
     ("z_m", WordKind::Number),
     ("arc_m", WordKind::Number),
 ];
-/// Words of a ping without a sample.
+/// Names and types of the words in the record of a ping without a sample.
 const NO_SAMPLE: [(&str, WordKind); 4] = [
     ("received_ns", WordKind::Integer),
     ("source", WordKind::Integer),
     ("outcome", WordKind::Integer),
     ("reason", WordKind::Integer),
 ];
-/// Words of advice.
+/// Names and types of the words in an advice record.
 const ADVICE: [(&str, WordKind); 11] = [
     ("at_ns", WordKind::Integer),
     ("v_max_mps", WordKind::Number),
@@ -81,7 +82,7 @@ const ADVICE: [(&str, WordKind); 11] = [
     ("remedy_mode", WordKind::Integer),
     ("remedy_mode_rest", WordKind::Integer),
 ];
-/// Words of a pose.
+/// Names and types of the words in a pose's record.
 const POSE: [(&str, WordKind); 13] = [
     ("at_ns", WordKind::Integer),
     ("x_m", WordKind::Number),
@@ -98,7 +99,7 @@ const POSE: [(&str, WordKind); 13] = [
     ("tilt_sd_rad", WordKind::Number),
     ("yaw_sd_rad", WordKind::Number),
 ];
-/// Words of the live state.
+/// Names and types of the words in a live state's record.
 const STATE: [(&str, WordKind); 19] = [
     ("at_ns", WordKind::Integer),
     ("position", WordKind::Integer),
@@ -120,7 +121,7 @@ const STATE: [(&str, WordKind); 19] = [
     ("alerts", WordKind::Integer),
     ("turning", WordKind::Integer),
 ];
-/// Words of the first occurrence of an observation.
+/// Names and types of the words in the record of an observation's first occurrence.
 const ALERT: [(&str, WordKind); 5] = [
     ("at_ns", WordKind::Integer),
     ("kind", WordKind::Integer),

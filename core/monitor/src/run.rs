@@ -31,7 +31,7 @@ use headrace_vehicle::Mission;
 /// next batch.
 const FINISHED_AT_ONCE: usize = 256;
 
-/// The three worlds (placer, adviser, surveyor) and the alerter of which a loop consists.
+/// Parts of a loop: the three worlds (placer, adviser, surveyor) and the alerter.
 pub(super) struct Parts {
     pub(super) placer: Placer,
     pub(super) surveyor: Surveyor,
@@ -89,7 +89,7 @@ impl Loop {
 
     /// Processes the waiting packets. Returns the number of packets consumed.
     ///
-    /// `now` is the end of the tick's time. The loop only records it; no result depends on it.
+    /// `now` is the end of the tick's time. The loop only records this time; no result depends on it.
     ///
     /// Panics: if parts of the loop are split off. Allocates: never.
     pub fn tick(&mut self, now: MonoNs) -> usize {
@@ -163,7 +163,7 @@ impl Loop {
         self.ahead = Some((placer, adviser));
     }
 
-    /// Runs the rest of a tick from the values of placer and adviser. The advice is swapped with that of the
+    /// Runs the rest of a tick from the values of placer and adviser. In exchange, `advised` gets the advice of the
     /// previous tick.
     ///
     /// Returns false if a lagging outlet holds back the tick's packets. The call then counts as a tick
@@ -276,8 +276,8 @@ impl Loop {
     /// Judges the sections whose verdict may still change, at the end of a dive, when no more samples will
     /// come.
     ///
-    /// `hear` gets the notices in batches, with the loop's state after each batch. All notices of a long dive
-    /// at once would take more memory than its samples.
+    /// `hear` gets the notices in batches, with the loop's state after each batch. All notices of a long dive at once
+    /// would take more memory than the dive's samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         if let Some((placer, _)) = &mut self.ahead {
             placer.end();
@@ -306,7 +306,7 @@ impl Loop {
         self.list_last_observations(hear);
     }
 
-    /// Lists the observations made at the end of a dive.
+    /// Adds alerts for the observations made at the end of a dive.
     fn list_last_observations(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         let at = self.last_packet();
         self.alerter.take_observations_at_end(self.surveyor.observations(), at);

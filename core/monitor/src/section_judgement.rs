@@ -19,7 +19,7 @@ pub struct SectionJudgement {
     pub verdict: Verdict,
     /// Diameter of the section's largest hole, m; 0 if the hole wasn't measured.
     pub hole_m: f64,
-    /// Standard deviation of that diameter, m.
+    /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
     /// Chainage of the hole's centre, m; 0 if the hole wasn't measured.
     pub hole_x_m: f64,
@@ -54,8 +54,8 @@ pub(super) fn record(to: &mut ResultStream, at: MonoNs, index: i64, change: Judg
 }
 
 impl SectionJudgement {
-    /// Reads a judgement from the words of its record; `None` if they are too few, or name an unknown change
-    /// or verdict.
+    /// Reads a judgement from the words of its record; `None` if the words are too few, or name an unknown change or
+    /// verdict.
     ///
     /// Records of earlier program versions, with fewer figures about the cause, are accepted.
     pub fn read(words: &[u64]) -> Option<Self> {

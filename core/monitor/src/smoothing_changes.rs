@@ -28,7 +28,7 @@ fn judged(section: &SectionRow) -> JudgedReport {
 
 /// Lists the sections whose verdict differs between two reports.
 ///
-/// Both inputs are in the order of chainage. Either may have sections that are missing in the other.
+/// Both lists are in the order of chainage. Either may have sections that are missing in the other.
 fn changes(before: &[SectionRow], after: &[SectionRow]) -> Vec<ChangeReport> {
     let (mut before, mut after) = (before.iter().peekable(), after.iter().peekable());
     let mut changed = Vec::new();

@@ -164,7 +164,7 @@ impl Surveyor {
         wall::end_returns(&mut self.part.world);
     }
 
-    /// Returns the sections to judge at the end of a dive, and a request whose other fields fit all of them.
+    /// Returns the sections to judge at the end of a dive, and a request that fits all of them except for its section.
     pub(super) fn open_requests(&mut self, at: MonoNs) -> (Vec<i64>, Option<Request>) {
         let outlook = self.outlook(at);
         let (mut open, mut common) = (Vec::new(), None);

@@ -15,13 +15,13 @@ pub struct UnsureStretch {
     pub from_m: f64,
     /// End of the stretch, m.
     pub to_m: f64,
-    /// Metres of the stretch's sections that neither pass nor fail.
+    /// Length of the stretch's sections that neither pass nor fail, m.
     pub metres_m: f64,
     /// Diameter of the stretch's largest hole, m.
     pub hole_m: f64,
-    /// Standard deviation of that diameter, m.
+    /// Standard deviation of the largest hole's diameter, m.
     pub hole_sd_m: f64,
-    /// Error of that diameter: the confidence times its standard deviation, m.
+    /// Error of the largest hole's diameter, m: the confidence times its standard deviation.
     pub hole_error_m: f64,
     /// Driving figures of the section with the largest hole.
     #[serde(skip)]
@@ -66,8 +66,8 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     }
 }
 
-/// Lower and upper ratio of a speed to the fitting speed, which is the largest one that meets the target.
-/// Between the two ratios, the speed counts as equal to the fitting speed.
+/// Lower and upper ratio of a speed to the fitting speed, the largest speed that meets the target. Between the two
+/// ratios, the speed counts as equal to the fitting speed.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
 /// Text of the remedy for a stretch without a verdict; empty if there is none.

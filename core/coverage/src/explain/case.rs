@@ -1,5 +1,5 @@
-//! A failed section and its surroundings: ping counts over both, and the driving figures with some factors
-//! removed.
+//! A failed section and its surroundings: ping counts over the section and its surroundings, and the driving figures as
+//! they would be without some factors.
 
 use crate::cause::{Cause, Causes};
 use crate::frontier::Reach;
@@ -36,7 +36,8 @@ pub struct Case<'a> {
     pub is_torn: bool,
     /// Coverage target T, m.
     pub target_m: f64,
-    /// Causes of the two neighbouring sections. Among equally small sets of causes, the search prefers these.
+    /// Causes of the two neighbouring sections. Among equally small sets of causes, the search tries these two sets
+    /// first.
     pub beside: [Causes; 2],
     /// List of the most recent missing samples.
     pub lacks: &'a MissingSamples,
@@ -84,8 +85,8 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole. If the hole is larger than the target, only a central part of the
-/// target's size has to be swept.
+/// Whether every live head has swept the hole. If the hole is larger than the target, only its central part, as large
+/// as the target, has to be swept.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
@@ -138,10 +139,10 @@ impl Drive {
         }
     }
 
-    /// Returns the driving figures as they would have been with some factors removed.
+    /// Returns the driving figures as they would have been without the factors `removed`.
     ///
-    /// If speed is among the removed factors, the returned speed is low enough for holes of at most `margin_m`, m,
-    /// which is the target less a margin. `all_turn` means that no head is silent or stalled.
+    /// If speed is among these factors, the returned speed is low enough for holes of at most `margin_m`, m, which is
+    /// the target less a margin. `all_turn` means that no head is silent or stalled.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;
@@ -176,7 +177,7 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // If the vehicle hides wall from some heads, the advised speed is lower, and replaces this speed.
+            // If the vehicle hides wall from some heads, the advised speed is lower than this speed, and replaces it.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

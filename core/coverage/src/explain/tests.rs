@@ -160,7 +160,7 @@ fn both_causes_are_named_only_if_both_are_needed() {
     let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
-    // A sample that is missing for two reasons is put back only if both are removed.
+    // A sample that is missing for two reasons is put back only if both reasons are removed.
     let both = Causes::of(Cause::PositionLost).with(Cause::OutOfRange);
     assert_eq!(
         named(&Wall { bare: BARE, why: both, ..Wall::default() }),
@@ -182,7 +182,7 @@ fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
 
 /// A longer range or a finer step has a longer turn, which leaves the passes farther apart.
 ///
-/// If the section would fail with that setting too, the present setting is not the cause.
+/// If the section would fail with the other setting too, the present setting is not the cause.
 #[test]
 fn head_setting_is_a_cause_only_if_another_setting_meets_the_target() {
     let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
@@ -289,8 +289,8 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
         let then = without(causes, all_turn);
         assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
     }
-    // A longer range doubles the time between passes, and a finer mode increases it by half. Both factors
-    // scale all times that depend on the turn period.
+    // A longer range doubles the time between passes, and a finer mode increases this time by half. Both factors scale
+    // all times that depend on the turn period.
     for (causes, slower, finer) in [
         (&[Cause::OutOfRange][..], 2.0, 1.0),
         (&[Cause::AngularStep], 1.5, 0.5),

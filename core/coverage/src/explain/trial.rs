@@ -1,4 +1,4 @@
-//! Computes the hole that a section would have with some of the present factors removed.
+//! Computes the hole that a section would have without some of the present factors.
 
 use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unheard};
 use crate::cause::{Cause, Causes};
@@ -11,15 +11,16 @@ use headrace_geometry::math;
 use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
-/// Largest hole that the lower speed may leave when the speed factor is removed, as a share of the target. Plans keep
-/// the rest as a margin.
+/// Removing the speed factor means a speed at which holes are at most this share of the target. Plans keep the rest as
+/// a margin.
 const MARGIN: f64 = 0.85;
 /// Limits of the factor by which the wall is compressed or stretched.
 ///
 /// A finer step or a longer range takes longer per turn, which stretches the wall.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// If the hole exceeds this multiple of the target with all present factors removed, its cause is unknown.
+/// If the hole exceeds this multiple of the target even with all present factors removed, the cause of the hole is
+/// unknown.
 const AT_MOST: f64 = 1.3;
 /// Maximum number of bisection steps in the search for the hole's diameter with all missing samples put back.
 const SEARCHED: u32 = 5;
@@ -31,7 +32,7 @@ const MOST_NAMED: u32 = 3;
 /// Maximum number of sets of causes tested per fail.
 const MOST_TRIED: u32 = 120;
 
-/// Computes the holes that a section would have with some factors removed.
+/// Computes the holes that a section would have without some factors.
 pub(super) struct Trial<'a> {
     case: &'a Case<'a>,
     drive: &'a Drive,
@@ -164,13 +165,13 @@ impl<'a> Trial<'a> {
 
     /// Returns the factors that every set of causes must contain to explain the fail.
     ///
-    /// If one of them stays, the section fails even if all other factors are removed.
+    /// If one of these factors stays, the section fails even if all other factors are removed.
     fn needed(&mut self, present: Causes) -> Causes {
         let mut is_needed = |cause: &Cause| !self.passes_without(present.without(*cause), 1.0);
         present.iter().filter(|cause| is_needed(cause)).collect()
     }
 
-    /// Whether the section's hole would be at most `times` the target with some factors removed.
+    /// Whether the section's hole would measure at most `times` the target without the factors `removed`.
     fn passes_without(&mut self, removed: Causes, times: f64) -> bool {
         if self.left == 0 {
             return false;
@@ -189,7 +190,7 @@ impl<'a> Trial<'a> {
         !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
     }
 
-    /// Lays out the wall as it would be with some factors removed, for the search for holes.
+    /// Lays out the wall as it would be without the factors `removed`, for the search for holes.
     fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &WallChanges) {
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
@@ -201,7 +202,7 @@ impl<'a> Trial<'a> {
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 
-    /// Whether all wall counts as covered once some factors are removed.
+    /// Whether all wall counts as covered without the factors `removed`.
     ///
     /// True if it is unknown where these factors caused missing samples.
     fn covers(&self, removed: Causes) -> bool {
@@ -210,8 +211,8 @@ impl<'a> Trial<'a> {
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
     }
 
-    /// Distance between neighbouring samples with some factors removed, m, computed from vehicle and head
-    /// movement alone.
+    /// Distance between neighbouring samples without the factors `removed`, m, computed from vehicle and head movement
+    /// alone.
     ///
     /// Infinite if the remaining factors cause many missing samples.
     fn stays_m(&self, removed: Causes) -> f64 {
@@ -240,10 +241,9 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(self.drive.passes_needed * then.along_m(), 0.0, then.t_y_m) <= target_m
     }
 
-    /// Returns the movement of vehicle and heads as driven, and with some factors removed.
+    /// Returns the movement of vehicle and heads, first as driven, then without the factors `removed`.
     ///
-    /// `healthy_gap_s` is the time between passes of the heads that are present. It excludes silent or stalled heads
-    /// if these factors remain.
+    /// If silent or stalled heads remain a factor, `healthy_gap_s` is at least the actual time between passes.
     fn drives(&self, removed: Causes) -> [Drive; 2] {
         let stalls = Causes::of(Cause::HeadSilent).with(Cause::HeadStalled);
         let staying = self.present.less(removed);
@@ -286,7 +286,7 @@ impl<'a> Trial<'a> {
         self.case.to_come.filter(|_| is_passed(self.case))
     }
 
-    /// Returns the changes to the wall that result from removing some factors.
+    /// Returns the changes to the wall that result from removing the factors `removed`.
     fn otherwise(&mut self, removed: Causes) -> WallChanges {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
@@ -307,8 +307,8 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // The driving figures are from a single moment, so the size of the hole limits the effect that is computed
-        // from them.
+        // The driving figures are from a single moment. The size of the hole therefore limits the effect that these
+        // figures have.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

@@ -5,7 +5,7 @@ use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 
-/// Resolution of the search, m. A circle that exceeds the required radius by less than this may be missed.
+/// Resolution of the search, m. A circle may be missed if it exceeds the required radius by less than this resolution.
 const FINE_M: f64 = 1e-3;
 
 /// Radius that an empty circle must have for an early fail, as a function of the arc length of its centre.
@@ -106,7 +106,7 @@ mod tests {
             let most_m = radius_m(PERIMETER_M / 2.0);
             let needed = Needed { radius_m: &radius_m, most_m, slope };
             let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), [reach, None], &needed);
-            // The grid of the brute force has an error of at most 5 mm in each direction, and the search of 1 mm.
+            // The brute-force grid has an error of at most 5 mm in each direction. The search has an error of 1 mm.
             prop_assert!(!found || best_m + 0.009 > 0.0, "a circle is found with a margin of {best_m} m");
             prop_assert!(found || best_m <= 0.0022, "no circle is found with a margin of {best_m} m");
         }

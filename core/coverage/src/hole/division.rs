@@ -54,7 +54,7 @@ impl Share {
     fn clip(&mut self, rival: (f64, f64)) -> bool {
         let (nx, ny) = (rival.0 - self.owner.0, rival.1 - self.owner.1);
         let half = 0.5 * (nx * nx + ny * ny);
-        // A rival more than twice as far away as the farthest corner cuts off nothing: half > 2 farthest^2.
+        // A rival cuts off nothing if it is more than twice as far from the share's sample as the farthest corner.
         if half > 2.0 * self.farthest2 {
             return true;
         }
@@ -93,7 +93,8 @@ impl Share {
 
 /// A tile divided among the samples found so far.
 ///
-/// The farthest corner of any share bounds the distance in the whole tile. More samples only reduce the bound.
+/// The largest distance of a corner from its share's sample is the upper bound for all points of the tile. More samples
+/// only reduce this bound.
 #[derive(Debug)]
 pub(super) struct Division {
     half_edges: (f64, f64),

@@ -27,9 +27,9 @@ const PROVEN_M: f64 = 1e-11;
 pub struct Hole {
     /// Diameter of the largest empty circle found among the stored samples, m.
     pub diameter_m: f64,
-    /// Lower bound of D, m: `diameter_m` less the possible effect of thinned and moved samples.
+    /// Lower bound of the hole's exact diameter, m: `diameter_m` less the possible effect of thinned and moved samples.
     pub least_m: f64,
-    /// Upper bound of D, m; infinite if the hole is not `bounded`.
+    /// Upper bound of the hole's exact diameter, m; infinite if the hole is not `bounded`.
     pub most_m: f64,
     /// Chainage of the circle's centre, m.
     pub x_m: f64,
@@ -37,7 +37,7 @@ pub struct Hole {
     pub arc_m: f64,
     /// Whether there are samples around the hole.
     ///
-    /// If there are none, D is at least `diameter_m`.
+    /// Without samples around the hole, its exact diameter is at least `diameter_m`.
     pub bounded: bool,
 }
 
@@ -71,8 +71,8 @@ pub(super) struct Tile {
     pub(super) half_arc_m: f64,
     /// Sample nearest to the tile's centre, relative to the centre, m.
     ///
-    /// The searches for an empty circle of given size use this field differently. They store the chainage, from the
-    /// start of the section, and the arc length of any nearby sample.
+    /// Searches for an empty circle of given size store the place of any nearby sample here: its chainage from the
+    /// start of the section, and its arc length.
     pub(super) owner: (f64, f64),
     /// Upper bound of f in the tile, m; f is the distance from a point to the nearest sample.
     pub(super) bound_m: f64,
@@ -137,8 +137,8 @@ impl Tile {
 
     /// Searches for a sample near the tile's centre.
     ///
-    /// If the known sample `owner` is within the radius of the whole tile, the function does not search.
-    /// Otherwise, it returns any sample that is near enough; if there is none, it returns the nearest sample.
+    /// No search is needed if `owner` is a known sample within the radius of all points of the tile. Otherwise, the
+    /// function returns any sample that is near enough, or else the nearest sample.
     pub(super) fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
         // The margins are larger than the rounding errors of the distances.
         let enough_m = radius_m - self.half_m() - ROUNDING_M;
@@ -188,7 +188,7 @@ pub struct HoleFinder {
     tolerance_m: f64,
     /// Radius of the previous hole, m: the first guess for the next search.
     last_m: f64,
-    /// Radius of the largest circle for which the changed wall was last laid out, m.
+    /// Largest radius of circles for which the latest layout of the changed wall suffices, m.
     pub(super) laid_m: f64,
     pub(super) window: Window,
     pub(super) tiles: Vec<Tile>,
@@ -204,7 +204,7 @@ impl Default for HoleFinder {
 stateful!(HoleFinder { state: last_m; fixed: tolerance_m, laid_m, window, tiles, division; });
 
 impl HoleFinder {
-    /// Creates a finder of D with a tolerance, m; zero means an exact search.
+    /// Creates a finder that measures hole diameters with a tolerance, m; zero means an exact search.
     ///
     /// Allocates: at startup, all that it will ever use.
     pub fn new(tolerance_m: f64) -> Self {
@@ -227,7 +227,7 @@ impl HoleFinder {
 
     /// Returns the largest hole among the samples of visits from `first_visit` on.
     ///
-    /// Here, `least_m` is not a lower bound of D: full cells leave out samples near samples of earlier visits.
+    /// The hole's `least_m` is then no lower bound: full cells don't store a sample near a sample of an earlier visit.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
@@ -259,8 +259,8 @@ impl HoleFinder {
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
-            // The next tile's centre is one tile edge away, and f changes by at most 1 m per metre. This limits
-            // the radius of the next search.
+            // The next tile's centre is one tile edge away. The distance from there to the nearest sample is longer by
+            // this edge at most, which limits the radius of the next search.
             within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_arc_m + 1e-6;
             self.tiles.push(tile);
         }
@@ -277,7 +277,8 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile among samples until none of its points can clearly exceed the best point's distance.
+    /// Divides a tile among samples until no point of the tile can be clearly farther from all samples than the best
+    /// point.
     ///
     /// Returns false if the tile must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {
@@ -322,7 +323,7 @@ impl HoleFinder {
         let from_m = self.window.chainage_m(-radius_m);
         let fidelity = store.fidelity(from_m, self.window.chainage_m(length_m + radius_m));
         let diameter_m = 2.0 * best.distance_m;
-        // If the window was full, samples were dropped that could reduce D. The lower bound of D is then zero.
+        // If the window was full, the samples that it dropped could reduce the diameter. Its lower bound is then zero.
         let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
         let hole = Hole {
             diameter_m,

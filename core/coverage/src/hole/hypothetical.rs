@@ -22,7 +22,7 @@ pub struct WallChanges {
     pub covered: [Option<Reach>; 4],
     /// Stretch where samples may still land.
     ///
-    /// The wall in this stretch is taken as the mirror image of the wall outside it.
+    /// The wall in this stretch is taken as the mirror image of the wall outside the stretch.
     pub to_come: Option<Reach>,
 }
 
@@ -45,7 +45,7 @@ impl WallChanges {
 
 /// Returns a stretch and its mirror image, in ascending order.
 ///
-/// If the two stretches meet, they are joined. A gap between them belongs to neither.
+/// If the two stretches meet, they are joined. A gap between the two stretches belongs to neither of them.
 fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
     let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
     if image_m[0] > to_m {
@@ -106,8 +106,8 @@ impl HoleFinder {
 
     /// Whether a circle of `radius_m` centred between two chainages holds no sample.
     ///
-    /// The search uses the wall laid out by [`lay_otherwise`](Self::lay_otherwise), which must have been
-    /// called for circles at least this large.
+    /// Lay out the wall with [`lay_otherwise`](Self::lay_otherwise) before, for circles of at least this radius. A
+    /// smaller layout lacks samples near the circle.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle_otherwise(

@@ -16,7 +16,7 @@ pub(super) struct Nearest {
     pub x_m: f64,
     /// Arc length of the sample, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Number of whole turns to add to the arc length for the image nearest to the point.
+    /// Number of perimeters to add to the arc length to get the sample's image nearest to the point.
     pub turns: f64,
     /// Squared distance from the point to the sample on the unrolled wall, m2.
     pub distance2: f64,
@@ -32,7 +32,7 @@ pub(super) struct Window {
     from_m: f64,
     cell_m: f64,
     column_m: f64,
-    /// Reciprocals of perimeter, cell length and cell width, 1/m; sorting and lookup share them.
+    /// Reciprocals of perimeter, cell length and cell width, 1/m. Sorting and lookup must use the same values.
     per_m: [f64; 3],
     rows: usize,
     columns: usize,

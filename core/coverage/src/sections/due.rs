@@ -62,7 +62,7 @@ impl Sections {
             }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        // Of each section at the zone's ends, the heads may have passed only a part.
+        // The heads may have passed only a part of each section at the zone's ends.
         let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {
@@ -99,9 +99,9 @@ impl Sections {
 
     /// Calls `ask` for sections in reach of a vehicle that is nearly stationary.
     ///
-    /// Without this call, these sections would get no verdict while the vehicle is stationary. A section is
-    /// due if it may be certain to fail although its hole may still get samples, or if it is flagged and has
-    /// new samples since it was judged.
+    /// Without this call, these sections would get no verdict while the vehicle is stationary. An unflagged section is
+    /// always due, because it may have become certain to fail. A flagged section is due if it has new samples since it
+    /// was judged.
     ///
     /// Allocates: never.
     pub fn look_around(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {

@@ -28,7 +28,7 @@ pub struct Request {
     pub section: i64,
     /// Time at which the request was made.
     pub at: MonoNs,
-    /// Stretch that every awaited head had swept at this time.
+    /// Stretch that every awaited head had swept at this time. A head is awaited if its samples may still land.
     pub swept_by_all: Option<Reach>,
     /// Whether no head was alive at this time.
     pub none_alive: bool,
@@ -56,7 +56,7 @@ impl Ended {
     }
 }
 
-/// Initial check positions. Every finite reach is beyond them, so the first movement causes a check.
+/// Initial check positions. Every finite reach is beyond these positions, so the first movement causes a check.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Request {
@@ -83,7 +83,7 @@ struct Measured {
     sd_m: f64,
     /// Whether the newest visit alone shows that the section passes.
     by_newest: bool,
-    /// Whether doubtful returns would fill every hole over the target if they were wall.
+    /// Whether every hole over the target would be filled if the section's doubtful returns were wall.
     filled_by_doubtful: bool,
 }
 
@@ -106,7 +106,7 @@ pub struct Judging<'a> {
 pub struct Sections {
     pub(super) section_m: f64,
     pub(super) target: Target,
-    /// Distance from the start of a missed stretch at which the vehicle's origin should turn round, m.
+    /// Distance before the start of a missed stretch at which the vehicle's origin should turn round, m.
     run_up_m: f64,
     first: i64,
     /// Number of judged sections by verdict, in the order of [`Verdict::ALL`].
@@ -115,7 +115,7 @@ pub struct Sections {
     judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
-    /// Chainages that the ends of the heads' reach must get to before sections are checked again, m.
+    /// Chainages that the ends of the heads' reach must pass before sections are checked again, m.
     ///
     /// The first chainage is for sections behind the heads, the second for sections ahead.
     pub(super) next_look_m: [f64; 2],
@@ -276,7 +276,8 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Updates a section's hole and verdict. `fails` means that the section fails, however large its largest hole is.
+    /// Updates a section's hole and verdict. `fails` means that the section is certain to fail, whatever its largest
+    /// hole.
     fn decide(
         &mut self,
         request: &Request,
@@ -344,7 +345,7 @@ impl Sections {
         }
     }
 
-    /// Returns the slot of the verdict counts in which a judged section is counted.
+    /// Returns the index of the verdict count in which a judged section is counted.
     fn counted(section: &Section) -> Option<usize> {
         section.hole?;
         Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
@@ -394,7 +395,8 @@ impl Sections {
         }
     }
 
-    /// Returns the metres of the coverage extent by verdict. Their sum is the total length of the extent's sections.
+    /// Returns the length of each verdict within the coverage extent, m. The sum is the total length of the extent's
+    /// sections.
     pub fn metres(&self, way: Option<Reach>) -> Metres {
         let mut metres = Metres::default();
         let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
@@ -416,7 +418,8 @@ impl Sections {
 
     /// Returns the error of a section's passes.
     ///
-    /// If no head pinged in the section, the result is the largest error of the sections within half the target of it.
+    /// If no head pinged in the section, the result is the largest error of the sections that are at most half the
+    /// target away.
     pub(super) fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
@@ -493,7 +496,7 @@ impl Sections {
     /// Returns the evidence for one cause of a missed stretch.
     ///
     /// If the section with the largest hole has the cause, the evidence is from this section. Otherwise it is from the
-    /// section with the cause that is farthest along the tunnel.
+    /// last section along the tunnel that has the cause.
     pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
         let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
         evidence(run.worst.0).or_else(|| (run.from..run.to).rev().find_map(evidence))
@@ -551,15 +554,15 @@ fn is_filled_by_doubtful(
     !finder.has_circle_otherwise((from_m, to_m), radius_m, &WallChanges::NOTHING)
 }
 
-/// Verdict on a hole. Its centre is at the distance `clear_m` from the stretch where samples may still land.
+/// Verdict on a hole whose centre is at the distance `clear_m` from the stretch where samples may still land.
 ///
-/// `sd_m` is the standard deviation of the hole's diameter, and k the confidence.
+/// D is the hole's diameter, `sd_m` (sd) its standard deviation, T the target and k the confidence.
 /// - `pass` if D + k sd <= T: more samples won't enlarge D.
 /// - `fail` if D - k sd > T for any final D: samples come no nearer to the centre than `clear_m`. A hole without
 ///   samples around it fails, too.
 /// - `open` otherwise while D may change, and `cannot_say` afterwards.
 ///
-/// A verdict holds for both bounds of D.
+/// A verdict holds for both the lower and the upper bound of D.
 pub(crate) fn verdict(hole: &Hole, sd_m: f64, target: Target, clear_m: f64) -> Verdict {
     let (target_m, error_m) = (target.max_hole_m, target.error_m(sd_m));
     debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");

@@ -21,8 +21,8 @@ const MOST_LOST: f64 = 2.0;
 impl Sections {
     /// Returns the opening that explains the lost returns of a missed stretch; `None` if the losses have another cause.
     ///
-    /// The opening is the patch of wall that the stretch's empty circles cover. Every ping at the patch was lost, and
-    /// few pings elsewhere.
+    /// The opening is the patch of wall that the stretch's empty circles cover. Every ping at the patch was lost, but
+    /// few pings elsewhere were.
     ///
     /// Allocates: the opening's name. Called only at the end of a dive.
     pub fn suggested_opening(&self, run: &Run, profile: &Profile) -> Option<Opening> {

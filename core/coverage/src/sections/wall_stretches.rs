@@ -24,7 +24,7 @@ pub struct WallStretch {
     pub outmost_m: f64,
 }
 
-/// Neighbouring sections that deviate to the same side, with the sections between them.
+/// Sections that deviate to the same side and are near each other, with the sections between them.
 struct Candidate {
     from: i64,
     to: i64,
@@ -131,7 +131,7 @@ mod tests {
     }
 
     /// A slow head sees only a part of the wall in each section. The stretch has the mean deviation of all these parts.
-    /// It begins and ends with a section that deviates.
+    /// The stretch begins and ends with a section that deviates.
     #[test]
     fn sections_of_one_slow_turn_form_a_stretch_if_their_mean_deviates() {
         let ditch = [0.0, 0.6, 0.0, 0.0, 0.6, 0.0, 0.0, 0.6, 0.0];

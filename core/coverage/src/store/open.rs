@@ -183,7 +183,7 @@ impl OpenBricks {
         (at.slot * self.rows + at.row) * self.columns + at.column
     }
 
-    /// Returns the bitmask of the rows of a slot that have samples in a column.
+    /// Returns the bitmask of the rows that have samples in this column of a slot.
     pub(super) fn rows_seen(&self, slot: usize, column: usize) -> u32 {
         self.rows_seen.get(slot * self.columns + column).copied().unwrap_or(0)
     }

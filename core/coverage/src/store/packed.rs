@@ -13,8 +13,8 @@ use headrace_sampling::head::MAX_HEADS;
 const QUANTA_PER_M: f64 = 131_072.0;
 /// Maximum displacement of a sample by packing, m.
 ///
-/// The displacement is up to half a quantum along the tunnel, and one quantum along the perimeter, whose last quantum
-/// is partial.
+/// The displacement is up to half a quantum along the tunnel. Along the perimeter it is up to one quantum, because the
+/// perimeter's last quantum is partial.
 pub(super) const MOVED_M: f64 = 8.6e-6;
 /// Number of sample words per block; one more word links to the next block.
 pub(super) const ROOM: usize = 31;

@@ -49,8 +49,8 @@ struct Side {
 impl SampleStore {
     /// Returns the distance in chainage to the nearest pass over a point's arc length within `within_m`, m.
     ///
-    /// The distance is accurate to some micrometres if a packed brick had to be opened. A pass is a single step of a
-    /// head from one sample to the next. The chainage of the pass at this arc length is interpolated.
+    /// A pass is a single step of a head from one sample to the next. The chainage of the pass at this arc length is
+    /// interpolated. If a packed brick had to be opened, the distance is accurate to some micrometres.
     /// Source: docs/reference/glossary.md, "Spacing and holes", T_x.
     ///
     /// Allocates: never.

@@ -34,7 +34,7 @@ pub struct WallSample {
     pub head: usize,
     /// Step from the same head's previous sample, along the tunnel and along the perimeter, m.
     ///
-    /// `None` unless both samples are one step apart in one sweep.
+    /// `None` unless the two samples are one step apart in one sweep.
     pub step_m: Option<[f64; 2]>,
     /// Number of the visit that measured the sample, from zero. The number never decreases.
     pub visit: u32,

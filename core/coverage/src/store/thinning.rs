@@ -7,8 +7,8 @@ use super::open::{CellAt, OpenBricks};
 
 /// Thinning tiers: a number of samples in the cell, and a share of the cell's edge.
 ///
-/// A tier applies from its number of samples on. A sample is then dropped if a stored sample is nearer than the tier's
-/// share of the edge.
+/// A tier applies from its number of samples on. A sample is then dropped if its distance from a stored sample is below
+/// the tier's share of the edge.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
 /// A sample at the end of a step is dropped only if its cell holds this many samples more than the tier requires.
@@ -30,8 +30,8 @@ pub(super) fn stands_for(
     step_m: Option<[f64; 2]>,
     edge_m: f64,
 ) -> Option<u8> {
-    // A step is a pass. Its sample is therefore dropped later, and only if a nearby step in the same
-    // direction represents it.
+    // A sample at the end of a step marks a pass. It is therefore dropped later than other samples, and only if a
+    // nearby step in the same direction represents it.
     let around_m = step_m.map_or(0.0, |[_, around_m]| around_m);
     let count = open.count(at).saturating_sub(if step_m.is_some() { PASSES } else { 0 });
     let tier = TIERS.iter().take_while(|(from, _)| count >= *from).count();

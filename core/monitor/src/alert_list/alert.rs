@@ -82,7 +82,7 @@ pub enum Figures {
     Advice(AdviceFigures),
     /// Requirement of a position that is not met, such as a heading.
     MissingRequirement(NoFix),
-    /// Position error, m, and whether staying stationary would reduce it.
+    /// Position error, m, and whether staying stationary would reduce this error.
     Error(f64, bool),
     /// Observation about the dive as a whole, such as a contradicted design profile.
     Deviation(Occurrences),

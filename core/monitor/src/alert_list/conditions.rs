@@ -16,20 +16,20 @@ use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Grace period after the first advice update. Data or positions that haven't arrived by its end count as
-/// missing.
+/// Grace period after the first advice update. Data or positions that haven't arrived by the end of this period count
+/// as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
 /// Time for which the alerts `CannotSay` and `ComputerStalled` stay active after their situation last occurred.
 const GROWS: DurNs = DurNs(10_000_000_000);
-/// Limits of the remaining cable, time and charge, percent: at or below them, a warning, an alarm or an
-/// emergency alarm is raised.
+/// Three limits of the remaining cable, time and charge, percent. At or below the first, a warning is raised, at or
+/// below the second an alarm, at or below the third an emergency alarm.
 ///
 /// A negative limit means that more than the whole cable or time is used up.
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
 const TIME_PCT: [f64; 3] = [10.0, 0.0, -1.0];
 const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
-/// Dead band, percent. The alert ends only if the remaining amount rises by more than this above the warning's
-/// limit.
+/// Dead band, percent. The alert ends only if the remaining amount rises above the warning's limit by more than this
+/// band.
 const MORE_PCT: f64 = 2.0;
 
 /// An advice update, with the live state at that time.
@@ -42,7 +42,7 @@ pub(crate) struct Beat<'a> {
     pub(crate) unverified_mounts: bool,
 }
 
-/// Result of checking a condition: whether it holds.
+/// Result of checking a condition: whether the condition holds.
 pub(super) struct Seen {
     pub(super) kind: ListKind,
     pub(super) source: Option<SourceId>,
@@ -226,10 +226,10 @@ impl AlertList {
         let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
         let is_silent =
             |source: u16| matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent);
-        // If no sensor delivers data, that is a single situation with one alert, not one per sensor.
+        // The silence of all sensors is a single situation with one alert, not one alert per sensor.
         let all_silent = state.sources > 0 && sources().all(is_silent);
         self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);
-        // A sensor is silent if it delivers nothing while another one does.
+        // A sensor is silent if it delivers nothing while another sensor does.
         let newest = sources().filter_map(heard).max();
         for source in sources() {
             let holds = match (heard(source), newest) {
@@ -318,7 +318,7 @@ impl AlertList {
         self.timers.get(timer::place(kind, source)).is_some_and(|timer| timer.number != 0)
     }
 
-    /// Updates the timer of a situation, and raises or ends its alert when that is due.
+    /// Updates the timer of a situation, and raises or ends the situation's alert when due.
     pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);
@@ -382,7 +382,7 @@ impl AlertList {
 }
 
 impl Figures {
-    /// Figures of a continuing situation: the present ones, except that the speed is the highest so far.
+    /// Figures of a continuing situation: the present figures, except that the speed is the highest so far.
     ///
     /// Once the pilot has slowed down, the present speed would no longer show by how much the limit was
     /// exceeded.

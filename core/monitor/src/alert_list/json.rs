@@ -92,9 +92,9 @@ pub struct SettingJson {
     pub range_ratio: Option<f64>,
     /// Angle to be added to the angle in the vehicle file, degrees; `None` unless an angle is doubtful.
     ///
-    /// It is an angle about the head's axis, a pitch or a yaw.
+    /// The doubtful angle is an angle about the head's axis, a pitch or a yaw.
     pub angle_deg: Option<f64>,
-    /// Difference between the file's value and the correct one, in standard deviations.
+    /// Difference between the file's value and the correct value, in standard deviations.
     pub sure_ratio: f64,
 }
 

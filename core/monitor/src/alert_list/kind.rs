@@ -183,7 +183,7 @@ impl ListKind {
         }
     }
 
-    /// Priority of the alert when it is raised. It may rise later as cable, time or charge runs out.
+    /// Priority of the alert when it is raised. The priority may rise later as cable, time or charge runs out.
     pub fn priority(self) -> Priority {
         match self {
             Self::CannotSay | Self::TurnFails | Self::MountsUnverified => Priority::Caution,
@@ -221,7 +221,7 @@ impl ListKind {
 
     /// Whether an alert of this kind may name a sensor.
     ///
-    /// For the cable counter, the sensor is the velocity log that it differs from, if any.
+    /// In an alert of the cable counter, the sensor is the velocity log that the counter differs from, if any.
     pub(super) fn may_name_a_sensor(self) -> bool {
         self.is_of_sensor() || self == Self::CableDoubted
     }

@@ -99,8 +99,8 @@ impl AlertList {
         self.set_alert_of(input.id, number);
     }
 
-    /// Adapts an alert to a missed stretch that has grown. If the stretch is the alert's only one, the alert also
-    /// shrinks with it.
+    /// Adapts an alert to a missed stretch that has grown. If the alert has no other stretch, the alert also shrinks
+    /// with this stretch.
     ///
     /// If a later pass splits a stretch in two, one alert covers both parts.
     fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {

@@ -334,7 +334,8 @@ fn alert_with_increased_priority_needs_a_new_acknowledgement() {
     assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
 }
 
-/// A dive begins with unverified mounts. The vehicle may swing during the first 30 s, before the alert asks for it.
+/// A dive begins with unverified mounts. The vehicle may swing during the first 30 s. After that, the alert asks for a
+/// swing.
 #[test]
 fn unverified_mounts_raise_a_caution_after_the_grace_period_until_they_are_verified() {
     let mut bench = Bench::new(0.0, 0.0);

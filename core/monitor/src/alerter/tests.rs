@@ -129,8 +129,8 @@ impl Bench {
 
     /// Applies the inputs up to the advice update before event number `beat`, or all inputs of the tick if `None`.
     ///
-    /// Returns the number of alerts raised, the number of those acknowledged, the number of commands
-    /// without effect, and the last reading's time.
+    /// Returns the number of alerts raised, the number of acknowledged alerts, the number of commands without effect,
+    /// and the last reading's time.
     fn until(&mut self, beat: Option<usize>) -> (u32, usize, u64, Option<u64>) {
         let Self { alerter, run, command, events } = self;
         let (runs, commands) = (core::slice::from_ref(run), core::slice::from_ref(command));

@@ -23,7 +23,7 @@ pub type NoteText = ShortText<MAX_NOTE_BYTES>;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "copied into preallocated room; a box would allocate")]
 pub enum Command {
-    /// Acknowledges the alert with this number; 0 acknowledges all that need it.
+    /// Acknowledges the alert with this number; 0 acknowledges all alerts that need acknowledgement.
     Acknowledge {
         /// Number of the alert.
         alert: u32,
@@ -209,7 +209,7 @@ fn quote(json: &mut String, key: &str, text: &str) {
 }
 
 impl Values {
-    /// Builds the command from the values read. All of its keys must be present, and no others.
+    /// Builds the command from the values read. All keys of the command must be present, and no other keys.
     fn command(self) -> Result<Command, &'static str> {
         let Self { what, alert, by, text, fails, battery_pct, id, seconds } = self;
         let what = what.ok_or("the key \"do\"")?;
@@ -282,7 +282,7 @@ impl Scan<'_> {
         self.at += self.rest().bytes().take_while(is_space).count();
     }
 
-    /// Skips blanks, and consumes `word` if it comes next. Returns true if it did.
+    /// Skips blanks. If `word` comes next, consumes it and returns true.
     fn has(&mut self, word: &str) -> bool {
         self.skip_space();
         let has = self.rest().starts_with(word);

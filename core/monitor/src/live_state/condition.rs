@@ -41,7 +41,8 @@ pub enum Condition {
     CannotSay(PositionDoubt),
     /// The speed is slightly over v_max.
     Over,
-    /// Position errors may make the present turn miss the target. At a speed nearer to v_max it would meet the target.
+    /// Position errors may make the present turn miss the target. At a speed nearer to v_max, the turn would meet the
+    /// target.
     TurnUnsure,
     /// The speed is within v_max.
     Good,

@@ -51,7 +51,7 @@ pub struct LiveStateJson {
     pub turn: Option<TurnJson>,
     /// Every sensor, in the order of the vehicle file.
     pub sensors: Vec<SensorJson>,
-    /// Metres of the coverage extent by verdict. `way_m` is their sum.
+    /// Length of each verdict within the coverage extent, and the sum `way_m` of these lengths.
     pub metres: MetresJson,
     /// Last judged stretch without a verdict.
     pub cannot_say: Option<StretchJson>,
@@ -107,7 +107,7 @@ pub struct MarginsJson {
     /// It is the confidence times the standard deviation of the position at one pass relative to the next
     /// pass.
     pub position_m: Option<f64>,
-    /// Share of lost returns; `None` unless they limit the speed.
+    /// Share of lost returns; `None` unless lost returns limit the speed.
     pub lost_share: Option<f64>,
 }
 
@@ -143,10 +143,10 @@ pub struct SensorJson {
     pub withheld: Option<String>,
 }
 
-/// Metres of the coverage extent by verdict, and their sum.
+/// Length of each verdict within the coverage extent, and the sum of these lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MetresJson {
-    /// Metres by verdict.
+    /// Length of each verdict, m.
     #[serde(flatten)]
     pub by_state: Metres,
     /// Length of the whole coverage extent, m: the sum over all verdicts.

@@ -163,7 +163,7 @@ pub struct LiveState {
     pub length_m: f64,
     /// Largest distance of a head ahead of or behind the vehicle's origin, m.
     pub heads_reach_m: f64,
-    /// Metres of the coverage extent by verdict.
+    /// Length of each verdict within the coverage extent.
     pub metres: Metres,
     /// Chainage at which the first missed stretch begins, m; `None` if no stretch is missed.
     pub missed_from_m: Option<f64>,
@@ -233,7 +233,7 @@ impl LiveState {
         }
     }
 
-    /// Chainage of the tunnel's end beyond which all heads are, m; `None` if a head may be inside the tunnel.
+    /// Chainage of the tunnel's end if all heads are beyond this end, m; `None` if a head may be inside the tunnel.
     pub fn outside_m(&self) -> Option<f64> {
         let x_m = self.chainage_m?;
         let beyond = x_m > self.length_m + self.heads_reach_m;
@@ -344,9 +344,9 @@ impl LiveState {
         self.speed_mps.is_some_and(|speed_mps| speed_mps < ASTERN_MPS)
     }
 
-    /// Share of lost returns; `None` unless they reduce the largest speed by at least a fifth.
+    /// Share of lost returns; `None` unless lost returns reduce the largest speed by at least a fifth.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Threshold: share of the speed that remains if losses cost a fifth of it.
+        /// Limit: share of the speed that remains if lost returns reduce the speed by a fifth.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;

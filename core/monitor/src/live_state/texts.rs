@@ -43,8 +43,8 @@ impl LiveState {
 
     /// Texts of the speed and its limit.
     ///
-    /// Both have the same number of decimals. The limit is rounded down. A speed over the limit is rounded up. Any
-    /// other speed is shown as at most the limit. The figures therefore agree with the condition.
+    /// Speed and limit have the same number of decimals. The limit is rounded down. A speed over the limit is rounded
+    /// up. Any other speed is shown as at most the limit. The figures therefore agree with the condition.
     pub fn speed_texts(&self) -> SpeedTexts {
         let is_now = !matches!(self.condition(), Condition::NoData | Condition::Old(_));
         let speed_mps = self.speed_mps.filter(|_| is_now).map(f64::abs);

@@ -124,7 +124,7 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
     }
 }
 
-/// Margin on either side of the occluded angles, radians. Beams within it may also return echoes from the
+/// Margin on either side of the occluded angles, radians. Beams within this margin may also return echoes from the
 /// vehicle.
 const BESIDE_RAD: f64 = 0.09;
 /// A return at an occluded angle is from the vehicle if its range is below this share of the range to the

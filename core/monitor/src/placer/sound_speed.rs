@@ -1,5 +1,4 @@
-//! Speed of sound during the dive, from the temperature of a depth sensor. Sonar readings are corrected for
-//! it.
+//! Speed of sound during the dive, from the temperature of a depth sensor. Sonar readings are corrected for this speed.
 
 use bevy_ecs::prelude::Resource;
 
@@ -11,7 +10,7 @@ use headrace_sensor::reading::{Decoded, Reading, SourceId};
 /// Plausible water temperatures, degrees Celsius. Outside this range the sensor is faulty or not in the
 /// water.
 const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;
-/// Time constant of the low-pass filter, s. Faster changes are sensor noise.
+/// Time constant of the low-pass filter of the speed of sound, s. Faster changes are sensor noise.
 const SLOWNESS_S: f64 = 60.0;
 
 /// The current speed of sound, measured or assumed.
@@ -41,8 +40,8 @@ impl SoundSpeed {
 
     /// Updates the speed of sound from a depth sensor, and corrects sonar readings.
     ///
-    /// Later stages rescale ranges to the site's speed. The speed stated by the device is therefore
-    /// multiplied by the ratio of the site's speed to the current one.
+    /// Later stages rescale ranges to the site's speed. The speed stated by the device is therefore multiplied by the
+    /// ratio of the site's speed to the current speed.
     pub(super) fn pass(&mut self, source: SourceId, decoded: &mut Decoded) {
         match &mut decoded.reading {
             Reading::Pressure(water)

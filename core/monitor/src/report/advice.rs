@@ -20,7 +20,8 @@ pub struct AdviceReport {
     /// Speed below which heads at different places along the hull run out of phase, m/s; zero if a lower
     /// speed always helps.
     pub from_mps: f64,
-    /// Speed nearest to the present speed that meets the target, m/s; `None` if the present speed meets it.
+    /// Speed that meets the target and is nearest to the present speed, m/s; `None` if the present speed meets the
+    /// target.
     pub nearest_mps: Option<f64>,
     /// Factor that limits the speed.
     pub reason: &'static str,
@@ -41,11 +42,11 @@ pub struct AdviceReport {
     /// Speed at which the present mode meets the target if the heads are set in phase again for this speed,
     /// m/s.
     pub restart_for_mps: Option<f64>,
-    /// Largest speeds that meet the target with the margins added one after the other.
+    /// Largest speeds that meet the target: without margins, then as each margin is added.
     pub margins: Option<MarginsReport>,
 }
 
-/// Largest speeds that meet the target with the margins added one after the other.
+/// Largest speeds that meet the target: without margins, then as each margin is added.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarginsReport {
     /// Largest speed for each number of margins, m/s.
@@ -62,7 +63,7 @@ pub struct AlternativeReport {
     pub mode: String,
     /// Largest speed that meets the target in this mode, m/s.
     pub v_max_mps: f64,
-    /// Hours needed for the rest of the tunnel at that speed.
+    /// Hours needed for the rest of the tunnel at this `v_max_mps`.
     pub needed_h: Option<f64>,
     /// Whether the remaining dive time is enough for the rest of the tunnel.
     pub suffices: Option<bool>,

@@ -6,8 +6,7 @@ use crate::resources::{Coverage, Tally};
 use crate::run::Loop;
 use headrace_fusion::NoFix;
 
-/// Largest share of pings without a position in an inspection. With a larger share, the dive's verdicts mean
-/// nothing.
+/// A dive with a larger share of pings without a position is no inspection, because its verdicts mean nothing.
 const MOST: f64 = 0.5;
 
 /// Coverage extent: whole sections of tunnel in which the vehicle or its heads have been, whether the heads
@@ -18,7 +17,7 @@ pub struct CoverageExtentReport {
     pub from_m: Option<f64>,
     /// End of the extent's last section, m.
     pub to_m: Option<f64>,
-    /// Length of the extent, m: the sum of the metres by verdict.
+    /// Length of the extent, m: the sum over all verdicts.
     pub length_m: f64,
 }
 

@@ -63,7 +63,7 @@ pub struct Report {
     pub coverage_extent: CoverageExtentReport,
     /// Summary figures of the dive as a whole.
     pub dive: DiveReport,
-    /// Metres by verdict, and spacings over all sections.
+    /// Length of tunnel by verdict, and spacings of the samples over all sections.
     pub summary: SummaryReport,
     /// Every section of the coverage extent, in the order of chainage.
     pub sections: Vec<SectionRow>,
@@ -81,7 +81,7 @@ pub struct Report {
     pub suggested_openings: Vec<SuggestedOpeningReport>,
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,
-    /// Metres by verdict for the additional targets and section lengths requested.
+    /// Length of tunnel by verdict, for each additional target and section length requested.
     pub other_targets: Vec<OtherTargetReport>,
     /// Names of the heads and their alternative settings, for the report as text.
     #[serde(skip)]
@@ -113,7 +113,7 @@ pub struct Report {
 pub struct LogReport {
     /// Path of the log, as given by the user.
     pub path: String,
-    /// SHA-256, hexadecimal. For a recording in parts, it is that of the concatenated parts.
+    /// SHA-256 of the log, hexadecimal. For a recording in parts: SHA-256 of the concatenated parts.
     pub sha256: String,
     /// Number of messages from sources in the log.
     pub messages: u64,
@@ -147,7 +147,7 @@ pub struct DiveReport {
     pub from_m: Option<f64>,
     /// Largest chainage reached by any head, m.
     pub to_m: Option<f64>,
-    /// Distance between the two chainages, m.
+    /// Distance between the smallest and the largest chainage, m.
     pub distance_m: f64,
     /// Whether any profiling head pinged. If none did, there is no coverage.
     pub sonar: bool,
@@ -182,18 +182,18 @@ pub struct RejectedReport {
     pub doubtful_returns: u64,
 }
 
-/// Metres by verdict, and spacings of the samples.
+/// Length of tunnel by verdict, and spacings of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SummaryReport {
-    /// Metres of sections that passed.
+    /// Length of the sections that passed.
     pub pass_m: f64,
-    /// Metres of sections that failed.
+    /// Length of the sections that failed.
     pub fail_m: f64,
-    /// Metres of sections undecided within the error of the hole.
+    /// Length of the sections that neither pass nor fail, although no more samples will land.
     pub cannot_say_m: f64,
-    /// Metres of sections still open.
+    /// Length of the sections still open.
     pub open_m: f64,
-    /// Metres of sections where some heads have not been, because the vehicle began or turned back there.
+    /// Length of the sections where some heads have not been, because the vehicle began or turned back there.
     pub not_inspected_m: f64,
     /// Number of failed sections that were flagged.
     pub flags_raised: u32,
@@ -287,7 +287,7 @@ impl Report {
         report
     }
 
-    /// Metres by verdict for the dive's own target and sections.
+    /// Length of tunnel by verdict, for the dive's own target and section length.
     pub fn metres(&self) -> OtherTargetReport {
         let sum = &self.summary;
         OtherTargetReport {
@@ -311,7 +311,7 @@ impl Report {
 }
 
 impl SummaryReport {
-    /// Sum of the metres by verdict, m.
+    /// Total length over all verdicts, m.
     pub fn way_m(&self) -> f64 {
         self.pass_m + self.fail_m + self.cannot_say_m + self.open_m + self.not_inspected_m
     }

@@ -14,11 +14,11 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 pub struct RunReport {
     /// Number of the stretch, which never changes.
     pub id: u32,
-    /// Main cause: the one that applies to most sections of the stretch.
+    /// Main cause: the cause that applies to most sections of the stretch.
     pub cause: Cause,
-    /// All causes of the stretch's sections: first the main one, then the others by frequency.
+    /// All causes of the stretch's sections: the main cause first, then the others by frequency.
     pub causes: Vec<Cause>,
-    /// Figures for the causes that the text names. Each comes from a section with that cause.
+    /// Figures for the causes that the text names. The figures for a cause come from a section with this cause.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
     /// Source ids of the heads that were silent in the section with the largest hole, or in the section that
@@ -28,11 +28,11 @@ pub struct RunReport {
     pub start_m: f64,
     /// End of the missed stretch, m.
     pub end_m: f64,
-    /// Metres of the stretch that fail at present.
+    /// Length of the stretch's sections that fail at present, m.
     pub failed_m: f64,
     /// Diameter of the stretch's largest hole, m. For a cleared stretch, the diameter before it was cleared.
     pub hole_m: f64,
-    /// Chainage of that hole's centre, m.
+    /// Chainage of the largest hole's centre, m.
     pub hole_x_m: f64,
     /// Clock position of the hole's centre, looking along the tunnel.
     pub hole_clock: String,
@@ -63,11 +63,10 @@ pub struct ReturnReport {
     pub actions: Vec<Action>,
     /// Maximum speed for passing the stretch again, m/s.
     ///
-    /// It is the planned speed if that meets the target. It is zero if no speed meets the target in this
-    /// mode.
+    /// It is the planned speed if the planned speed meets the target, and zero if no speed in this mode does.
     pub at_most_mps: f64,
-    /// Duration of passing the stretch at that speed, seconds. It includes a second pass if the vehicle has
-    /// to roll to each side.
+    /// Duration of passing the stretch at `at_most_mps`, seconds. It includes a second pass if the vehicle has to roll
+    /// to each side.
     pub takes_s: Option<f64>,
 }
 
@@ -101,7 +100,7 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
         .collect()
 }
 
-/// Metres of a missed stretch that fail at present.
+/// Length of a missed stretch's sections that fail at present, m.
 ///
 /// A section may keep its flag although it no longer has a verdict. Such sections don't count.
 fn failed_m(sections: &Sections, run: &Run) -> f64 {

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-/// Verdicts of a dive with the trajectory that the navigation filter alone gives, compared with those after
-/// smoothing.
+/// Verdicts of a dive on the navigation filter's own trajectory, compared with the verdicts on the smoothed trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmoothingReport {
     /// Digest of the results with the navigation filter alone.
@@ -12,26 +11,26 @@ pub struct SmoothingReport {
     pub estimates: u64,
     /// Number of contiguous pieces of the smoothed trajectory.
     pub pieces: u64,
-    /// Metres by verdict with the navigation filter alone.
+    /// Length of tunnel by verdict with the navigation filter alone.
     pub before: MetresReport,
-    /// Metres by verdict after smoothing.
+    /// Length of tunnel by verdict after smoothing.
     pub after: MetresReport,
     /// Sections whose verdict has changed, in the order of chainage.
     pub changed: Vec<ChangeReport>,
 }
 
-/// Metres of tunnel by verdict.
+/// Length of tunnel by verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MetresReport {
-    /// Metres of sections that passed.
+    /// Length of the sections that passed.
     pub pass_m: f64,
-    /// Metres of sections that failed.
+    /// Length of the sections that failed.
     pub fail_m: f64,
-    /// Metres of sections undecided within the error of the hole.
+    /// Length of the sections that neither pass nor fail, although no more samples will land.
     pub cannot_say_m: f64,
-    /// Metres of sections still open.
+    /// Length of the sections still open.
     pub open_m: f64,
-    /// Metres of sections where some heads have not been.
+    /// Length of the sections where some heads have not been.
     pub not_inspected_m: f64,
 }
 

@@ -17,7 +17,7 @@ pub struct SurveyReport {
     pub enough: u16,
     /// Number of nodes in the coverage extent.
     pub nodes: u32,
-    /// Share of these nodes that have enough samples; `None` if there are no nodes.
+    /// Share of the nodes in the coverage extent that have enough samples; `None` if there are no nodes.
     pub enough_share: Option<f64>,
     /// Number of nodes in the coverage extent without a sample.
     pub empty: u32,

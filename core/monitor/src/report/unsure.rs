@@ -15,11 +15,11 @@ pub struct NoVerdictReport {
     pub start_m: f64,
     /// End of the stretch, m.
     pub end_m: f64,
-    /// Metres of the stretch's sections that neither pass nor fail.
+    /// Length of the stretch's sections that neither pass nor fail, m.
     pub no_verdict_m: f64,
     /// Diameter of the stretch's largest hole, m.
     pub hole_m: f64,
-    /// Standard deviation of that diameter, m.
+    /// Standard deviation of the largest hole's diameter, m.
     pub hole_sd_m: f64,
     /// The stretch without a verdict, for the report as text.
     #[serde(skip)]

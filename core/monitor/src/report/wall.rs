@@ -15,7 +15,7 @@ pub struct WallStretchReport {
     pub from_m: f64,
     /// End of the stretch, m.
     pub to_m: f64,
-    /// Mean deviation of its samples from the design, m; positive is outside.
+    /// Mean deviation of the stretch's samples from the design, m; positive is outside.
     pub mean_m: f64,
     /// Largest inward deviation, m; never above zero.
     pub inmost_m: f64,

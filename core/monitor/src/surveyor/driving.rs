@@ -32,9 +32,9 @@ const RAYS: u32 = 72;
 const MOVED_M: f64 = 0.05;
 /// Heads are in phase if the time between passes is at most this multiple of the scheduled time.
 const IN_STEP: f64 = 1.05;
-/// Number of classes of the places in a sector. The classes differ in the wait until the head's next pass.
+/// Number of classes into which places in a sector are divided, by the wait until the head's next pass.
 ///
-/// At an end of the sector, this wait is a whole sweep there and back. In the middle it is half of that.
+/// At an end of the sector, this wait is a whole sweep there and back. In the middle, the wait is half as long.
 const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
@@ -97,8 +97,7 @@ impl Driving {
         self.looks.keep(at, look);
     }
 
-    /// Updates the fitting speed, which is the largest one that meets the target, if the heads' passes have
-    /// changed.
+    /// Updates the fitting speed, the largest speed that meets the target, if the heads' passes have changed.
     fn note_fit(&mut self, healthy: &Situation, plan: &Plan) {
         let now = &mut self.now;
         let margin_m = position_margin_m(plan.target, healthy.pass_error_m, now.middle_t_y_m);

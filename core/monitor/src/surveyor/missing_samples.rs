@@ -22,8 +22,8 @@ use headrace_sampling::passes::Situation;
 
 /// Time without a ping at a new angle after which a head's samples count as missing.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);
-/// Some angles are assumed to be occluded. This number of latest pings at these angles decides whether they are,
-/// and this share of lost pings confirms it.
+/// Number of latest pings at angles assumed to be occluded that decide whether the angles are really occluded, and
+/// share of lost pings that confirms it.
 const HIDDEN_PINGS: u16 = 600;
 const HIDDEN_SHARE: f64 = 0.7;
 /// Maximum number of pings without a fix that are kept. It suffices for over two minutes of four heads.
@@ -156,7 +156,7 @@ impl MissingSampleFinder {
     }
 }
 
-/// Records a ping. If it was aimed at the wall and gave no return, it is a missing sample.
+/// Records a ping. If the ping was aimed at the wall and gave no return, it is a missing sample.
 pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, lacks: &mut MissingSamples) {
     if ping.standing {
         lacking.stalled = lacking.stalled.with(ping.head);
@@ -365,7 +365,7 @@ impl Way {
         (self.to.1.position.x() - self.from.1.position.x()).abs() / seconds
     }
 
-    /// Pose at a time between the two fixes. The attitude is that of the nearer fix.
+    /// Pose at a time between the two fixes. The attitude is taken from the nearer fix.
     fn at(&self, at: MonoNs) -> Pose {
         let whole_s = self.to.0.since(self.from.0).as_secs_f64().max(1e-3);
         let share = (at.since(self.from.0).as_secs_f64() / whole_s).clamp(0.0, 1.0);
@@ -401,8 +401,7 @@ impl Placing<'_> {
         // causes.
         let made = why == Causes::of(Cause::PositionLost);
         if ping.is_lost {
-            // If the head could not have detected the wall at this point anyway, its loss is not due to
-            // chance.
+            // If the head could not have detected the wall at this point anyway, the ping's loss is not due to chance.
             let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
             let is_far = wall.range_m > self.turning.longest_m;
             let is_hidden = self.turning.is_hidden() && (self.hidden)(ping.angle_rad);

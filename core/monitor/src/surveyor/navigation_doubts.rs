@@ -94,7 +94,8 @@ mod tests {
         })
     }
 
-    /// All samples of a head that points elsewhere are displaced: first those of the whole dive, then the new ones.
+    /// All samples of a head that points elsewhere are displaced: first the samples of the whole dive, then the new
+    /// samples.
     #[test]
     fn samples_of_a_head_that_points_elsewhere_are_suspected_from_the_beginning() {
         for setting in [Setting::HeadYawed(0.05), Setting::HeadPitched(-0.05), Setting::WrongWayRound] {

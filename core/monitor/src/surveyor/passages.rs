@@ -97,8 +97,8 @@ mod tests {
         assert_eq!(coverage.sections.get(28).unwrap().passage, elsewhere);
     }
 
-    /// A ping is no evidence of the speed if two standard deviations of its position relative to the previous
-    /// pass reach the target. The error of a hole is 1.2 times that of a pass.
+    /// A ping is no evidence of the speed if two standard deviations of its position relative to the previous pass
+    /// reach the target. The error of a hole is 1.2 times the error of a pass.
     #[test]
     fn ping_with_an_uncertain_position_is_no_evidence_of_the_speed() {
         let profile = pipe();

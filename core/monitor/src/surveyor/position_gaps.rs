@@ -10,7 +10,7 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::passes::Situation;
 
-/// Maximum number of listed gaps. Beyond it, the two oldest gaps become one.
+/// Maximum number of listed gaps. Beyond this number, the two oldest gaps become one.
 const MOST_GAPS: usize = 32;
 /// Duration of the shortest listed gap. The alignment of the filter takes a second at the start of a dive.
 const SHORTEST: DurNs = DurNs(5_000_000_000);
@@ -30,7 +30,8 @@ pub struct PositionGap {
     pub from_m: Option<f64>,
     /// Chainage at the end of the gap, m; `None` if it can't be predicted.
     ///
-    /// After the gap this is the first fix. Until then it is predicted from the mean speed before the gap.
+    /// After the gap, it is the chainage of the first fix. Until then it is predicted from the mean speed before the
+    /// gap.
     pub to_m: Option<f64>,
     /// Whether a fix has ended the gap, so that `to_m` is measured.
     pub is_over: bool,

@@ -12,7 +12,7 @@ use headrace_sampling::spacing;
 
 /// Stores a sample, and adds its spacings to its section.
 ///
-/// `is_confirming` means that another head has found wall with the same deviation from the design there.
+/// `is_confirming` means that another head has found wall with the same deviation from the design at the same place.
 pub(super) fn note_sample(
     coverage: &mut Coverage,
     sweep: &mut HeadSweep,

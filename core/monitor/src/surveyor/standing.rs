@@ -1,4 +1,4 @@
-//! Reports metres by verdict and the observations that hold at an advice update.
+//! Reports the length of each verdict and the observations that hold at an advice update.
 
 use bevy_ecs::prelude::{Query, Res};
 

@@ -36,7 +36,7 @@ pub(super) struct Requests(pub(super) Vec<Request>);
 /// Results of the surveyor in a tick.
 #[derive(Debug, Resource)]
 pub struct Found {
-    /// Metres by verdict and observations that hold, at each advice update, in order.
+    /// Length of each verdict and observations that hold, at each advice update, in order.
     pub standings: Vec<Standing>,
     /// Changed missed stretches, in order.
     pub(crate) runs: Vec<RunInput>,

@@ -18,7 +18,7 @@ use headrace_coverage::{Cause, Causes, Loss, MissingSample, StoreError, Taken};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::tunnel::WallPoint;
 
-/// Distance beyond either end of the tunnel from which samples are recorded as outside, m.
+/// Samples farther than this beyond either end of the tunnel are recorded as outside, m.
 const WELL_BEYOND_M: f64 = 1.0;
 
 /// Inputs and outputs of processing classified returns, without the head.
@@ -119,7 +119,7 @@ fn settle(
     }
 }
 
-/// Applies a return from wall. `is_confirming` as in [`Sorted`](headrace_coverage::Sorted).
+/// Applies a return from wall. `is_confirming` has the same meaning as in [`Sorted`](headrace_coverage::Sorted).
 fn wall(context: &mut WallContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing, is_confirming: bool) {
     context.tally.samples += 1;
     digest(context.outputs.digests, ping, RecordKind::Sample);
@@ -333,8 +333,8 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
-    /// All returns but the first are from a rock. Pings that arrive while the first return waits take effect when
-    /// it is classified.
+    /// All returns but the first are from a rock. Pings that arrive while the first return waits take effect when that
+    /// return is classified.
     #[test]
     fn lost_ping_after_an_undecided_return_interrupts_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {

@@ -27,9 +27,10 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Diameter D of the largest hole from all candidate maxima of f, without any code of the search under test.
+/// Diameter of the largest hole, from all places where the distance to the samples may be largest, without any code of
+/// the search under test.
 ///
-/// Candidates are the circumcentres of three samples (or of their images), and points on the section's two ends that
+/// These places are the circumcentres of three samples (or of their images), and points on the section's two ends that
 /// are equidistant from two samples.
 fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
     let images: Vec<(f64, f64)> =
@@ -101,7 +102,8 @@ proptest! {
     /// The exact diameter D lies within the bounds found by a search with a tolerance. The bounds are at most
     /// the tolerance apart.
     ///
-    /// A verdict from these bounds equals the verdict from the exact D, or is undecided if T lies between the bounds.
+    /// A verdict from these bounds equals the verdict from the exact D, or is undecided if the target T lies between
+    /// the bounds.
     #[test]
     fn bounds_of_a_search_with_tolerance_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -191,8 +193,8 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// D depends neither on the order of the samples, nor on the seam of the unrolled wall, nor on the origin
-    /// of the chainage.
+    /// The diameter D depends neither on the order of the samples, nor on the seam of the unrolled wall, nor on the
+    /// origin of the chainage.
     #[test]
     fn hole_is_independent_of_sample_order_seam_and_chainage_origin(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
@@ -250,7 +252,7 @@ fn hole_of_samples_with_nanometre_and_metre_spacings_is_correct() {
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel, D is the same to within the floating-point precision at that chainage.
+/// Far along the tunnel, the diameter D is the same to within the floating-point precision at that chainage.
 #[test]
 fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =

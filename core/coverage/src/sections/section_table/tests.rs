@@ -124,7 +124,8 @@ fn verdict_is_cannot_say_if_the_hole_bounds_straddle_the_target() {
     assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
 }
 
-/// Judges a section of a pipe after two visits. Each visit leaves a square mesh of samples; `meshes_m` are its widths.
+/// Judges a section of a pipe after two visits. Each visit leaves a square mesh of samples; `meshes_m` are the mesh
+/// widths.
 ///
 /// With `is_related`, both visits belong to one navigation segment. Returns the verdict, the hole's diameter, m, and
 /// the first visit that counts.

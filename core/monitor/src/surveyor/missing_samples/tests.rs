@@ -48,8 +48,8 @@ fn angle_is_hidden_if_most_pings_get_no_return() {
     assert!(!hides([10_000, 400]), "the last hundreds of pings got returns");
 }
 
-/// The simulated pings of a silent head are lost as often, and in series as long, as its real pings were. The
-/// same times always give the same losses.
+/// The simulated pings of a silent head are lost as often as its real pings were, and in equally long series. The same
+/// times always give the same losses.
 #[test]
 fn simulated_losses_match_the_share_and_clustering_of_real_losses() {
     let lost = |rate: LossRate| {
