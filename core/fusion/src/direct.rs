@@ -21,8 +21,7 @@ use headrace_sensor::reading::{EchoRange, Level, MAX_SOURCES, Reading, TetherLen
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
-/// The speed comes from the cable readings of this time window; the next constant is the maximum number of these
-/// readings.
+/// The speed comes from the cable readings within `SPEED_WINDOW`, of which there are at most `SPEED_READINGS`.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Standard deviation of an echosounder's range, m.
@@ -38,7 +37,7 @@ pub struct DirectNavigation {
     tether: TetherTrack,
     echoes: [Option<(MonoNs, Echo)>; MAX_SOURCES],
     place: Option<(MonoNs, [f64; 2])>,
-    /// `height_m` is the height from pressure, m. The offset makes this height agree with the echoes.
+    /// `height_m` is the height from pressure, m. `height_offset_m` makes this height agree with the echoes.
     height_m: Option<f64>,
     height_offset_m: f64,
 }

@@ -537,7 +537,7 @@ impl Advisor {
             && (passes.turn_s() - period_s).abs() < SAME * period_s
     }
 
-    /// Returns the largest speed after each margin of the target is added in turn.
+    /// Returns the largest speed without margins, with the first margin, with the first two, and so on.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
         /// Number of speeds in the margins that do not allow for swing.
         const BEFORE_SWING: usize = 3;

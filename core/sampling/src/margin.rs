@@ -163,7 +163,7 @@ impl Margin {
     }
 }
 
-/// Largest speed after each margin is added in turn, m/s; no speed exceeds the speed before it.
+/// Largest speeds without margins, with the first margin, with the first two, and so on, m/s; they never increase.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.

@@ -31,7 +31,7 @@ pub struct BiasDrift([Ratio; 2]);
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Ratio {
-    /// Decaying sums: `corrected` of the squared corrections, the next field of their expected squares.
+    /// Decaying sums: `corrected` of the squared corrections, `expected` of their expected squares.
     corrected: f64,
     expected: f64,
     factor: f64,

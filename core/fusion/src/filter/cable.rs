@@ -35,8 +35,8 @@ const RETURNED_AFTER: DurNs = DurNs(500_000_000);
 /// A reading that agrees with the estimate proves that the counter has lost no length, but only if the innovation's sd
 /// is at most this, m.
 const SURE_M: f64 = 0.3;
-/// The counter has caught up with the vehicle if it lacks at most `MISSING_SHARE` of the distance travelled since the
-/// disagreement began, plus `MISSING_M`.
+/// The counter has caught up with the vehicle if it differs from the estimate by at most `MISSING_SHARE` of the
+/// distance travelled since the disagreement began, plus `MISSING_M`.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
 /// The counter follows the vehicle if their distances differ by at most `SAME_SHARE` of the distance, plus `SAME_M`.
@@ -136,8 +136,8 @@ struct Dispute {
     agreeing_from: Option<MonoNs>,
     /// Counter reading when the difference from the estimate first exceeded `LOST_M`, m.
     lost_from_m: Option<f64>,
-    /// Since the first withheld reading: `longest_m` is the longest distance, by counter or estimate. The next field is
-    /// the largest difference between the two, m.
+    /// Since the first withheld reading: `longest_m` is the longest distance, by counter or estimate. `most_m` is the
+    /// largest difference between the two, m.
     longest_m: f64,
     most_m: f64,
 }

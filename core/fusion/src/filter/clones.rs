@@ -4,9 +4,8 @@
 //! compares two head passes. It is smaller than the error of either position. A sample stays where it was
 //! georeferenced, so its error is that of the estimate at the time of its ping.
 //!
-//! Each clone is a copy of the error covariance at its time. It also keeps the transition of errors since the previous
-//! clone. The transition includes propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative
-//! uncertainty".
+//! Each clone keeps the error covariance at its time, and the transition of errors since the previous clone. The
+//! transition includes propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative uncertainty".
 
 use serde::{Deserialize, Serialize};
 

@@ -15,7 +15,7 @@ pub struct CounterZero {
     restarts: u32,
     /// Time of the counter's last reading.
     heard: Option<MonoNs>,
-    /// `others` is the time of the last reading of any other sensor. The next field is the longest silence of all other
+    /// `others` is the time of the last reading of any other sensor. `silence` is the longest silence of all other
     /// sensors since the counter's last reading.
     others: Option<MonoNs>,
     silence: DurNs,

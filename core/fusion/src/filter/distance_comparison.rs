@@ -26,14 +26,12 @@ use headrace_sensor::reading::{Reading, SourceId};
 
 /// Time windows over which distances are compared, s.
 const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
-/// `EVERY` is the time between two rows of distances. The next constant is the number of rows that the longest window
-/// needs.
+/// `EVERY` is the time between two rows of distances. `ROOM` rows suffice for the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// `READINGS` is the maximum number of kept readings of a source; the next constant is the minimum time between two of
-/// them.
+/// At most `READINGS` readings of a source are kept, at least `NEAR` apart.
 ///
-/// Together they cover more than the filter's longest window at any reading rate.
+/// Together, these readings cover more than the filter's longest window at any reading rate.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
 /// Duration of silence after which a source is no longer compared. It is this long because a velocity log may send a
@@ -341,8 +339,8 @@ mod tests {
     fn velocity_log_wrong_by_a_fifth_is_reported_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
-        // The vehicle travels about 12 m in a window of a minute, and the log shows a fifth too much, which is up to
-        // 2.4 m. The limits below are wider, because the speed varies.
+        // In a window of a minute, the vehicle travels about 12 m, so the log shows about 2.4 m too much. In windows
+        // with slow motion, this difference is smaller.
         assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
         assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
     }

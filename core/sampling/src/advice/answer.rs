@@ -210,7 +210,7 @@ pub struct Advice {
     pub alternatives: [Option<Alternative>; MAX_MODES],
     /// Restart of the heads in phase for the best speed; `None` if the heads' phases do not depend on the speed.
     pub anew: Option<Anew>,
-    /// Largest speeds after each margin is added in turn, which show each margin's cost; updated every five seconds.
+    /// Largest speeds with more and more margins, which show what each margin costs; updated every five seconds.
     pub margins: Option<Margins>,
     /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,

@@ -50,7 +50,8 @@ pub struct Answer {
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,
-    /// The largest speed after each margin is added in turn; the last speed is `v_max_mps`.
+    /// The largest speeds without margins, with the first margin, with the first two, and so on; the last is
+    /// `v_max_mps`.
     pub margins: Option<Margins>,
     /// Time for the whole length of the tunnel at `v_max_mps`, hours.
     pub needed_h: Option<f64>,

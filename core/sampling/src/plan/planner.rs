@@ -203,7 +203,8 @@ impl Planner {
         errors.pass_error_m(margin::error_time_s(passes_per_s, apart_m, speed_mps, APART_SHARE))
     }
 
-    /// Returns the largest speed in a mode for a target, after each margin is added in turn.
+    /// Returns a mode's largest speed for a target without margins, with the first margin, with the first two, and so
+    /// on.
     ///
     /// Errors: as for [`Planner::v_max_mps`].
     pub fn margins(&self, mode: usize, target_m: f64) -> Result<Margins, SamplingError> {
