@@ -1,4 +1,4 @@
-//! Navigation without a filter, as in Jorge et al. 2021, §9.2. It is the baseline with which the filter is compared.
+//! Navigation without a filter, as in Jorge et al. 2021, §9.2: the baseline for judging the filter.
 //!
 //! Attitude comes from the IMU and chainage from the tether. The position in the cross-section is the best fit of the
 //! echosounders' ranges to the design profile. While the echosounders are silent, height comes from the depth sensor.

@@ -59,7 +59,7 @@ impl Site {
         self.surface_pressure_pa + depth_m * self.density_kgpm3 * self.gravity_mps2
     }
 
-    /// Rescales a range, m, from the speed of sound `device_mps`, which the device used, to that of the water.
+    /// Rescales a range, m, from the speed of sound `device_mps`, which the device assumed, to the water's.
     pub fn rescaled_range_m(&self, range_m: f64, device_mps: f64) -> f64 {
         range_m * (self.sound_speed_mps / device_mps)
     }

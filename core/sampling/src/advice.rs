@@ -201,7 +201,7 @@ impl Advisor {
     /// Returns the largest speed at which the predicted T_max stays within the target.
     ///
     /// The function inverts Eq. 16 with measured values: the turn period, step, number and phases of the heads, the
-    /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. It propagates the phases
+    /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. The phases are propagated
     /// to each tested speed. `left_s` is the remaining time, if known.
     ///
     /// Heads that are apart along the hull keep their phases only in some intervals of speed. The result is the upper

@@ -41,8 +41,8 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 /// Part of a target reserved for position errors, m.
 ///
 /// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
-/// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth
-/// of the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
+/// distance between neighbouring samples of one turn. The margin is continuous in all inputs, and at most a fifth of
+/// the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
 /// without margin. A larger margin would slow the vehicle by more than it is worth.
 pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
     let target_m = target.max_hole_m;

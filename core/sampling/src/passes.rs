@@ -194,7 +194,7 @@ impl Phasing {
     /// Mean distance along the hull between heads that successively pass a place, as a share of [`Phasing::apart_m`].
     ///
     /// The share is 1 for two heads. It is a half for two pairs of side-by-side heads if the heads of a pair follow
-    /// each other. It is zero if all heads are at the same place along the hull.
+    /// each other. The share is zero if all heads are at the same place along the hull.
     pub fn neighbours_apart(&self) -> f64 {
         let apart_m = self.apart_m();
         if apart_m <= 0.0 {

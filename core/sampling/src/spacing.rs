@@ -88,7 +88,7 @@ impl Spiral {
     /// rest.
     ///
     /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with the distance of a single step.
-    /// [`Spiral::t_y_mean_m`] uses the advance between two pings instead. Reports show both values.
+    /// [`Spiral::t_y_mean_m`] uses the advance between two pings instead.
     /// Source: Eq. 15.
     pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)

@@ -24,10 +24,10 @@ const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
 /// Longest time between two stamps for which one update moves the usual delay, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// Smaller delays of a sample are not corrected. They come from clock ticks and from the time to send its frames.
+/// A delay below this is not corrected, because clock ticks and the sending of a sample's frames cause such delays.
 const LEAST: DurNs = DurNs(1_000_000);
-/// Larger delays of a sample are not corrected. A stopped device clock also looks like a delay, and navigation waits no
-/// longer than this for samples.
+/// A delay above this is not corrected. It may come from a stopped device clock, and navigation waits no longer than
+/// this for samples.
 const MOST: DurNs = DurNs(150_000_000);
 
 /// Corrects the times of the samples of a device with a clock. Allocates: never.

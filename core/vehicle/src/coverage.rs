@@ -52,7 +52,7 @@ impl CoverageConfig {
 
     /// Reads the tables `[coverage]` and `[[openings]]` from the root of a vehicle file.
     ///
-    /// The second value is the confidence of verdicts.
+    /// The second value of the result is the confidence of verdicts.
     ///
     /// `profile` or `target_m` is `None` if its keys in the file are invalid. Even then, the two tables are checked as
     /// far as possible.

@@ -152,8 +152,8 @@ impl ErrorClones {
 
     /// Computes the covariance of each older clone relative to the newest one.
     ///
-    /// The method goes back through the clones. At each clone, it updates the matrix that maps the clone's errors to
-    /// those of the newest clone.
+    /// The method goes back through the clones. At each clone, the method updates the matrix that maps the clone's
+    /// errors to those of the newest clone.
     fn compare(&mut self) {
         let Some(now) = self.newest().copied() else {
             debug_assert!(false, "there is a clone to compare with: {} so far", self.count);

@@ -2,7 +2,7 @@
 //!
 //! The comparison detects differences that the data sheets do not explain. It uses only readings and the estimated
 //! chainage, and never the filter's covariance, gates or learnt noise. So the comparison still works when the filter
-//! has settled on a wrong speed. The inertial unit is not compared here, because it only measures changes of speed;
+//! has settled on a wrong speed. The inertial unit is not compared here, because it measures only changes of speed;
 //! `slack_level.rs` compares it with the counter.
 //!
 //! Over a time window of W seconds, a difference in m counts if it exceeds the following limit. In it, n is the
@@ -67,8 +67,8 @@ pub(super) struct DistanceComparison {
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
     /// Rows of the distances by each source at one time, m; NaN for a missing distance.
     rows: Vec<(MonoNs, [f64; 3])>,
-    /// Time since which the distance by cable has differed from that by the velocity log, then from that by the
-    /// estimate.
+    /// Times since which the distance by cable has differed: first from the distance by velocity log, second from that
+    /// by the estimate.
     since: [Option<MonoNs>; 2],
     doubt: Option<CableDoubt>,
     /// Value of [`super::eskf::Eskf::ties`] at the last comparison.

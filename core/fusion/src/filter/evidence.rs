@@ -53,8 +53,8 @@ pub(super) struct Fit {
     values_2: f64,
 }
 
-/// Comparison of a sonar's residuals at its configured mount with those at an alternative. The alternative is the mount
-/// of another sonar, or the configured mount turned by half a turn.
+/// Comparison of a sonar's residuals with its configured mount and with an alternative mount. The alternative is the
+/// mount of another sonar, or the configured mount turned by half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Alternative {
     pub(super) source: u16,

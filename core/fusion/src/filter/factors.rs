@@ -178,7 +178,7 @@ impl<const N: usize> Factors<N> {
         core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
     }
 
-    /// Returns the elements of U above the diagonal and those of D, column by column.
+    /// Returns the elements of U above the diagonal and the elements of D, column by column.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let columns = self.u.iter().zip(&self.d).enumerate();
         columns.flat_map(|(j, (column, d))| column.iter().take(j).copied().chain([*d]))

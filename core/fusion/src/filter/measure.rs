@@ -167,8 +167,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
     let across = 1.0 - along.x() * along.x();
-    // The second derivative by position is that of a circular wall around the sonar. That by rotation is that of height
-    // / cos(incidence).
+    // By position, the second derivative is that of the range to a circular wall around the sonar. By rotation, it is
+    // that of height / cos(incidence).
     let secant = 1.0 / cosine;
     let by_turn = expected_m * (2.0 * secant * secant - 1.0);
     let tangent = math::sqrt((secant * secant - 1.0).max(0.0));

@@ -93,7 +93,7 @@ mod tests {
         for speed_mps in [0.05, 0.11, 0.2] {
             let schedule = Schedule::new(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
             let programs = layout::programs(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
-            // Several moments of a sweep there and back, including those near the turning points.
+            // Several moments of a sweep there and back, including moments near the turning points.
             for moment in 0..50 {
                 let at_s = 7.0 + 0.083 * f64::from(moment);
                 let legs = legs_at(&schedule, &specs, &programs, at_s);

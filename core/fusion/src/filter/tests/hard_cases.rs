@@ -394,8 +394,8 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the gyro bias is known, within the time that the advice first stated. It does
-/// not return.
+/// The advice to stand still ends once the gyro bias is known, within the time that the advice first stated. The advice
+/// does not return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
