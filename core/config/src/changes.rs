@@ -20,7 +20,7 @@ const ID: &str = "id";
 /// - `sensors.all.key` changes the key in every table of the array in which the key is present.
 /// - An array that is missing from `text`, such as `openings = [{ .. }]`, is added at the start.
 ///
-/// Errors: `text` is not TOML, or a key in `changes`, other than an array of tables, does not exist in `text`.
+/// Errors: `text` is not TOML, or a key in `changes` is missing from `text` and is no such array.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
     let mut changed = String::new();

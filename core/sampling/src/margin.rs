@@ -20,8 +20,8 @@ const MOST_SHARE: f64 = 0.2;
 ///
 /// The share is below 1, because only some neighbouring passes are by these two heads, and holes between their passes
 /// grow by less than the heads' separation. With this share, 93 % of the errors of a hole's size D are within two
-/// standard deviations, in the dives of `tests/tests/navigation/fusion.rs` with four heads. In similar dives, it is 80
-/// % of the errors with a share of 0, and 99 % with a share of 1.
+/// standard deviations, in the dives of `tests/tests/navigation/fusion.rs` with four heads. In similar dives, these are
+/// 80 % of the errors with a share of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as at rest, m/s.
 const SLOW_MPS: f64 = 0.01;
