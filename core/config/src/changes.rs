@@ -17,10 +17,10 @@ const ID: &str = "id";
 ///
 /// - `heads.layout = "x"` changes a key of a table.
 /// - `sensors.ID.key` changes a key of the table with this id in an array of tables.
-/// - `sensors.all.key` changes the key in every table of the array that has it.
+/// - `sensors.all.key` changes the key in every table of the array in which the key is present.
 /// - An array that is missing from `text`, such as `openings = [{ .. }]`, is added at the start.
 ///
-/// Errors: `text` is not TOML, or another key in `changes` does not exist in `text`.
+/// Errors: `text` is not TOML, or a key in `changes` is missing from `text` and is no such array.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
     let mut changed = String::new();

@@ -1,12 +1,12 @@
-//! A TOML text with its file name: parses the root table and finds the lines of keys.
+//! A TOML text with its file name: parses the root table and finds the line number of a key.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
-/// Maximum length of a TOML text, bytes: about a hundred times the length of a long vehicle file. Parsing a text
-/// takes many times its length in memory.
+/// Maximum length of a TOML text, bytes: about a hundred times the length of a long vehicle file. The limit is needed
+/// because parsing takes many times the text's length in memory.
 const MAX_TEXT_BYTES: usize = 1 << 20;
 
 /// A TOML text and its file name.
@@ -22,7 +22,7 @@ impl<'a> Document<'a> {
         Self { file, text }
     }
 
-    /// Parses the root table of the TOML text.
+    /// Parses the TOML text into its root table.
     pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
         self.is_short()?;
         DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| self.broken(&error))

@@ -23,7 +23,7 @@ pub struct ConfigError {
 }
 
 impl ConfigError {
-    /// Formats the parts of the error without escaping special characters.
+    /// Formats the error as one text, without escaping special characters.
     fn text(&self) -> String {
         let Self { file, line, key, value, problem } = self;
         let value = value.as_ref().map(|value| format!(" = {value}")).unwrap_or_default();
@@ -38,8 +38,8 @@ pub struct ConfigErrors(Vec<ConfigError>);
 impl ConfigErrors {
     /// Sorts the errors by line and removes duplicates; `None` if there are no errors.
     pub(super) fn of(mut errors: Vec<ConfigError>) -> Option<Self> {
-        // The sort is stable: errors of one line stay in the order of discovery. Errors from several files are not
-        // sorted.
+        // The sort is stable: errors of one line stay in the order of discovery. If the errors come from several files,
+        // they are not sorted.
         let file = errors.first()?.file.clone();
         if errors.iter().all(|error| error.file == file) {
             errors.sort_by_key(|error| error.line);
@@ -60,7 +60,7 @@ impl ConfigErrors {
         Some(Self(each))
     }
 
-    /// Appends the errors of a second file to which this file refers.
+    /// Appends the errors of another file to which this file refers.
     #[must_use]
     pub fn and(mut self, others: Self) -> Self {
         self.0.extend(others.0);
@@ -92,8 +92,8 @@ impl fmt::Display for ConfigErrors {
 
 impl std::error::Error for ConfigErrors {}
 
-/// Maximum number of reported errors of a file. Nobody reads more errors, and a file that is not TOML may have an
-/// error in each line.
+/// Maximum number of reported errors of a file. A file that is not TOML may have an error in each line, and nobody
+/// reads so many.
 pub(super) const MOST_ERRORS: usize = 100;
 
 /// Errors found so far in one document; `None` if reading stops at the first error.
@@ -124,7 +124,7 @@ impl Notes {
         self.0.as_ref()?.borrow().iter().find(|error| is_so(error)).cloned()
     }
 
-    /// Whether more errors were found than will be reported.
+    /// Whether more errors were found than are reported at most.
     pub(super) fn are_enough(&self) -> bool {
         self.count() > MOST_ERRORS
     }

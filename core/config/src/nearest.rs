@@ -1,7 +1,7 @@
 //! Search for the known word that the author of a file may have intended.
 
-/// Maximum number of edits between a word and the intended word: `FEW` for short words, `MORE` from `LONG` letters
-/// on.
+/// Maximum number of edits between a word and the intended word: `MORE` if the word has at least `LONG` letters, else
+/// `FEW`.
 const FEW: usize = 1;
 const MORE: usize = 2;
 const LONG: usize = 6;

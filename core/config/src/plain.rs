@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 /// Returns a text as one visible line. A JSON text remains valid JSON.
 ///
-/// Escapes as in JSON replace control characters, line ends included, and characters that reverse or hide others.
+/// JSON escapes replace control characters, line ends, and characters that reverse or hide other characters.
 pub fn one_line(text: &str) -> Cow<'_, str> {
     escaped(text, acts)
 }
@@ -22,7 +22,7 @@ pub fn is_plain(text: &str) -> bool {
     !text.contains(acts)
 }
 
-/// Whether a character controls the terminal or the text layout instead of being displayed.
+/// Whether a character acts on the terminal or the text layout instead of being displayed.
 ///
 /// Source: Unicode 16, categories Cc, Zl and Zp; Bidi_Control; and the invisible characters of Cf.
 fn acts(c: char) -> bool {

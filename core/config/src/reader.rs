@@ -11,7 +11,7 @@ use super::error::{ConfigError, ConfigErrors, MOST_ERRORS, Notes};
 use super::nearest::nearest;
 use super::plain::is_plain;
 
-/// Function that reads a referenced file by the name in the key, for instance a polyline profile or a DBC file.
+/// Function that reads a file whose name is the value of a key, for instance a polyline profile or a DBC file.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 
 /// Maximum number of tables in an array. The number is limited because each table is compared with all others.
@@ -61,8 +61,8 @@ impl<'a> Document<'a> {
 
     /// Reads the whole TOML text by calling `read`, and finds all errors in the text.
     ///
-    /// The table and its subtables note each error, and reading continues as if the key were absent. Unread keys
-    /// are also errors.
+    /// The table and its subtables note each error, and reading continues as if the wrong key were absent. Keys that
+    /// were never read are also errors.
     ///
     /// Errors: all noted errors, and the error that `read` returned.
     pub fn read<T>(
@@ -71,7 +71,8 @@ impl<'a> Document<'a> {
     ) -> Result<T, ConfigErrors> {
         self.is_short()?;
         let (table, broken) = DeTable::parse_recoverable(self.text);
-        // Only the first syntax error of a line is reported, because the others follow from it.
+        // Only the first syntax error of a line is reported, because further errors on the same line follow from the
+        // first.
         let told = broken.iter().take(2 * MOST_ERRORS);
         let mut broken: Vec<ConfigError> = told.map(|error| self.broken(error)).collect();
         broken.dedup_by_key(|error| error.line);
@@ -100,7 +101,7 @@ impl<'a> Section<'a> {
         Self { document, path, at: 0, table, asked, files: Files(None), notes }
     }
 
-    /// Allows keys of this table and its subtables to refer to files; `load` reads the files.
+    /// Allows keys of this table and its subtables to refer to files. `load` reads such a file.
     #[must_use]
     pub fn with_files(self, load: Loader<'a>) -> Self {
         Self { files: Files(Some(load)), ..self }
@@ -190,7 +191,7 @@ impl<'a> Section<'a> {
         self.wrong(key, Some(value), format!("must be one of {}{meant}", words.join(", ")))
     }
 
-    /// Reads three numbers, each within `allowed`.
+    /// Reads an array of three numbers, each within `allowed`.
     ///
     /// Errors: the value is not an array of three numbers, or a number is outside `allowed`.
     pub fn triple(
@@ -253,7 +254,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads the tables of an array of tables; returns none if the key is absent.
+    /// Reads the tables of an array of tables; returns no tables if the key is absent.
     ///
     /// Errors: the value is not an array of tables, or it has too many tables.
     pub fn sections(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
@@ -297,8 +298,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Returns `value`, or an error that the key is missing; the error names an unread key with a similar name, if
-    /// any.
+    /// Returns `value`, or an error that the key is missing. If an unread key has a similar name, the error names it.
     ///
     /// Errors: `value` is `None`.
     pub fn required<T>(&self, key: &'static str, value: Option<T>) -> Result<T, ConfigError> {
@@ -310,7 +310,7 @@ impl<'a> Section<'a> {
         let is_below = |error: &ConfigError| {
             error.key.strip_prefix(&name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
-        // The key is present with a wrong value, so the already noted error about it is returned.
+        // The key is present, but its value is wrong. The error about this value was already noted, and is returned.
         if let Some(wrong) = self.noted(|error| self.table.contains_key(key) && is_below(error)) {
             return wrong;
         }
@@ -329,7 +329,7 @@ impl<'a> Section<'a> {
         Some(self.told(self.unknown(other, &[key])))
     }
 
-    /// Reads a part of the file; `None` if the part has errors. The errors are noted, so that reading continues.
+    /// Reads a part of the file; `None` if the part has errors. These errors are noted, and reading continues.
     ///
     /// Errors: the error of the part, if errors are not collected.
     pub fn part<T>(&self, read: impl FnOnce() -> Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
@@ -338,7 +338,7 @@ impl<'a> Section<'a> {
         Ok(part.filter(|_| self.notes.count() == before))
     }
 
-    /// Returns the result's value. If the result is an error and errors are collected, notes the error and returns
+    /// Returns the value of `result`. If `result` is an error and errors are collected, notes the error and returns
     /// `None`.
     fn go_on<T>(&self, result: Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
         match result {
@@ -364,7 +364,7 @@ impl<'a> Section<'a> {
                 break;
             }
             let name = self.full(key.get_ref());
-            // An error about this key may already be noted, because its name is similar to a missing one.
+            // An error about this key may already be noted, because its name is similar to that of a missing key.
             if self.noted(|error| error.key == name).is_none() {
                 self.go_on::<()>(Err(self.unknown(key, &asked)))?;
             }
@@ -388,9 +388,9 @@ impl<'a> Section<'a> {
 
     /// Returns an error about `key` in this table, for checks that only the caller can make.
     ///
-    /// The new error may be a mere consequence of an earlier error. So the result is the noted error of the same key,
-    /// if there is one. If the key is absent from a table below the root, the result is a noted error of that table,
-    /// or an error about a key with a similar name.
+    /// The new error may be a mere consequence of an earlier error. If an error about the same key was already noted,
+    /// that error is returned instead. If the key is absent from a table below the root, the function returns a noted
+    /// error of that table, or an error about a key with a similar name.
     pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
         let (name, value) = (self.full(key), self.table.get(key));
         let is_below = value.is_none() && !self.path.is_empty();
@@ -399,8 +399,8 @@ impl<'a> Section<'a> {
         follows.or_else(misnamed).unwrap_or_else(|| self.told(self.error(key, value, problem.to_owned())))
     }
 
-    /// Returns an error about this table as a whole; returns the noted error of one of its keys instead, if there is
-    /// one.
+    /// Returns an error about this table as a whole; if an error about one of its keys was noted, returns that error
+    /// instead.
     pub fn invalid_itself(&self, problem: &str) -> ConfigError {
         let error = || ConfigError {
             file: self.document.file.to_owned(),
@@ -433,7 +433,7 @@ impl<'a> Section<'a> {
         error
     }
 
-    /// Notes an error about a wrong value and returns `None`, as for an absent key. If errors are not collected,
+    /// If errors are collected, notes an error about a wrong value and returns `None`, as for an absent key. Otherwise
     /// returns the error.
     fn wrong<T>(
         &self,

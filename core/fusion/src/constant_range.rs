@@ -1,5 +1,5 @@
-//! Detection of a sonar that reports the same range in every direction, for instance the range of its last echo or of
-//! an echo from its own frame.
+//! Detection of a sonar that reports the same range in every direction, for instance the range of its last echo, or the
+//! range to its own frame.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 /// The limit is finer than a profiling sonar's resolution, so the noise of ranges to a real wall exceeds it.
 const SAME_M: f64 = 0.002;
 
-/// Successive returns with the same range, and how much the design range has varied meanwhile.
+/// Successive returns with the same range, and how much the range expected from the design has varied meanwhile.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ConstantRange {
     returns: u32,
     range_m: f64,
-    /// Minimum and maximum of the range minus the design range, m.
+    /// Smallest and largest difference so far between a range and its design range, m.
     off_m: [f64; 2],
 }
 
@@ -31,7 +31,7 @@ impl ConstantRange {
 
     /// Whether at least `fewest` returns have the same range while the design range varies by more than `varies_m`.
     ///
-    /// If the design range varies, the ranges to a real wall vary as well, by more than 2 mm.
+    /// If the design range varies, the ranges to a real wall also vary, by more than 2 mm.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }

@@ -1,8 +1,8 @@
-//! Navigation without a filter, as in Jorge et al. 2021, §9.2; the baseline for comparison with the filter.
+//! Navigation without a filter, as in Jorge et al. 2021, §9.2: the baseline for judging the filter.
 //!
-//! Attitude comes from the IMU and chainage from the tether. The position in the cross-section is the best fit of
-//! the echosounders' ranges to the design profile. While the echosounders are silent, height comes from the depth
-//! sensor. The method suits data with low noise.
+//! Attitude comes from the IMU and chainage from the tether. The position in the cross-section is the best fit of the
+//! echosounders' ranges to the design profile. While the echosounders are silent, height comes from the depth sensor.
+//! The method suits data with low noise.
 
 use super::relative::Relative;
 use super::section::{Echo, settle};
@@ -21,12 +21,12 @@ use headrace_sensor::reading::{EchoRange, Level, MAX_SOURCES, Reading, TetherLen
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
-/// Time window of the cable readings that give the speed, and the maximum number of these readings.
+/// The speed comes from the cable readings within `SPEED_WINDOW`, of which there are at most `SPEED_READINGS`.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Standard deviation of an echosounder's range, m.
 const ECHO_SD_M: f64 = 0.01;
-/// Standard deviation of the prior position, across and up, m.
+/// Standard deviations of the prior position, m: across the tunnel, and up.
 const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
 /// Navigation without a Kalman filter.
@@ -37,7 +37,7 @@ pub struct DirectNavigation {
     tether: TetherTrack,
     echoes: [Option<(MonoNs, Echo)>; MAX_SOURCES],
     place: Option<(MonoNs, [f64; 2])>,
-    /// Height from pressure, and the offset that makes it agree with the echoes, m.
+    /// `height_m` is the height from pressure, m. `height_offset_m` makes this height agree with the echoes.
     height_m: Option<f64>,
     height_offset_m: f64,
 }
@@ -125,8 +125,8 @@ impl TetherTrack {
         if self.count == 0 {
             self.restarts = restarts;
         }
-        // After a restart, the cable counter begins at zero again. Navigation without a filter has no means to
-        // restore the chainage.
+        // After a restart, the cable counter begins at zero again. Navigation without a filter cannot restore the
+        // chainage, so the chainage is lost.
         if restarts != self.restarts {
             return;
         }
@@ -186,7 +186,7 @@ impl Navigation for DirectNavigation {
         let (_, [y_m, z_m]) = self.place.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Section)?;
         let speed_mps = self.tether.speed_mps();
         let x_m = chainage_m + speed_mps * at.since(since).as_secs_f64();
-        // The chainage error between two passes is the rounding of two cable readings to the counter's resolution.
+        // The chainage error between two passes comes from rounding two cable readings to the counter's resolution.
         let relative = Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
@@ -283,7 +283,8 @@ mod tests {
             })
         };
         let depth = SensorInfo { kind: SensorKind::Depth, ..imu };
-        // The depth sensor shows 0.4 m too much height: 3.4 m, where the echoes measure 3.0 m.
+        // The depth sensor shows a height of 3.4 m, and the echoes measure 3.0 m. So the depth sensor is 0.4 m too
+        // high.
         nav.update(1, &depth, at_once(MonoNs(0)), &pressure(3.4));
         let down = SensorInfo {
             mount: Mount {

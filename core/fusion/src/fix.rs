@@ -17,13 +17,12 @@ pub struct Fix {
     pub relative: Relative,
     /// Error covariance relative to a much earlier visit to this position in the same navigation segment.
     pub revisit: Relative,
-    /// Number of the navigation segment, a period within which the relative position of soundings is known. Between
-    /// two segments, the relative position error is unknown.
+    /// Number of the navigation segment. Within a segment, the positions of soundings relative to each other are known;
+    /// between two segments, they are not.
     pub tie: u32,
     /// Number of times the estimate has become much more certain while it settled.
     ///
-    /// Earlier soundings carry the larger errors from before such a change. `relative` does not include those
-    /// errors.
+    /// Soundings from before such a change have larger errors. `relative` does not include these larger errors.
     pub settled: u32,
 }
 

@@ -23,7 +23,8 @@ pub trait Navigation: Stateful + Send + Sync {
     /// Finishes navigation after the last reading.
     fn end(&mut self) {}
 
-    /// Returns the innovation statistics of a source; `None` if the method or the source has none.
+    /// Returns the innovation statistics of a source; `None` if the navigation method or the source has no such
+    /// statistics.
     fn consistency(&self, _source: usize) -> Option<Consistency> {
         None
     }
@@ -33,14 +34,14 @@ pub trait Navigation: Stateful + Send + Sync {
         None
     }
 
-    /// Returns the doubt about the cable counter once the doubt has lasted for a second.
+    /// Returns the doubt about the cable counter if this doubt has lasted for at least a second.
     ///
     /// `None` while the counter is trusted, and for methods that do not check the counter.
     fn cable_doubt(&self) -> Option<CableDoubt> {
         None
     }
 
-    /// Returns how much longer the vehicle should stand still, s, until the gyro bias is known.
+    /// Returns how many more seconds the vehicle should stand still until the gyro bias is known.
     ///
     /// 0 once the bias is known, and for methods that learn nothing from a stationary vehicle.
     fn stand_s(&self) -> u32 {
@@ -54,7 +55,7 @@ pub trait Navigation: Stateful + Send + Sync {
         None
     }
 
-    /// Whether several heads have a pitch or yaw on their mounts that is not verified yet.
+    /// Whether there are several heads, and the pitch or yaw of a head on its mount is not yet verified.
     ///
     /// False for methods that do not check mounts.
     fn has_unverified_mounts(&self) -> bool {

@@ -31,19 +31,20 @@ impl Relative {
         math::sqrt(sum.max(0.0))
     }
 
-    /// Standard deviation of pitch and yaw together, radians.
+    /// Standard deviation of the relative pitch and yaw errors together, radians.
     ///
-    /// If the arm becomes a metre longer, [`Relative::sd_m`] changes by at most this number of metres.
+    /// If the arm to the point becomes a metre longer, [`Relative::sd_m`] changes by at most this number of metres.
     pub fn turn_sd_rad(&self) -> f64 {
         let [_, [_, pitch, _], [.., yaw]] = self.0;
         math::sqrt((pitch + yaw).max(0.0))
     }
 
-    /// Returns the covariance for another reference point on the vehicle, at `arm` from the present reference point.
+    /// Returns the relative covariance for another reference point on the vehicle. `arm` leads from the present
+    /// reference point to the other one.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
-        // The matrix stays symmetric, because the shear acts on the rows and then on the columns.
+        // The shear is applied to the rows and then to the columns, so the matrix stays symmetric.
         let once = self.0.map(sheared);
         let columns = [0, 1, 2].map(|c| sheared(once.map(|row| row.get(c).copied().unwrap_or(0.0))));
         Self(columns)

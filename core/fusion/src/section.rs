@@ -7,7 +7,7 @@ use headrace_geometry::tunnel::Profile;
 
 /// Minimum cosine of the angle of incidence. Echosounder beams at a more grazing angle are ignored.
 const LEAST_COSINE: f64 = 0.1;
-/// A beam determines the vehicle's height if its range changes by more than this per metre of height, m/m.
+/// A beam determines the vehicle's height if the beam's range changes by more than this per metre of height, m/m.
 const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 
@@ -32,8 +32,8 @@ pub struct Place {
 /// Fits the position to the echoes by Gauss-Newton iteration, starting at `start`.
 ///
 /// Minimises sum((measured - predicted)^2 / sd^2) plus a prior term (position and standard deviations, m). The
-/// derivative of a range with respect to the position is -n / (n . beam). Stops before a step that would leave the
-/// cross-section.
+/// derivative of a range with respect to the position is -n / (n . beam). The iteration stops before a step that would
+/// leave the cross-section.
 pub fn settle(
     profile: &Profile,
     attitude: Rot<Tunnel, Body>,
@@ -82,7 +82,7 @@ pub fn settle(
     place
 }
 
-/// Least-squares weight of an observation with this standard deviation.
+/// Least-squares weight of an observation with the standard deviation `sd_m`.
 fn weight(sd_m: f64) -> f64 {
     1.0 / (sd_m * sd_m)
 }

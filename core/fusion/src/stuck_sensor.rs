@@ -1,7 +1,7 @@
 //! Detection of a stuck inertial unit, which repeats its last reading.
 //!
-//! A noisy reading hardly ever equals the previous one to the last bit. Readings without noise, as in ideal dives,
-//! repeat whenever the motion is steady, so their repetition is no evidence.
+//! A noisy reading hardly ever equals the previous reading to the last bit. Readings without noise, as in ideal dives,
+//! repeat whenever the motion is steady, so such repetition is no evidence.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 const HANGS_AFTER: DurNs = DurNs(500_000_000);
 /// Natural logarithm of the largest probability that noise alone causes the repetition: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
-/// Weight of the newest value in the running means: of sign reversals on all three axes, and of run lengths.
+/// Weight of the newest value in two running means: of sign reversals on all three axes, and of the lengths of series.
 const LATEST: f64 = 1.0 / 64.0;
 /// Readings count as noisy if more than this share of their successive differences reverses its sign.
 ///
@@ -28,7 +28,8 @@ pub struct StuckSensor {
     steps: [f64; 3],
     /// Share of differences whose sign is opposite to that of the previous difference, from 0 to 1.
     to_and_fro: f64,
-    /// Mean length of the series of identical readings, and length of the present series; both count readings.
+    /// `usual_run` is the mean length of series of identical readings, and `run` the length of the present series, in
+    /// readings.
     usual_run: f64,
     run: u32,
     /// Start time of the present series of identical readings.
@@ -121,12 +122,12 @@ mod tests {
         assert!(hangs(all).iter().all(|hangs| !hangs));
     }
 
-    /// A coarsely quantised unit at rest repeats each reading for a while. The coarser the unit, the longer the
-    /// detection takes.
+    /// A coarsely quantised unit at rest repeats each reading for a while. The coarser the unit is, the longer the
+    /// detection of a stuck unit takes.
     #[test]
     fn coarsely_quantised_inertial_unit_at_rest_does_not_count_as_stuck() {
-        // About one reading in 200 differs from the others, which are equal. So series of three to 2000 equal readings
-        // are normal, and no evidence that the unit is stuck.
+        // About one reading in 200 differs, and all others are equal. So series of three to 2000 equal readings are
+        // normal, and no evidence that the unit is stuck.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

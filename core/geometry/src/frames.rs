@@ -21,15 +21,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::math;
 
-/// The tunnel's frame.
+/// Marker type of the tunnel frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tunnel {}
 
-/// The vehicle's frame.
+/// Marker type of the body frame, which is fixed to the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Body {}
 
-/// The frame of one sensor, as the sensor is mounted.
+/// Marker type of the frame of one mounted sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {}
 
@@ -207,8 +207,8 @@ impl<To, From> Rot<To, From> {
 
     /// Whether the quaternion has unit length, within the rounding errors of a long product of rotations.
     pub fn is_unit(&self) -> bool {
-        /// Maximum error of the quaternion's squared length. Products of rotations over ten hours at 600 Hz stay
-        /// below 1e-8.
+        /// Largest accepted error of the quaternion's squared length. Ten hours of multiplied rotations at 600 Hz give
+        /// errors below 1e-8.
         const DRIFT: f64 = 1e-6;
         let [w, x, y, z] = self.wxyz();
         (w * w + x * x + y * y + z * z - 1.0).abs() <= DRIFT

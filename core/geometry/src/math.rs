@@ -88,7 +88,7 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
 /// Wraps `difference` to [-`modulus`/2, `modulus`/2), the shorter way round. `modulus` must be positive and finite.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
     // As in `wrap`, the branches give the same bits as the formula with the quotient. Near an odd multiple of half the
-    // modulus, rounding can change the result by a modulus, so there the formula decides.
+    // modulus, rounding can change the result by a modulus, so there the formula is used.
     let size = difference.abs();
     if size < 0.499 * modulus {
         return difference;
@@ -115,7 +115,7 @@ pub fn floor_to_i64(x: f64) -> i64 {
 pub fn round_to_i64(x: f64) -> i64 {
     /// 2^52: doubles of this size have no fractional part.
     ///
-    /// The sum of a value and this constant is thus rounded to an integer, halves to even.
+    /// Adding this constant to a value thus rounds the value to an integer, halves to even.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
     let size = x.abs();
     if size < WHOLE { ((size + WHOLE) - WHOLE).copysign(x) as i64 } else { x as i64 }

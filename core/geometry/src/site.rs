@@ -59,7 +59,7 @@ impl Site {
         self.surface_pressure_pa + depth_m * self.density_kgpm3 * self.gravity_mps2
     }
 
-    /// Rescales a range to the water's speed of sound, m; the device computed the range with the speed `device_mps`.
+    /// Rescales a range, m, from the speed of sound `device_mps`, which the device assumed, to the water's.
     pub fn rescaled_range_m(&self, range_m: f64, device_mps: f64) -> f64 {
         range_m * (self.sound_speed_mps / device_mps)
     }
@@ -69,7 +69,7 @@ impl Site {
 mod tests {
     use super::{Site, fresh_water_sound_speed_mps};
 
-    /// The reference values are tables for pure water: Del Grosso and Mader 1972.
+    /// The reference values come from the tables for pure water by Del Grosso and Mader 1972.
     #[test]
     fn sound_speed_equals_reference_tables() {
         for (degc, mps) in [(0.0, 1402.39), (5.0, 1426.16), (10.0, 1447.27), (20.0, 1482.34), (30.0, 1509.13)]

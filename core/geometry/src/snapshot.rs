@@ -1,8 +1,8 @@
 //! Snapshots: the state after a tick as bytes, restored into a loop of the same vehicle and program.
 //!
-//! Serde writes values (numbers, enums, small records). Types that own preallocated memory, or settings that are not
-//! state, are restored in place. [`stateful!`](crate::stateful) classifies every field of such a type, so that a new
-//! field cannot be forgotten.
+//! Serde writes plain values (numbers, enums, small records). A type with preallocated memory, or with settings that
+//! are not part of the state, is restored in place. [`stateful!`](crate::stateful) classifies every field of such a
+//! type, so that a new field cannot be forgotten.
 //!
 //! ```
 //! use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _, stateful};
@@ -45,7 +45,7 @@ pub trait Stateful {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SnapshotError {
-    /// The bytes are not a snapshot of this loop.
+    /// The bytes do not fit the loop that restores them.
     #[error("restoring {part} from a snapshot: {why}; it is from another vehicle or version, or damaged")]
     Unfit {
         /// Name of the part of the state that was being restored.
@@ -97,7 +97,7 @@ impl Saver {
         }
     }
 
-    /// Appends stateful elements without their number, because the number of elements is a setting.
+    /// Appends stateful elements, but not how many there are, because their number is a setting.
     pub fn each<'a, T: Stateful + ?Sized + 'a>(&mut self, each: impl Iterator<Item = &'a T>) {
         each.for_each(|one| one.save(self));
     }

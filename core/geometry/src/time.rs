@@ -1,7 +1,7 @@
 //! Time as integer nanoseconds, in three types that can't be mixed up.
 //!
-//! The loop uses only [`MonoNs`], the host's monotonic clock. The timestamp comes from the thread that received the
-//! bytes, from a log or from a simulation. UTC appears only at the program's inputs and outputs.
+//! The loop uses only [`MonoNs`], the host's monotonic clock. Its timestamps come from the thread that receives a
+//! device's bytes, from a log or from a simulation. UTC appears only at the program's inputs and outputs.
 
 use serde::{Deserialize, Serialize};
 

@@ -31,13 +31,13 @@ pub use hysteresis::Hysteresis;
 pub use ring_cache::Looks;
 pub use search::SPEED_MARGIN;
 
-/// The alternatives are recomputed once per this number of advice updates.
+/// Number of advice updates after which the alternatives are recomputed.
 const ALTERNATIVES_EVERY: u32 = 25;
 /// Number of iterations that solve for the speed and the position margin, which depend on each other.
 const FALLS: u32 = 3;
-/// Speed below which the previous direction of travel is assumed to continue, m/s.
+/// At speeds below this, the direction of travel is unclear and the previous direction is used, m/s.
 const UNDER_WAY_MPS: f64 = 0.02;
-/// Maximum number of stretches of wall outside a head's range limits.
+/// Maximum number of stored stretches of wall outside a head's range limits.
 const OUT_OF_REACH: usize = 16;
 
 /// The largest speed that meets a target, as found by the search.
@@ -58,14 +58,14 @@ struct Chosen {
     from_mps: f64,
     /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
     nearest_mps: Option<f64>,
-    /// Whether the advised speed meets the target only with the passes of several swings of the vehicle together.
+    /// Whether the advised speed meets the target only if passes from several swings of the vehicle are taken together.
     by_several_swings: bool,
 }
 
 /// The inspection task that the advice is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
-    /// Target.
+    /// Coverage target, with the confidence of verdicts.
     pub target: Target,
     /// Length of the tunnel, m.
     pub length_m: f64,
@@ -73,7 +73,8 @@ pub struct Task {
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
-    /// Angular resolution and update rate of the rays that find the wall for the advice.
+    /// Number of the rays that find the wall for the advice, and the vehicle's movement after which they are cast
+    /// again.
     pub looks: Looks,
 }
 
@@ -84,7 +85,8 @@ pub struct Advisor {
     task: Task,
     heads: Vec<AdvisedHead>,
     views: Vec<View>,
-    /// Strips of the wall with the heads in their present settings, and in each of their modes.
+    /// Strips of the wall: `now` with the heads in their present settings, `modes` with the heads in each of their
+    /// modes.
     now: Strips,
     modes: Strips,
     /// Largest distance between neighbouring samples of a turn, in each mode, at the tunnel's centre, m.
@@ -94,7 +96,7 @@ pub struct Advisor {
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring of rays is checked first at the next update.
     next: usize,
-    /// Number of advice updates until the alternatives are recomputed, and the current alternatives.
+    /// Number of advice updates until the alternatives are recomputed. `alternatives` are the current ones.
     until_alternatives: u32,
     alternatives: [Option<Alternative>; MAX_MODES],
     anew: Option<Anew>,
@@ -104,7 +106,7 @@ pub struct Advisor {
     last_mps: Option<f64>,
     /// Distance that the vehicle may move before the heads' rings are recast, m.
     still_m: f64,
-    /// Speed at which passes of several swings meet the target together, m/s; zero if there is none.
+    /// Speed at which passes of several swings together meet the target, m/s; zero if there is none.
     swung_mps: f64,
 }
 
@@ -199,7 +201,7 @@ impl Advisor {
     /// Returns the largest speed at which the predicted T_max stays within the target.
     ///
     /// The function inverts Eq. 16 with measured values: the turn period, step, number and phases of the heads, the
-    /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. It propagates the phases
+    /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. The phases are propagated
     /// to each tested speed. `left_s` is the remaining time, if known.
     ///
     /// Heads that are apart along the hull keep their phases only in some intervals of speed. The result is the upper
@@ -253,7 +255,8 @@ impl Advisor {
         self.still_m = self.still_m_for(&fastest, &going);
         let mut predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         if chosen.by_several_swings {
-            // Passes of later swings fill the gaps of this turn. The remaining gaps grow with the speed.
+            // Passes of later swings fill the gaps of this turn until the target is met. At a higher speed, the gaps
+            // that stay are larger in proportion.
             let over = (situation.speed_mps.abs() / self.swung_mps).max(1.0);
             predicted_t_m = predicted_t_m.min(sure_m * over);
         }
@@ -285,14 +288,14 @@ impl Advisor {
         }
     }
 
-    /// Returns the remaining length of tunnel in the direction of travel, m.
+    /// Returns the length of tunnel, m, that remains in the direction of travel.
     fn left_m(&self, x_m: f64) -> f64 {
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
         left_m.clamp(0.0, self.task.length_m)
     }
 
     /// Chooses between two speeds: the largest speed at which successive passes meet the target, and the speed at which
-    /// passes of several swings meet the target together.
+    /// passes of several swings together meet the target.
     fn choose(&self, fastest: Option<&Fastest>, driving: &Driving<'_>, now_mps: f64) -> Chosen {
         let Some(fastest) = fastest.filter(|fastest| fastest.advised_mps >= self.swung_mps) else {
             let advised_mps = Some(self.swung_mps).filter(|mps| *mps > 0.0);
@@ -308,7 +311,7 @@ impl Advisor {
         }
     }
 
-    /// Returns the advised speed at which passes of several swings meet the target together, m/s.
+    /// Returns the advised speed at which passes of several swings together meet the target, m/s.
     ///
     /// Zero if there is no such speed, or if the swing is so small that successive passes allow a higher speed.
     fn swung_mps(
@@ -365,8 +368,8 @@ impl Advisor {
 
     /// Updates the heads' rings for the vehicle's pose; returns `false` if no turning head has a ring.
     ///
-    /// A head's ring is recast once the vehicle has moved. If several rings are outdated, one is recast per call,
-    /// since the vehicle moves little between calls.
+    /// A head's ring is outdated once the vehicle has moved. If several rings are outdated, each call recasts only one,
+    /// because the vehicle moves little between calls.
     fn look(&mut self, situation: &Situation, pose: &Pose) -> bool {
         let count = self.heads.len().max(1);
         let present = |number: usize| situation.heads.get(number).is_some_and(Option::is_some);
@@ -405,7 +408,8 @@ impl Advisor {
         }
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
-        // The steps are kept with the ring, because most rings are unchanged since the previous advice.
+        // The distances between soundings are kept with the ring, because most rings are unchanged since the previous
+        // advice.
         for (head, stride) in self.heads.iter_mut().zip(self.strides) {
             if let Some(stride) = stride {
                 head.ring.keep_steps(stride);
@@ -452,8 +456,8 @@ impl Advisor {
         let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
-            // At another speed, the heads have other phases and less swing between their passes, so this error is not
-            // final.
+            // At another speed, the heads have other phases and less swing between their passes, so this error need not
+            // hold there.
             Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
             Err(why) => return Err(*why),
         };
@@ -472,7 +476,7 @@ impl Advisor {
         }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // If the vehicle swings too much for any speed, it also does so at a slightly different position.
+            // A vehicle that swings too much for any speed also does so at a slightly different position.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
             // The distance between samples that limits the speed is unknown.
             Err(_) => (self.task.target.max_hole_m, 0.0),
@@ -533,9 +537,9 @@ impl Advisor {
             && (passes.turn_s() - period_s).abs() < SAME * period_s
     }
 
-    /// Returns the largest speeds as the margins of the target are added one after the other.
+    /// Returns the largest speed without margins, with the first margin, with the first two, and so on.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
-        /// Number of speeds that don't allow for swing.
+        /// Number of speeds in the margins that do not allow for swing.
         const BEFORE_SWING: usize = 3;
         let target_m = self.task.target.max_hole_m;
         let known = RemainingTarget { pass_error_m: 0.0, ..sure };
@@ -555,7 +559,7 @@ impl Advisor {
             fastest(lossy, going, sure),
         ];
         let mut advised = speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN));
-        // Like the advised speed, the speeds that allow for swing may rest on the passes of several swings.
+        // Like the advised speed, the speeds that allow for swing may need the passes of several swings together.
         for speed_mps in advised.iter_mut().skip(BEFORE_SWING) {
             *speed_mps = speed_mps.max(self.swung_mps);
         }
@@ -592,7 +596,7 @@ impl Advisor {
             ping_period_s = ping_period_s.max(turn(head)?.ping_period_s());
         }
         let passes = match self.task.layout {
-            // The size of a sector does not depend on the number of heads still working.
+            // A head's sector keeps its size if other heads fail, so the configured number of heads counts.
             HeadLayout::SectorOffset => {
                 Passes::in_sectors(heads, 2.0 * longest_s / self.heads.len().max(1) as f64)
             }
@@ -631,7 +635,7 @@ impl Advisor {
         RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
-    /// Returns the first remedy that alone makes the target possible.
+    /// Returns the first remedy that makes the target possible without further remedies.
     ///
     /// The order is: a steady heading, then the tunnel's centre if samples of a turn are close enough there, then the
     /// fastest mode.

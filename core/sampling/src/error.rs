@@ -2,7 +2,7 @@
 
 use super::head_set::MAX_HEADS;
 
-/// Reason for a missing result of sampling theory.
+/// Reason why a function of this crate has no result.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplingError {
@@ -95,7 +95,8 @@ pub enum SamplingError {
         /// Arc length of the strip's middle, m.
         arc_m: f64,
     },
-    /// The vehicle's heading is too far off the axis, or the vehicle swings too fast.
+    /// The vehicle's heading is too far off the tunnel's axis, or the vehicle swings too fast, for the target at any
+    /// speed.
     #[error(
         "no speed meets a target of {target_m} m: because of the heading or swing, passes are farther apart than that"
     )]
@@ -118,7 +119,7 @@ pub enum SamplingError {
 impl SamplingError {
     /// Returns the error with the configured target, m.
     ///
-    /// A smaller target was tried, to leave a margin for position errors.
+    /// The error may name a smaller target, which left a margin for position errors.
     #[must_use]
     pub(crate) fn of_target(mut self, asked_m: f64) -> Self {
         if let Self::UnseenStrip { target_m, .. }

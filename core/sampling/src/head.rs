@@ -11,7 +11,8 @@ use headrace_geometry::time::DurNs;
 /// Headrace does not wait for a silent head, and leaves it out of the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
-/// Tolerance with which a turn must be a whole number of steps. Steps are specified in decimal degrees.
+/// Tolerance, in steps, with which a turn must be a whole number of steps. It is needed because steps are given in
+/// decimal degrees.
 const WHOLE_STEPS: f64 = 1e-6;
 /// Maximum number of angular steps per turn of a head.
 const MAX_STEPS: f64 = 100_000.0;
@@ -80,7 +81,7 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// Name of the period's origin in tables.
+    /// Name of the turn period's origin in tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -132,20 +133,21 @@ pub struct HeadSpec {
 }
 
 impl HeadSpec {
-    /// Smallest and largest detectable range to a wall in water with this speed of sound, m.
+    /// Smallest and largest range, m, at which the head detects a wall in water with this speed of sound.
     pub fn reach_m(&self, sound_speed_mps: f64) -> [f64; 2] {
         self.range_m.map(|range_m| range_m * sound_speed_mps / self.sound_speed_mps)
     }
 }
 
-/// Rotation program of a head for a dive: start angle, direction and sector, with angles in the sensor frame.
+/// Rotation program of a head for a dive: start angle, direction and sector. Angles are in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadProgram {
     /// Head angle at the first ping, radians.
     pub start_rad: f64,
     /// Whether the head's first step is towards growing angles.
     pub growing: bool,
-    /// Least angle and size of the sector to sweep back and forth, radians; `None` for continuous rotation.
+    /// Smallest angle and size of the sector that the head sweeps back and forth, radians; `None` for continuous
+    /// rotation.
     pub sector: Option<(f64, f64)>,
 }
 

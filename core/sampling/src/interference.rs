@@ -9,7 +9,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
-/// Time per turn or sweep in which two heads can receive each other's pings.
+/// Time per turn or sweep for which two heads can receive each other's pings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
     /// The two heads by number.
@@ -22,9 +22,10 @@ pub struct Exposure {
     pub of_s: f64,
 }
 
-/// Returns for each pair of scheduled heads the time in which they can receive each other's pings, at `pose`.
+/// Returns, for each pair of scheduled heads, the time for which they can receive each other's pings at `pose`.
 ///
-/// Pairs without such times are omitted. Heads at the same position are an idealisation and never interfere.
+/// Pairs that never receive each other's pings are omitted. Heads at the same position are an idealisation and count as
+/// such a pair.
 /// Errors: a head outside the profile, or a beam along the tunnel.
 pub fn exposures(
     heads: &[HeadSpec],
@@ -135,7 +136,8 @@ mod tests {
     fn side_by_side_heads_half_a_turn_apart_face_each_other() {
         let found = found(&[[0.0, 0.15, 0.0], [0.0, -0.15, 0.0]], HeadLayout::PhaseShift);
         assert_eq!(found.len(), 1);
-        // Each beam points at the other head once per turn of 8 s, for 2 (0.7 + asin(0.04 / 0.3)) degrees = 16.7.
+        // Each beam points at the other head once per turn of 8 s, over an angle of 2 (0.7 + asin(0.04 / 0.3)) = 16.7
+        // degrees.
         assert!((found[0].facing_s - 8.0 * 16.73 / 360.0).abs() < 0.025, "{:?}", found[0]);
         assert_eq!((found[0].same_patch_s, found[0].of_s), (0.0, 8.0));
     }

@@ -7,7 +7,8 @@ use headrace_geometry::math::{self, TAU};
 /// Layout of the heads of a vehicle: how they share the wall between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeadLayout {
-    /// All s heads rotate continuously. At the moments when they pass the same place, their angles are 2 pi / s apart.
+    /// All s heads rotate continuously. Their angles are 2 pi / s apart if each is taken when its head reaches the same
+    /// chainage.
     PhaseShift,
     /// Each of s heads sweeps back and forth in a sector of 2 pi / s.
     SectorOffset,
@@ -39,11 +40,11 @@ impl HeadLayout {
     }
 }
 
-/// Angle that a head turns while the vehicle travels `x_m`, radians, not wrapped to a turn.
+/// Angle through which a head turns while the vehicle travels `x_m`, radians, not wrapped to a turn.
 ///
 /// `rate_radps` is the head's angular velocity omega, of either sign; `speed_mps` > 0.
-/// Errors: a distance, rate or speed that isn't finite; a negative speed; a speed of zero, where x / v has no bound,
-/// unless the distance is zero.
+/// Errors: a distance, rate or speed that isn't finite; a negative speed; a speed of zero if the distance is not zero,
+/// because x / v is then infinite.
 /// Source: Jorge et al. 2021, Eq. 19 (alpha_k = omega x / v).
 pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64, SamplingError> {
     not_negative("the rate of turn in rad/s, without its sign", rate_radps.abs())?;
@@ -55,8 +56,8 @@ pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64,
 
 /// gamma: start angle of a head `x_m` behind the foremost head, in [0, 2 pi).
 ///
-/// The head has the phase `phase_rad` where it passes the foremost head's place. The error is about 1e-16 of the
-/// angle turned between the two passes.
+/// The head has the phase `phase_rad` when it reaches the chainage of the foremost head. The rounding error is about
+/// 1e-16 of the angle through which the head turns until then.
 ///
 /// Errors: as for [`turned_over_rad`]; a phase that isn't finite.
 /// Source: Jorge et al. 2021, Eq. 20 (gamma = phi(k) - omega x / v).
@@ -112,13 +113,14 @@ pub struct Sector {
 
 /// Returns the angle at which a head is in step with the first head.
 ///
-/// Two heads are in step if they are at the same point of their sweeps where they pass the same place. The first
-/// head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s.
-/// A `speed_mps` of zero means no delay: all heads are at the same point of their sweeps, regardless of their
-/// positions along the hull.
-/// Errors: fewer than two sectors, a sector number that doesn't exist, a lead outside sector 0, a time that isn't
-/// above zero, a speed below zero.
-/// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
+/// Two heads are in step if each is at the same point of its sweep when it reaches the same chainage. The first head,
+/// in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s. A
+/// `speed_mps` of zero means no delay: all heads are at the same point of their sweeps, regardless of their positions
+/// along the hull.
+/// Errors: fewer than two sectors, a sector number that doesn't exist, a lead outside sector 0, a time that isn't above
+/// zero, a speed below zero.
+/// Source: Jorge et al. 2021, Algorithm 1. Here the sector's size has only one name, and the period of a sweep is 2 T /
+/// s.
 pub fn in_step(
     lead: InSector,
     sector: &Sector,
@@ -153,8 +155,8 @@ pub fn in_step(
 
 /// Assigns a sector to each head such that heads look outwards, away from their neighbours.
 ///
-/// The assignment maximises the sum over heads of the offset across the hull times the direction of the sector's
-/// middle. Among equal assignments, the function prefers head k in sector k.
+/// The assignment maximises a sum over all heads: the head's offset across the hull, projected on the direction of its
+/// sector's middle. Among assignments with equal sums, the function prefers head k in sector k.
 pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
     let count = heads.len().min(MAX_HEADS);
     let share = TAU / count.max(1) as f64;
@@ -171,7 +173,7 @@ pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
 
 /// Tries each unassigned sector for the next head, in order.
 ///
-/// The first of several equal assignments is kept.
+/// Among assignments with equal sums, the first one is kept.
 fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f64, Vec<usize>)) {
     /// Assignments whose sums differ by less than this count as equal, m.
     const SAME_M: f64 = 1e-9;
@@ -192,9 +194,9 @@ fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f
 
 /// Returns the program of each head, such that the heads' passes interleave evenly at `speed_mps`.
 ///
-/// Head k of s starts at the body-frame angle gamma_k = 2 pi k / s - omega x_k / v, where x_k is its distance behind
-/// the foremost head (Eq. 20). A head that faces aft turns the other way, so its start is mirrored (Eq. 21). In
-/// sectors, the foremost head is at the start of its sector when the others are at the angles of Algorithm 1.
+/// Head k of s starts at the body-frame angle gamma_k = 2 pi k / s - omega x_k / v, where x_k is the distance of head k
+/// behind the foremost head (Eq. 20). A head that faces aft turns the other way, so its start is mirrored (Eq. 21). In
+/// sectors, the foremost head starts at the beginning of its sector, and all other heads at the angles of Algorithm 1.
 /// At zero speed the offsets along the hull have no meaning and are ignored.
 /// Errors: a number of heads that the layout doesn't allow; a speed, step or ping period out of range.
 /// Source: Jorge et al. 2021, Eq. 19 to 21, §5.2 and Algorithm 1.
@@ -252,7 +254,7 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     let least_rad = if sector.reversed { math::wrap(TAU - least_rad - size_rad, TAU) } else { least_rad };
     let begin = InSector { angle_rad: 0.0, growing: true };
     let start = in_step(begin, sector, turn_s, speed_mps)?;
-    // Wrapping of the angle may have moved either end of the sector by a whole turn.
+    // The angle was wrapped to a turn, so the start and the least angle may differ by an extra whole turn.
     let along_rad = math::wrap(start.angle_rad - least_rad + ROUNDING_RAD, TAU) - ROUNDING_RAD;
     Ok(HeadProgram {
         start_rad: least_rad + along_rad,
@@ -261,13 +263,14 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// Spacing rule x = q v T / s for s heads that are x apart along the hull, at the speed v with the turn period T.
+/// Spacing rule x = q v T / s for s heads: x is the distance between heads along the hull, v the speed, T the turn
+/// period.
 ///
 /// If the rule holds for a whole number q, the heads' passes interleave with start angles that differ by multiples of
-/// 1/s turn. Heads with these start angles interfere least.
+/// 1/s turn. Heads with such start angles interfere least with each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HullRule {
-    /// q: time in which the vehicle travels the distance between the heads, in units of T / s, rounded.
+    /// q: number of T / s in which the vehicle travels the distance between the heads, rounded to a whole number.
     pub q: u32,
     /// Speed that meets the rule with the given distance and turn period, m/s: s x / (q T).
     pub speed_mps: f64,
@@ -277,7 +280,7 @@ pub struct HullRule {
     pub turn_s: f64,
 }
 
-/// Returns the figures of the spacing rule for `heads` heads in phase shift, one of them `apart_m` behind the first.
+/// Returns the values of the spacing rule for `heads` heads in phase shift, one of which is `apart_m` behind the first.
 ///
 /// Errors: an argument that isn't above zero, or an invalid number of heads.
 /// Source: Jorge et al. 2021, §5.1 (x = q v T for whole turns; T = s x / (q v) for fractions 1/s of a turn).
@@ -299,8 +302,8 @@ pub fn hull_rule(apart_m: f64, heads: usize, speed_mps: f64, turn_s: f64) -> Res
 /// The two alternating distances between passes in a head's sector, m, the smaller first.
 ///
 /// The distances are measured along the tunnel. `pitch_m` is T_x of one continuously rotating head (v T), `heads` the
-/// number s, `share` the position in the sector from 0 to 1.
-/// The sum of the distances is 2 T_x / s everywhere. In the middle they are equal; at the ends one is zero.
+/// number s, `share` the position in the sector from 0 to 1. The sum of the distances is 2 T_x / s everywhere. In the
+/// middle of the sector, the two are equal; at its ends, one of them is zero.
 /// Errors: fewer than two heads, a pitch below zero, a share outside 0 to 1.
 /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
 pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2], SamplingError> {
@@ -311,7 +314,7 @@ pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2],
     Ok(divided_m(2.0 * pitch_m / heads as f64, share))
 }
 
-/// Divides the distance `both_m` at a position in the sector; returns the smaller part first.
+/// Divides the distance `both_m` into the two distances between passes at a position in the sector, the smaller first.
 ///
 /// `both_m` is the distance travelled in a sweep there and back.
 pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
@@ -323,7 +326,8 @@ pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Each figure meets the rule x = q v T / s with the other two given figures, and q is the nearest whole number.
+    /// Speed, distance and turn period each meet the rule x = q v T / s together with the two others as given. q is the
+    /// nearest whole number.
     #[test]
     fn each_hull_rule_figure_satisfies_the_rule_with_the_other_inputs() {
         for (apart_m, heads, speed_mps, turn_s, q) in

@@ -13,17 +13,17 @@ use serde::{Deserialize, Serialize};
 use super::head::MAX_HEADS;
 use headrace_geometry::math;
 
-/// Length of the stretches of wall for which the chance of a hole is limited, m.
+/// Length, m, of a stretch of wall; the chance of a hole is limited per stretch.
 ///
-/// The share [`MAY_FAIL`] of such stretches may fail because of lost returns.
+/// At most the share [`MAY_FAIL`] of all stretches may miss the target because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches of wall that may fail. The other 95 in 100 stretches meet the target.
+/// Share of stretches of wall that may miss the target because of lost returns. The other 95 in 100 stretches meet it.
 const MAY_FAIL: f64 = 0.05;
 /// Maximum number of passes required over a place.
 ///
-/// More passes take too long in practice; the returns themselves must then improve.
+/// More passes would take too long in practice. Instead, the heads must lose fewer returns.
 pub const MOST_PASSES: f64 = 10.0;
-/// Probability below which a hole does not count as caused by chance.
+/// If chance makes a hole with a lower probability than this, the hole does not count as caused by chance.
 const HARDLY: f64 = 1e-3;
 /// Share of a hole's diameter, along and around the tunnel, that lost passes and pings must cover.
 const INNER: f64 = 0.7;
@@ -63,10 +63,10 @@ impl LossRate {
         self.share * power(self.after_lost, (pings - 1.0).max(0.0))
     }
 
-    /// Length in pings of the longest run of lost pings to expect at this many places of the wall.
+    /// Length, in pings, of the longest run of lost pings that is expected at this many places on the wall.
     ///
-    /// A run of this length occurs at one of these places with the probability [`MAY_FAIL`]. Zero if even a single
-    /// lost ping is less likely than that.
+    /// A run of this length occurs at one of these places with the probability [`MAY_FAIL`]. Zero if even a single lost
+    /// ping is less likely than [`MAY_FAIL`].
     fn longest_run(self, places: f64) -> f64 {
         let expected = places * self.share / MAY_FAIL;
         if expected <= 0.0 {
@@ -91,10 +91,10 @@ pub struct Sampled {
 impl Sampled {
     /// Returns the number of passes over each place that lost returns require in place of a single pass.
     ///
-    /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of the distance
-    /// between passes that the target allows without losses to the smaller distance that it allows with losses. The
-    /// number ranges from 1 without losses to [`MOST_PASSES`], and is continuous in all inputs. The model assumes that
-    /// heads pass in turn, and that the heads with the highest losses come first.
+    /// With these passes, 95 of 100 stretches of 0.25 m meet the target. The number is the ratio of two distances
+    /// between passes: the one that the target allows without losses, and the smaller one that it allows with losses.
+    /// The number ranges from 1 without losses to [`MOST_PASSES`], and is continuous in all inputs. The model assumes
+    /// that the heads pass one after the other, and that the heads with the highest losses come first.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {
@@ -113,7 +113,8 @@ impl Sampled {
         heads.sort_unstable_by(|a, b| b.chance_of_run(pings).total_cmp(&a.chance_of_run(pings)));
         let along_m = math::sqrt(lattice_m2);
         let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
-        // More passes provide more places at which passes may fail together.
+        // With more passes, there are more places at which passes may fail together. So a second estimate uses the
+        // first number of passes.
         let once = self.passes_for(places, along_m, heads);
         let passes = self.passes_for(places * once, along_m, heads);
         debug_assert!(
@@ -125,7 +126,7 @@ impl Sampled {
 
     /// Whether a hole of this diameter, m, may have been caused by chance.
     ///
-    /// `along_m` is the distance between passes, and `rate` the loss rate. If chance is excluded, the wall at the
+    /// `along_m` is the distance between passes, and `rate` the loss rate. If the result is `false`, the wall at the
     /// hole gives no returns at any speed.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
@@ -169,7 +170,8 @@ impl Sampled {
     ///
     /// One of two neighbouring passes misses a run of pings, which leaves a gap. The circle touches both ends of the
     /// gap and two neighbouring samples of the other pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with
-    /// the gap: a is the distance between passes, h half the distance between samples of a turn, g half the gap.
+    /// the gap: a is the distance between passes, h is half the distance between samples of a turn, and g is half the
+    /// gap.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

@@ -7,25 +7,25 @@ use crate::target::Target;
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation of a hole's size up to which no margin is needed, m. Navigation without error estimates has about
-/// this value.
+/// Largest standard deviation of a hole's size for which no margin is needed, m. Navigation without error estimates
+/// causes about this standard deviation.
 const NOTHING_M: f64 = 0.002;
-/// Minimum share of the allowed distance between passes that remains after the margin for position errors.
+/// The margin for position errors leaves at least this share of the allowed distance between passes.
 ///
-/// No speed compensates for a lost position.
+/// A larger margin would not help, because no speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
 /// Maximum share of the target that the margin for position errors takes.
 const MOST_SHARE: f64 = 0.2;
 /// Share of the travel time from the foremost to the rearmost head that counts towards the time between passes.
 ///
-/// Only some neighbouring passes are by these two heads, and holes between these passes grow by less than the heads'
-/// separation. With this share, the error of a hole's size D is within two standard deviations in 93 % of all cases,
-/// over the dives of `tests/tests/navigation/fusion.rs` with four heads. Over similar dives, the figure is 80 % with a
-/// share of 0, and 99 % with a share of 1.
+/// The share is below 1, because only some neighbouring passes are by these two heads, and holes between their passes
+/// grow by less than the heads' separation. With this share, 93 % of the errors of a hole's size D are within two
+/// standard deviations, in the dives of `tests/tests/navigation/fusion.rs` with four heads. In similar dives, these are
+/// 80 % of the errors with a share of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as at rest, m/s.
 const SLOW_MPS: f64 = 0.01;
-/// Limit for the time until the rearmost head reaches the position of the foremost head, seconds.
+/// Largest assumed time until the rearmost head reaches the position of the foremost head, seconds.
 const LONGEST_APART_S: f64 = 20.0;
 
 /// Time over which position errors accumulate between neighbouring passes of a place, s.
@@ -41,9 +41,9 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 /// Part of a target reserved for position errors, m.
 ///
 /// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
-/// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth of
+/// distance between neighbouring samples of one turn. The margin is continuous in all inputs, and at most a fifth of
 /// the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
-/// without margin. A larger margin would cost too much speed.
+/// without margin. A larger margin would slow the vehicle by more than it is worth.
 pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
     let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
@@ -60,16 +60,16 @@ pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
 /// Exponent with which position errors grow with the time between two passes.
 ///
 /// The exponent lies between 0.5, for independent noise, and 1, for drifting speeds. On a swaying VITA 2 with two
-/// heads, the error is 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
+/// heads, the position error is 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
 const GROWTH: f64 = 0.7;
 
 /// Target minus the margin for position errors, as a function of speed.
 ///
-/// The errors are known at the present speed only. At half that speed, the time between passes of heads that are
-/// apart along the hull is twice as long, and the margin is larger.
+/// The position errors are known at the present speed only. At half the present speed, the time between passes of heads
+/// that are apart along the hull is twice as long, and the margin is larger.
 #[derive(Debug, Clone, Copy)]
 pub struct RemainingTarget {
-    /// Target.
+    /// Coverage target, with the confidence of verdicts.
     pub target: Target,
     /// Standard deviation of a hole's size as measured at the present speed, m.
     pub pass_error_m: f64,
@@ -103,9 +103,11 @@ impl RemainingTarget {
 /// Expected position errors between two passes, before a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedErrors {
-    /// Number of standard deviations of a hole's size by which a passed section stays below the target.
+    /// Confidence k: the hole in a passed section is smaller than the target by at least k standard deviations of its
+    /// size.
     pub confidence_sd: f64,
-    /// Times between two passes in ascending order, s, each with the standard deviation of a hole's size, m.
+    /// Times between two passes, s, in ascending order. With each time comes the standard deviation of a hole's size,
+    /// m.
     pub by_time: Vec<[f64; 2]>,
 }
 
@@ -126,14 +128,14 @@ impl ExpectedErrors {
     }
 }
 
-/// A cause that lowers the speed below the speed of the ideal geometry.
+/// A cause that lowers the largest speed below that of the ideal geometry, or the ideal geometry itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Margin {
     /// Ideal geometry: only the distance that the vehicle travels between two passes limits the speed.
     Geometry,
     /// Wall that the vehicle hides from some of its heads, or that is outside their range limits.
     Hidden,
-    /// Heads that are not evenly phased, or that are side by side.
+    /// Passes that are unevenly spread, because heads are not evenly phased or are side by side.
     Phase,
     /// Beams that swing along the wall because the vehicle yaws or pitches.
     Swing,
@@ -161,7 +163,7 @@ impl Margin {
     }
 }
 
-/// Largest speeds as the margins are added one after the other, m/s; no speed exceeds the speed before it.
+/// Largest speeds without margins, with the first margin, with the first two, and so on, m/s; they never increase.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
@@ -176,7 +178,7 @@ pub struct Margins {
     pub position_mps: f64,
     /// Speed after lost returns are also taken into account: the largest speed that meets the target.
     pub losses_mps: f64,
-    /// Standard deviation of a hole's size between two passes that `position_mps` assumes, m.
+    /// Standard deviation, m, of the size of a hole between two passes, as assumed for `position_mps`.
     pub pass_error_m: f64,
 }
 
@@ -202,7 +204,7 @@ impl Margins {
         [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps]
     }
 
-    /// Returns the cost of each margin, m/s, in the order of [`Margin::ALL`] from the second on.
+    /// Returns the speed that each margin costs, m/s, in the order of [`Margin::ALL`] without its first entry.
     pub fn prices_mps(&self) -> [(Margin, f64); 5] {
         let [geometry, hidden, phase, swing, position, losses] = self.speeds_mps();
         [

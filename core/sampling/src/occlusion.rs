@@ -49,7 +49,7 @@ impl AngleRange {
         self.from_rad + self.size_rad / 2.0
     }
 
-    /// Returns the same directions as angles of a straight-mounted head, for pictures.
+    /// Returns this range as angles in the body frame, as a head mounted straight would measure them, for pictures.
     ///
     /// 0 is down, and angles grow to the vehicle's left. The angles of a head that faces aft grow in the opposite
     /// sense.
@@ -148,7 +148,8 @@ fn cylinder_entered(
     let (offset, direction) = ((from + -base).0, direction.0);
     let (height, climb) = (offset.dot(&axis), direction.dot(&axis));
     let (across, drift) = (offset - axis * height, direction - axis * climb);
-    // The ray's interval inside the infinite cylinder, which is then limited to the cylinder's ends.
+    // First, the part of the ray inside an infinitely long cylinder is found. Then, this part is limited to the
+    // cylinder's ends.
     let (a, b) = (drift.dot(&drift), across.dot(&drift));
     let c = across.dot(&across) - radius_m * radius_m;
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -225,7 +226,7 @@ fn edge_rad(hidden: &impl Fn(f64) -> bool, from_rad: f64, to_rad: f64) -> f64 {
 
 /// Returns for each head the angles at which other heads or the hull hide the wall.
 ///
-/// A neighbour whose axis runs through the head hides nothing, because such heads are idealised as one position.
+/// A neighbour whose axis runs through the head hides nothing, because such heads are treated as being at one position.
 pub fn hidden_by_vehicle(heads: &[HeadSpec], hull: &[Obstacle]) -> Vec<Vec<AngleRange>> {
     heads
         .iter()
@@ -386,7 +387,8 @@ mod tests {
                 assert!(!inside(direction.scaled(enters_m - 1e-9)), "direction {direction:?}");
                 assert!(inside(direction.scaled(enters_m + 1e-9)) || !marched, "direction {direction:?}");
             }
-            // The reference marches along the ray in steps, so it may miss a cylinder that the ray only grazes.
+            // The reference result comes from points at small steps along the ray, so it may miss a cylinder that the
+            // ray only grazes.
             assert!(stops || !marched, "direction {direction:?}");
             met += i32::from(stops && marched) - i32::from(stops && !marched);
         }

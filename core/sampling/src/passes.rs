@@ -1,4 +1,4 @@
-//! Times at which a vehicle's heads pass a place on the wall, and the longest time between two passes.
+//! Times at which a vehicle's heads pass a place on the wall, and the longest time between two successive passes.
 
 mod sectors;
 
@@ -14,26 +14,26 @@ use sectors::{AT_ONCE, Leg};
 
 /// Speed below which a vehicle counts as at rest, m/s.
 ///
-/// At rest, phases do not depend on the heads' offsets along the hull.
+/// At rest, phases are computed without the heads' offsets along the hull.
 const AT_REST_MPS: f64 = 1e-3;
 /// Relative difference of turn periods above which heads count as rotating at different rates.
 const SAME_TURN: f64 = 0.02;
 /// Limit for the cosine of the angle between a head's axis and the tunnel's axis.
 ///
-/// Below this limit, the head is askew: its scan plane meets no wall near the vehicle.
+/// If the cosine is below this limit, the head is askew: its scan plane meets no wall near the vehicle.
 const ASKEW: f64 = 0.1;
 
 /// Tolerance for rounding errors in shares of a turn or of a length.
 const ROUNDING: f64 = 1e-9;
 
-/// Measured state of a vehicle and its heads at one epoch.
+/// Measured state of a vehicle and its heads at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Situation {
     /// Pose of the vehicle; `None` without a fix.
     pub pose: Option<Pose>,
     /// Speed along the tunnel, m/s; negative on the way back.
     pub speed_mps: f64,
-    /// Standard deviation of the distance between two passes, m: the largest value around the wall.
+    /// Standard deviation of the distance between two passes over a place, m: the largest value for any place.
     pub pass_error_m: f64,
     /// Layout of the heads, from the vehicle file.
     pub layout: HeadLayout,
@@ -65,9 +65,9 @@ pub struct Passes {
     /// Turn period of each head, seconds.
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
-    /// Largest parallax of side-by-side heads, as an error of their pass times, seconds.
+    /// Largest error of pass times, seconds, because side-by-side heads see a place at different angles.
     parallax_s: f64,
-    /// Whether the vehicle is too slow for phases along the tunnel to have a meaning.
+    /// Whether the vehicle is so slow that phases along the tunnel have no meaning.
     at_rest: bool,
     /// Whether extra passes over each place are required for lost returns.
     lossy: bool,
@@ -83,7 +83,7 @@ enum Pattern {
     Sectors {
         /// The longest period of a sweep there and back, seconds.
         sweep_s: f64,
-        /// Unevenness of passes at shared sector ends, as in [`Passes::uneven_ends`].
+        /// Unevenness of two heads' passes where their sectors meet, as in [`Passes::uneven_ends`].
         uneven: f64,
     },
     /// Heads turn in opposite senses or at different rates.
@@ -92,7 +92,7 @@ enum Pattern {
     Loose,
 }
 
-/// Passes of a head over the vertical: the first one from now on, and one per turn.
+/// Passes of a head's beam over the vertical: the first pass from now on, then one pass per turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadPasses {
     /// Number of the head.
@@ -148,7 +148,8 @@ impl Phasing {
         }
     }
 
-    /// Returns the phasing with known sectors, by head number; their angles are in each head's sensor frame.
+    /// Returns this phasing with the given sectors, by head number. A sector's angles are in the sensor frame of its
+    /// head.
     #[must_use]
     pub fn in_sectors_of<'a>(
         self,
@@ -162,7 +163,7 @@ impl Phasing {
         Self { legs, ..self }
     }
 
-    /// Whether the heads interleave evenly in some intervals of speed only.
+    /// Whether the heads interleave evenly only in some intervals of speed.
     ///
     /// True if the heads are apart along the hull and phased with each other.
     pub fn fits_some_speeds(&self) -> bool {
@@ -184,16 +185,16 @@ impl Phasing {
 
     /// Largest distance along the tunnel between the planes in which the heads meet the wall, m.
     ///
-    /// Heads that are not phased with each other count as well.
+    /// Heads that are not phased with each other are also included.
     fn spread_m(&self) -> f64 {
         let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
     }
 
-    /// Mean distance along the hull between heads that pass a place in succession, as a share of [`Phasing::apart_m`].
+    /// Mean distance along the hull between heads that successively pass a place, as a share of [`Phasing::apart_m`].
     ///
-    /// The share is 1 for two heads, and a half for four heads if successive heads are side by side in pairs. It is
-    /// zero if all heads are at the same place along the hull.
+    /// The share is 1 for two heads. It is a half for two pairs of side-by-side heads if the heads of a pair follow
+    /// each other. The share is zero if all heads are at the same place along the hull.
     pub fn neighbours_apart(&self) -> f64 {
         let apart_m = self.apart_m();
         if apart_m <= 0.0 {
@@ -273,7 +274,7 @@ impl Phasing {
     }
 }
 
-/// Angle that each head turns until it next passes the vertical, as a share of a turn.
+/// Angle through which each head turns until it next passes the vertical, as a share of a turn.
 ///
 /// `None` for heads with opposite senses or different rates.
 fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]> {
@@ -283,7 +284,7 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
     if longest_s - shortest_s > SAME_TURN * shortest_s {
         return None;
     }
-    // If all heads turn in the opposite sense, their angles are mirrored.
+    // If the body-frame angles of all heads fall, they are mirrored, so that all angles grow.
     let mirror = if turning().all(|motion| body_rate(motion) < 0.0) { -1.0 } else { 1.0 };
     let mut phases = [0.0; MAX_HEADS];
     for (motion, phase) in motions.iter().zip(&mut phases) {
@@ -298,10 +299,11 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
 
 /// Chainage at which a head's scan plane meets the wall, relative to the vehicle's origin, m.
 ///
-/// The chainage is the same all round the wall, except for a part common to all heads with parallel axes. `None` for
+/// The chainage varies around the wall only by an amount that is the same for all heads with parallel axes. `None` for
 /// a head whose scan plane lies along the tunnel.
 ///
-/// The head's samples lie in the plane through the head normal to its axis n: `x n_x + y n_y + z n_z = (head) n`.
+/// The head's samples lie in the plane that contains the head and is normal to its axis n: `x n_x + y n_y + z n_z =
+/// (head) n`.
 pub fn ahead_m(attitude: &Rot<Tunnel, headrace_geometry::frames::Body>, mount: &Mount) -> Option<f64> {
     let axis = *attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let offset = *attitude * mount.position;
@@ -328,7 +330,7 @@ pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
 }
 
 impl Passes {
-    /// Returns these passes with the parallax of side-by-side heads.
+    /// Returns these passes with the timing error that the parallax of side-by-side heads causes.
     ///
     /// The angles from the heads to one place on the wall differ by up to `parallax_rad`.
     #[must_use]
@@ -348,16 +350,18 @@ impl Passes {
         self.lossy
     }
 
-    /// Returns the longest time that `needed` successive passes of the heads `seen_by` over a place take, s.
+    /// Returns the longest time, s, that `needed` successive passes over a place take; the heads `seen_by` see the
+    /// place.
     ///
-    /// `gap_s` is the longest time between two passes; the other passes of a turn share the rest of the turn evenly.
-    /// The result is continuous in `needed`, and equals `gap_s` for up to one pass.
+    /// `gap_s` is the longest time between two passes. The other passes of a turn are assumed to be evenly spread over
+    /// the rest of the turn. The result is continuous in `needed`, and equals `gap_s` for up to one pass.
     pub fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         let (passing, turn_s) = match self.pattern {
             Pattern::Turning(_) => {
                 (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
             }
-            // A sweep there and back passes a place twice. At a sector's end, one pass follows another immediately.
+            // A sweep there and back passes a place twice. At a sector's end, these two passes follow each other
+            // immediately.
             Pattern::Sectors { sweep_s, .. } => (2, sweep_s),
             Pattern::Loose => (1, gap_s),
         };
@@ -374,8 +378,9 @@ impl Passes {
 
     /// Creates passes of continuously rotating heads, evenly phased in order of their numbers.
     ///
-    /// A schedule for the present speed has these passes if the turn periods are equal. With unequal turn periods,
-    /// heads run out of step, and no phase is reliable. `turn_s` returns the turn period of a head, seconds.
+    /// Heads with equal turn periods have these passes after a start by a schedule for the present speed. Heads with
+    /// unequal turn periods run out of step, and have no reliable phases. `turn_s` returns the turn period of a head,
+    /// seconds.
     /// Errors: no head.
     pub fn evenly_phased(heads: HeadSet, turn_s: impl Fn(usize) -> f64) -> Result<Self, SamplingError> {
         const IN_STEP: f64 = 1e-6;
@@ -411,7 +416,7 @@ impl Passes {
 
     /// Returns the longest time between two passes of the heads `seen_by` over a place, s.
     ///
-    /// `None` if none of these heads turns.
+    /// `None` if none of the heads `seen_by` turns.
     pub fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
         let passing = || seen_by.iter().filter(|head| self.heads.has(*head));
         passing().next()?;
@@ -433,11 +438,11 @@ impl Passes {
         })
     }
 
-    /// Largest unevenness of neighbouring heads at the end that their sectors share.
+    /// Largest unevenness of passes by two neighbouring heads at the end that their sectors share.
     ///
     /// The unevenness is a share of the vehicle's advance in a sweep there and back. It is 0 if one head reaches the
-    /// shared end half a sweep after the other head. It is 0.5 if both heads reach it at the same chainage, or if the
-    /// timing is unknown. `None` for continuously rotating heads.
+    /// shared end half a sweep after the other head. It is 0.5 if both heads reach the shared end at the same chainage,
+    /// or if the timing is unknown. `None` for continuously rotating heads.
     pub fn uneven_ends(&self) -> Option<f64> {
         match self.pattern {
             Pattern::Sectors { uneven, .. } => Some(uneven),
@@ -450,7 +455,8 @@ impl Passes {
         self.turns_s.into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns the passes with evenly phased heads and without parallax; heads out of step are unchanged.
+    /// Returns these passes as they would be with evenly phased heads and without parallax. Heads that are not phased
+    /// with each other stay unchanged.
     #[must_use]
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
@@ -472,9 +478,9 @@ impl Passes {
 
     /// Returns the phase error of each head relative to the first head that turns, radians.
     ///
-    /// The error is an angle of the head's turn, in [-pi, pi). If it is positive, the head passes a place later, and
-    /// farther ahead, than in the schedule for `scheduled` heads. `None` for an absent head, for heads that aren't
-    /// phased with each other, and at rest.
+    /// The error is an angle of the head's turn, in [-pi, pi). If it is positive, the head passes the wall later, and
+    /// farther ahead, than it should by the schedule for `scheduled` heads. `None` for an absent head, for heads that
+    /// aren't phased with each other, and at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {
         let mut errors = [None; MAX_HEADS];
@@ -491,7 +497,7 @@ impl Passes {
     }
 }
 
-/// Scheduled phase of the head number `head` of `heads`, as a share of the vehicle's advance per turn.
+/// Scheduled phase of head number `head` among `heads` heads, as a share of the vehicle's advance per turn.
 ///
 /// A head that is ahead in angle passes a place earlier.
 fn scheduled_phase(head: usize, heads: usize) -> f64 {

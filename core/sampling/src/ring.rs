@@ -1,6 +1,6 @@
 //! Points where a head's beams meet the wall, by ray casting for any profile and pose.
 //!
-//! The head is at rest: the distance that the vehicle travels between pings is left out.
+//! The vehicle is at rest: the distance that it travels between pings is neglected.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,10 +10,10 @@ use headrace_geometry::math::{self, TAU};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::{Profile, WallHit};
 
-/// Range above which a beam counts as running along the tunnel, m.
+/// A beam that meets no wall within this range counts as running along the tunnel, m.
 const ALONG_M: f64 = 1000.0;
 
-/// A head at rest in a straight tunnel, from which rays are cast.
+/// A head at rest in a straight tunnel; rays are cast from this head.
 #[derive(Debug, Clone, Copy)]
 pub struct Standing<'a> {
     profile: &'a Profile,
@@ -78,9 +78,9 @@ impl<'a> Standing<'a> {
 
     /// Footprint of a beam of full width `beam_rad` about `angle_rad`.
     ///
-    /// In the scan plane, the footprint extends from one edge of the beam to the other along the unrolled wall.
-    /// Across this plane, it extends between the edges tilted ahead and astern.
-    /// Errors: as for [`Standing::sounding`], for each edge; a width that isn't above zero.
+    /// In the scan plane, the footprint extends from one edge of the beam to the other along the unrolled wall. Across
+    /// this plane, it extends between beams that are tilted ahead and astern by half the width.
+    /// Errors: as for [`Standing::sounding`], for each edge of the beam; a width that isn't above zero.
     /// Source: Jorge et al. 2021, §9.2 and Fig. 15, for any wall.
     pub fn footprint(&self, angle_rad: f64, beam_rad: f64) -> Result<Footprint, SamplingError> {
         positive("the beam's width in radians", beam_rad)?;
@@ -116,7 +116,7 @@ impl Sounding {
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// The distance is measured along the shorter way around the perimeter, like the size of a holiday.
+    /// The distance follows the shorter way around the perimeter, as the sizes of holidays do.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -140,7 +140,7 @@ pub struct Ring {
     perimeter_m: f64,
     /// Angles and beam directions of the soundings, cached for the next cast.
     beams: Vec<(f64, Vec3<Sensor>)>,
-    /// Stride of the distances cached in `steps_m`: each is from a sounding to the sounding `stride` places on.
+    /// Stride of the cached `steps_m`. Each entry is the distance from a sounding to the one `stride` places later.
     ///
     /// Zero if no distances are cached.
     stride: usize,
@@ -201,7 +201,7 @@ impl Ring {
         Ok(())
     }
 
-    /// Whether the arc length of the whole turn is a multiple of the perimeter.
+    /// Whether the signed arc length of the whole turn is a multiple of the perimeter.
     fn is_closed(&self) -> bool {
         let rounds = self.way_round_m() / self.perimeter_m;
         (rounds - math::round_to_i64(rounds) as f64).abs() <= 1e-6
@@ -265,7 +265,7 @@ impl Ring {
 
     /// Pairs of soundings `stride` apart, including the pairs that close the turn.
     ///
-    /// A head that pings at every `stride`-th sounding has these pairs as neighbours.
+    /// If a head pings only at every `stride`-th sounding, these pairs are its neighbouring pings.
     pub fn pairs(&self, stride: usize) -> impl Iterator<Item = (&Sounding, &Sounding)> {
         let count = self.soundings.len().max(1);
         self.soundings.iter().zip(self.soundings.iter().cycle().skip(stride % count))
@@ -273,14 +273,14 @@ impl Ring {
 
     /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart.
     ///
-    /// The distance is the largest over all angles of the first ping. Zero without soundings.
+    /// The largest value for any angle of the first ping is used. Zero without soundings.
     ///
     /// Source: Jorge et al. 2021, Eq. 6, where its assumptions hold.
     pub fn largest_step_m(&self, stride: usize) -> f64 {
         self.steps_m(stride).fold(0.0, f64::max)
     }
 
-    /// Distances on the unrolled wall from each sounding to the sounding `stride` places on, m.
+    /// Distances on the unrolled wall from each sounding to the sounding `stride` places later, m.
     ///
     /// The distances follow the direction of rotation. With one ping per turn, the distance is the whole perimeter.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
@@ -291,8 +291,8 @@ impl Ring {
         self.pairs(stride).enumerate().map(move |(k, (a, b))| {
             let (to, turns) =
                 if k + rest < count { (k + rest, turns) } else { (k + rest - count, turns + 1) };
-            // The difference of arc lengths has the smallest rounding error. The cumulative length gives the number
-            // of whole perimeters to add, mostly zero.
+            // The difference of two arc lengths has a smaller rounding error than the difference of two cumulative
+            // lengths. The cumulative lengths only give the number of whole perimeters to add, which is mostly zero.
             let short_m = math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
             let round_m = way_m(to) + whole_m * turns as f64 - way_m(k) - short_m;
             let rounds = if round_m.abs() < 0.4 * self.perimeter_m {

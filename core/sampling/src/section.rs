@@ -1,13 +1,13 @@
 //! Equations of Jorge et al. 2021 for one cross-section: a rotating head on a vehicle at rest.
 //!
-//! The paper states the equations for a head midway between floor and crown of a tunnel of height b. They hold for
-//! any flat or circular wall. The functions here take the distance h to the wall, which is b / 2 in the paper's case.
-//! Angles are measured from the perpendicular to the flat wall.
+//! The paper states the equations for a head midway between floor and crown of a tunnel of height b. The equations hold
+//! for any flat or circular wall. The functions here take the distance h from the head to the wall, which is b / 2 in
+//! the paper. Angles are measured from the perpendicular to the flat wall.
 
 use super::error::{SamplingError, not_negative, positive};
 use headrace_geometry::math;
 
-/// T_y1, m: distance between samples of a turn on a flat wall at the foot of the perpendicular, where it is smallest.
+/// T_y1, m: smallest distance between neighbouring samples of a turn on a flat wall, at the foot of the perpendicular.
 ///
 /// `distance_m` > 0 is the distance h to the wall, `step_rad` the step theta, in (0, pi/2).
 /// Errors: an argument out of range; a step of 90 degrees or more.
@@ -19,9 +19,9 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
 /// T_y2, m: distance between the samples at (m - 1) theta and m theta on a flat wall, for any m >= 1.
 ///
 /// The distance is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall. The
-/// formula h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)),
-/// which avoids cancellation. Multiples of theta have twice double precision, so that the result is as accurate for a
-/// beam almost along the wall.
+/// formula h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)), which
+/// avoids cancellation. Multiples of theta have twice double precision, so that the result is also accurate for a beam
+/// that is almost parallel to the wall.
 /// Errors: an argument out of range; m theta of 90 degrees or more.
 /// Source: Jorge et al. 2021, Eq. 6.
 pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingError> {
@@ -32,9 +32,10 @@ pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingErr
     Ok(distance_m * math::sin(step_rad) / (cosine * cos_of_multiple(m - 1, step_rad)?))
 }
 
-/// T_c, m: distance between samples of a turn on a circular wall for a head at its centre, the same everywhere.
+/// T_c, m: distance between neighbouring samples of a turn on a circular wall around a head at its centre.
 ///
-/// T_c is a straight-line distance. `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 is the step theta.
+/// T_c is a straight-line distance, and is the same everywhere on the wall. `radius_m` > 0 is the paper's b / 2;
+/// `step_rad` > 0 is the step theta.
 /// Errors: an argument out of range.
 /// Source: Jorge et al. 2021, Eq. 7 (b sin(theta / 2)).
 pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
@@ -43,7 +44,7 @@ pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
     Ok((2.0 * radius_m * math::sin(step_rad / 2.0)).abs())
 }
 
-/// Mean distance between samples of a turn on a flat wall, from the foot of the perpendicular to m theta, m.
+/// Mean distance between neighbouring samples of a turn on a flat wall, m, from the perpendicular to the angle m theta.
 ///
 /// Errors: as for [`t_y2_m`].
 /// Source: Jorge et al. 2021, Eq. 8, whose sum telescopes to Eq. 9: h tan(m theta) / m.
@@ -55,11 +56,11 @@ pub fn t_y2_mean_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, Sampli
     Ok(distance_m * sine / cosine / f64::from(m))
 }
 
-/// T_yp, m: upper bound of the mean distance between samples of a turn: perimeter / pings per turn.
+/// T_yp, m: upper bound of the mean distance between neighbouring samples of a turn: perimeter / pings per turn.
 ///
 /// The bound holds for any head position.
 ///
-/// Errors: a perimeter or a number that isn't above zero.
+/// Errors: a perimeter or a number of steps that isn't above zero.
 /// Source: Jorge et al. 2021, Eq. 10.
 pub fn t_yp_m(perimeter_m: f64, steps: u32) -> Result<f64, SamplingError> {
     Ok(positive("the perimeter in metres", perimeter_m)? / positive("the steps of a turn", f64::from(steps))?)
@@ -67,14 +68,14 @@ pub fn t_yp_m(perimeter_m: f64, steps: u32) -> Result<f64, SamplingError> {
 
 /// epsilon: overlap of the beams of neighbouring pings (beam width / angular step).
 ///
-/// Beams do not overlap below 1. `beam_rad` is the beam's full width zeta, `step_rad` the step theta.
+/// Below 1, beams do not overlap. `beam_rad` is the beam's full width zeta, `step_rad` the step theta.
 /// Errors: an argument that isn't above zero.
 /// Source: Jorge et al. 2021, Eq. 22.
 pub fn overlap(beam_rad: f64, step_rad: f64) -> Result<f64, SamplingError> {
     Ok(positive("the beam's width in radians", beam_rad)? / positive("the step in radians", step_rad)?)
 }
 
-/// eta, m: range resolution of a head, which is its span of ranges divided by the number of counts.
+/// eta, m: range resolution of a head: its span of ranges divided by the number of counts for this span.
 ///
 /// Errors: no counts, a negative least range, or an empty span of ranges.
 /// Source: Jorge et al. 2021, §6.
@@ -100,7 +101,7 @@ pub fn beam_width_m(range_m: f64, beam_rad: f64) -> Result<f64, SamplingError> {
 ///
 /// `distance_m` is the perpendicular distance to the wall, `angle_rad` the beam's angle from the perpendicular (either
 /// side), `beam_rad` its full width.
-/// Errors: an argument out of range; an edge of the beam that never meets the wall.
+/// Errors: an argument out of range; a beam with an edge that never meets the wall.
 /// Source: Jorge et al. 2021, §9.2 and Fig. 15: h (tan(alpha + zeta/2) - tan(alpha - zeta/2)), computed without the
 /// subtraction.
 pub fn footprint_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> Result<f64, SamplingError> {
@@ -111,7 +112,7 @@ pub fn footprint_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> Result<f64
     Ok(distance_m * math::sin(beam_rad) / (far * near))
 }
 
-/// Returns cos(m x) for m x in [0, pi/2), with m x in twice double precision.
+/// Returns cos(m x) for m x in [0, pi/2); the product m x is computed in twice double precision.
 fn cos_of_multiple(m: u32, x_rad: f64) -> Result<f64, SamplingError> {
     let (high, low) = product(f64::from(m), x_rad);
     above_zero(high, math::cos(high) - math::sin(high) * low)
@@ -162,7 +163,7 @@ mod tests {
     fn cosine_of_a_sum_is_accurate_up_to_a_grazing_beam() {
         const REST: f64 = 6.123_233_995_736_766e-17;
         for k in 35..60 {
-            // For angles above half a right angle, the difference from a right angle is exact.
+            // For an angle above half a right angle, its computed difference from a right angle is exact.
             let a_rad = 0.023 * f64::from(k);
             for left in [1e-3, 1e-6, 1e-9, 1e-12] {
                 let b_rad = FRAC_PI_2 - a_rad - left;
@@ -215,8 +216,8 @@ mod tests {
     }
 
     proptest! {
-        /// Theorem 1: distances between samples on a flat wall grow with the distance from the foot of the
-        /// perpendicular.
+        /// Theorem 1 of Jorge et al. 2021: on a flat wall, the samples are farther apart the farther they are from the
+        /// foot of the perpendicular.
         #[test]
         fn distances_between_samples_on_a_flat_wall_grow_away_from_its_nearest_point(h in 0.01..100.0f64, step in 1e-4..0.3f64, share in 0.0..1.0f64) {
             let last = headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1;
@@ -232,7 +233,7 @@ mod tests {
             prop_assert!(t_c_m(h, step).unwrap() < t_y1_m(h, step).unwrap());
         }
 
-        /// The mean distance between samples by Eq. 8 equals the mean of the single distances.
+        /// The mean distance by Eq. 8 equals the mean of all distances between neighbouring samples.
         #[test]
         fn mean_sample_distance_equals_the_mean_of_the_single_distances(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
             let m = u32::try_from(headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1).unwrap_or(0);

@@ -15,7 +15,7 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
 
 /// The speed at which T_max equals the target, m/s.
 ///
-/// `None` if `t_y_m` alone reaches the target, or the times aren't positive. `pass_gap_s` is the time between passes
+/// `None` if `t_y_m` alone reaches the target, or if the times aren't positive. `pass_gap_s` is the time between passes
 /// (T_rev / s for s evenly interleaved heads), `ping_period_s` the time between pings (T_s).
 /// Source: Eq. 16 solved for v (docs/decisions/0005-advice-and-plan.md).
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
@@ -23,7 +23,8 @@ pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_per
     along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
 }
 
-/// Sum of pass distance and ping advance that the target T allows, m: sqrt(T^2 - T_y^2).
+/// Largest allowed sum of the distance between passes and the advance between pings, m: sqrt(T^2 - T_y^2) for the
+/// target T.
 ///
 /// `None` if `t_y_m` alone reaches the target.
 pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
@@ -63,52 +64,56 @@ impl Spiral {
         self.speed_mps * self.turn.period_s()
     }
 
-    /// Distance along the tunnel between passes over a place, m: T_x / s, or at most 2 T_x / s in sectors.
+    /// Distance along the tunnel between passes over a place, m, for s heads: T_x / s in phase shift, at most 2 T_x / s
+    /// in sectors.
     /// Source: §5.1 and §5.2.
     pub fn t_x_m(&self) -> f64 {
         self.pitch_m() / self.passes_per_turn
     }
 
-    /// T_ymax, m: largest distance between samples of a turn, from the largest distance `t_y2_m` of a head at rest.
+    /// T_ymax, m: largest distance between samples of a turn, computed from `t_y2_m`, the largest distance for a head
+    /// at rest.
     /// Source: Eq. 13.
     pub fn t_y_max_m(&self, t_y2_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_y2_m)
     }
 
-    /// T_ymin, m: smallest distance between samples of a turn, from the smallest distance of a head at rest (T_y1 or
-    /// T_c). Source: Eq. 14.
+    /// T_ymin, m: smallest distance between samples of a turn, computed from the smallest distance for a head at rest
+    /// (T_y1 or T_c). Source: Eq. 14.
     pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
         math::hypot(self.advance_m(), smallest_step_m)
     }
 
-    /// Mean distance between samples of a turn, m, from the mean distance `t_yp_m` of a head at rest, as printed in
-    /// Eq. 15.
+    /// Mean distance between samples of a turn, m, by Eq. 15 as printed; `t_yp_m` is the mean distance for a head at
+    /// rest.
     ///
     /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with the distance of a single step.
-    /// [`Spiral::t_y_mean_m`] uses the advance between two pings, so that both values can be displayed.
+    /// [`Spiral::t_y_mean_m`] uses the advance between two pings instead.
     /// Source: Eq. 15.
     pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }
 
-    /// Mean distance between samples of a turn, m: the mean distance `t_yp_m` of a head at rest, combined with the
+    /// Mean distance between samples of a turn, m. It combines `t_yp_m`, the mean distance for a head at rest, with the
     /// advance between two pings.
     pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_yp_m)
     }
 
-    /// T_max: largest spacing of samples, m, from the largest distance `t_y2_m` of a head at rest. Source: Eq. 16.
+    /// T_max: largest spacing of samples, m, from `t_y2_m`, the largest distance between samples of a turn for a head
+    /// at rest. Source: Eq. 16.
     pub fn t_max_m(&self, t_y2_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y2_m)
     }
 
-    /// T_mean: mean spacing of samples, m, from the mean distance of a turn's samples, advance included. Source: Eq.
-    /// 17.
+    /// T_mean: mean spacing of samples, m, from the mean distance between samples of a turn, which includes the advance
+    /// between pings. Source: Eq. 17.
     pub fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_mean_m)
     }
 
-    /// T_min: smallest spacing of samples, m, from the smallest distance of a turn's samples, advance included.
+    /// T_min: smallest spacing of samples, m, from the smallest distance between samples of a turn, which includes the
+    /// advance between pings.
     /// Source: Eq. 18.
     pub fn t_min_m(&self, t_y_min_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_min_m)

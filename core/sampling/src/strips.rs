@@ -1,4 +1,4 @@
-//! Wall around a vehicle, divided into strips seen by the same heads, and the sample spacing on them.
+//! Wall around a vehicle, divided into strips, and the sample spacing on each strip. The same heads see all of a strip.
 
 mod limit;
 mod thin;
@@ -32,8 +32,8 @@ pub struct Strip {
     pub seen_by: HeadSet,
     /// Whether any part of the strip is hidden from a head whose beam would otherwise sweep it.
     ///
-    /// Pings then stop up to one angular step before the strip's edge. If the strip is only outside a sector, pings
-    /// stop at its edge.
+    /// If true, the head's pings stop up to one angular step before the strip's edge. If the strip is only outside the
+    /// head's sector, pings stop exactly at its edge.
     pub hidden: bool,
     /// Longest time between two passes over the strip, as a share of a sweep there and back: 0.5 to 1.
     ///
@@ -42,7 +42,7 @@ pub struct Strip {
 }
 
 impl Strip {
-    /// Whether another strip differs from this strip only in its place on the wall.
+    /// Whether this strip and another one differ only in their places on the wall.
     fn is_like(&self, other: &Self) -> bool {
         let same_wait = (self.wait - other.wait).abs() <= 0.0;
         self.seen_by == other.seen_by && self.hidden == other.hidden && same_wait
@@ -67,29 +67,30 @@ pub struct Unmet {
     pub gap_s: f64,
     /// The largest distance between neighbouring samples of a turn on the strip, m.
     pub t_y_m: f64,
-    /// Width of the strip around the wall, m: the minimum distance between the samples on its two sides.
+    /// Width of the strip around the wall, m. Samples on the strip's two sides are at least this far apart.
     pub width_m: f64,
 }
 
 /// Strips of the wall in order of arc length; a single strip if all heads see all of the wall.
 ///
-/// Neighbouring strips differ in the heads that see them or in the time between passes. For several settings of the
-/// heads, the largest distance between neighbouring samples of a turn is stored for each strip.
+/// Neighbouring strips differ in the heads that see them or in the time between passes. For each setting of the heads
+/// and each strip, the largest distance between neighbouring samples of a turn is stored.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
     strips: Vec<Strip>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
-    /// Largest distances between samples of a turn on a strip, m: of the heads that see the strip, and of all heads.
+    /// Two largest distances between samples of a turn on a strip, m: first among the heads that see the strip, then
+    /// among all heads.
     ///
     /// The list is ordered by setting, then by strip.
     steps_m: Vec<[f64; 2]>,
-    /// Numbers of passes needed because of lost returns, within a strip and across it.
+    /// Numbers of passes needed because of lost returns, for holes within a strip and for holes across it.
     ///
     /// The list is ordered by setting, then by strip. It is empty before the first call of `count_losses`.
     needed: Vec<[f64; 2]>,
-    /// Strip of each sounding of the present ring of rays, and approximate distance from the sounding to the strip's
-    /// end, m.
+    /// Strip of each sounding of the present ring of rays, and approximate distance, m, from the sounding to the end of
+    /// its strip.
     strip_of: Vec<(usize, f64)>,
 }
 
@@ -109,7 +110,7 @@ impl Strips {
         }
     }
 
-    /// Divides the wall into strips by the views of the heads; distances between samples are not yet known.
+    /// Divides the wall into strips by the views of the heads. [`Strips::measure`] adds the distances between samples.
     ///
     /// Allocates: not if the capacity suffices for the views' sectors and hidden arcs.
     pub fn rebuild<'a>(&mut self, perimeter_m: f64, views: &'a [View]) {
@@ -151,7 +152,7 @@ impl Strips {
         (sum_m - self.perimeter_m).abs() <= 1e-6 * self.perimeter_m
     }
 
-    /// Joins the last strip with the first strip across the arc-length seam if both are alike.
+    /// Joins the last strip with the first strip across the start of arc lengths if both strips are alike.
     fn join_at_the_seam(&mut self) {
         let first = self.strips.first().copied();
         if self.strips.len() > 1
@@ -166,7 +167,7 @@ impl Strips {
     /// Measures the largest distance between samples of a turn on each strip, for each of `settings` settings of the
     /// heads.
     ///
-    /// `stride` returns the number of rays in a head's step, by setting and head; `None` for an absent head.
+    /// `stride` returns the number of rays in an angular step, by setting and head; `None` for an absent head.
     ///
     /// Allocates: not if the capacity suffices for the settings.
     pub fn measure<'a>(
@@ -240,8 +241,8 @@ impl Strips {
         Arc { from_m: strip.arc.from_m - back_m, length_m: (forward_m + back_m).min(self.perimeter_m) }
     }
 
-    /// Returns the largest distance between samples of a turn in a setting, m, over all heads and the strips that
-    /// they see.
+    /// Returns the largest distance between samples of a turn in a setting, m. All heads count, on the strips that they
+    /// see.
     pub fn largest_step_m(&self, setting: usize) -> f64 {
         let count = self.strips.len();
         let of_setting = self.steps_m.iter().skip(setting * count).take(count);
@@ -256,8 +257,8 @@ impl Strips {
 
     /// Returns T_max predicted at a speed, m: the largest spacing T on any strip.
     ///
-    /// The result is infinite if there is a wide strip that no head sees. Passes are farther apart on a strip that
-    /// some heads do not see. On a narrow strip, the samples on either side limit T as well.
+    /// The result is infinite if no head sees some wide strip. Passes are farther apart on a strip that some heads do
+    /// not see. On such a strip, if it is narrow, the samples on its two sides limit T as well.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
@@ -276,7 +277,7 @@ impl Strips {
     ) -> Option<Unmet> {
         let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
-        // The samples on the two sides of a strip matter only if the strip itself misses the target.
+        // The samples on the two sides of a strip matter only if the samples within the strip miss the target.
         let is_unmet = |(k, strip): &(usize, &Strip)| {
             !(self.within(setting, (*k, strip), &thin).is_some_and(is_met)
                 || self.across(setting, (*k, strip), &thin).is_some_and(is_met))
@@ -289,7 +290,7 @@ impl Strips {
         })
     }
 
-    /// Returns the largest speed for a target if every head saw all of the wall, m/s.
+    /// Returns the speed that would be the largest for a target if every head saw all of the wall, m/s.
     ///
     /// `None` if no speed meets the target.
     pub fn bound_if_all_seen_mps(
@@ -402,8 +403,8 @@ impl Strips {
 
     /// Returns the width of the gap that strip `k` and its thin neighbours form, m.
     ///
-    /// The width is the distance between the samples on the gap's two sides. Also returns whether the strips are
-    /// thin only because they lie between the heads' sectors.
+    /// The width is the distance between the samples on the gap's two sides. The function also returns whether the
+    /// strips are thin only because they lie between the heads' sectors.
     fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> (f64, bool) {
         let count = self.strips.len();
         let thin = |number: usize| {
@@ -427,10 +428,10 @@ impl Strips {
         (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
     }
 
-    /// Computes how many passes over each strip are needed in place of a single pass because of lost returns, in a
-    /// setting of the heads.
+    /// Computes, for a setting of the heads, how many passes over each strip must replace a single pass because of lost
+    /// returns.
     ///
-    /// The number is used with [`crate::passes::Passes::lossy`]. `rates` are the losses of each head, `None` for an
+    /// The numbers are used with [`crate::passes::Passes::lossy`]. `rates` are the losses of each head, `None` for an
     /// absent head.
     ///
     /// Allocates: not if the capacity suffices for the settings.
@@ -456,14 +457,14 @@ impl Strips {
         }
     }
 
-    /// Returns how many passes are needed in place of a single pass, within a strip and across it.
+    /// Returns how many passes are needed in place of a single pass, for holes within a strip and for holes across it.
     fn needed(&self, setting: usize, k: usize, thin: &Thin<'_>) -> [f64; 2] {
         let needed = || self.needed.get(setting * self.strips.len() + k).copied();
         if thin.is_lossy() { needed().unwrap_or([1.0; 2]) } else { [1.0; 2] }
     }
 }
 
-/// Start and direction on the perimeter of a step between two soundings.
+/// Start and direction, on the perimeter, of the step from one sounding to the next.
 struct Reached {
     head: usize,
     arc_m: f64,
@@ -473,7 +474,7 @@ struct Reached {
     is_within: bool,
 }
 
-/// Records a head's step between two soundings on every strip that it touches or crosses, even the narrowest.
+/// Records the distance between two soundings of a head for every strip that the step between them touches or crosses.
 fn note_step(
     strips: &[Strip],
     steps_m: &mut [[f64; 2]],
@@ -539,7 +540,7 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
 
 /// Returns the number of the strip at an arc length, given a guess.
 ///
-/// The guess is mostly right, because soundings are in order around the wall. See [`number_at`].
+/// The guess is mostly right, because soundings are in order around the wall. If it is wrong, all strips are searched.
 fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> usize {
     let first_m = strips.first().map_or(0.0, |strip| strip.arc.from_m);
     let from_first_m = math::wrap(arc_m - first_m, perimeter_m);
@@ -550,7 +551,7 @@ fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> 
     strips.iter().rposition(|strip| strip.arc.from_m - first_m <= from_first_m).unwrap_or(0)
 }
 
-/// Returns the number of the last strip that begins at or before an arc length.
+/// Returns the number of the strip that begins at or nearest before an arc length.
 fn number_at(strips: &[Strip], arc_m: f64, perimeter_m: f64) -> usize {
     number_near(strips, arc_m, perimeter_m, strips.len())
 }

@@ -8,15 +8,15 @@ use headrace_geometry::tunnel::Yz;
 
 /// Number of stored directions: at 5 Hz, `WINDOW` plus one turn of a head in its slowest mode.
 const BEATS: usize = 320;
-/// Length of the past period in which a swing counts.
+/// Length of the past period from which the swing is computed.
 ///
 /// A swing with a period of up to a minute reaches its full extent within half a minute.
 const WINDOW: DurNs = DurNs(30_000_000_000);
-/// Largest rotation between two passes that is attributed to navigation errors, radians.
+/// Largest rotation between two passes that is attributed to navigation errors only, radians.
 ///
-/// A rotation of twice this value or more counts fully.
+/// A rotation of at least twice this value counts fully as swing.
 const DEAD_RAD: f64 = 0.0075;
-/// Time between two stored directions from which on the history counts as interrupted.
+/// If at least this time passes between two stored directions, the history counts as interrupted.
 const INTERRUPTED: DurNs = DurNs(1_000_000_000);
 /// Lower limit of a direction's component along the tunnel in the computation of displacements.
 ///
@@ -33,7 +33,7 @@ pub struct Swing<'a> {
     /// Largest rotation between the passes of two heads that are apart along the hull, divided by the time between
     /// them, rad/s.
     ///
-    /// The rearmost head reaches the position of the foremost head after this time.
+    /// This time is the time until the rearmost head reaches the position of the foremost head.
     pub apart_rate_radps: f64,
     /// History of the vehicle's directions from which the swing was computed, if known.
     pub history: Option<&'a Looks>,
@@ -48,11 +48,11 @@ pub struct Looks {
 
 /// Latest directions of the vehicle's x axis, stored at about equal intervals.
 ///
-/// Directions from before a time without a position are excluded.
+/// If positions were missing for a time, directions from before that time are excluded.
 #[derive(Debug, Clone, Copy)]
 pub struct RecentSwing<'a> {
     looks: &'a Looks,
-    /// Index of the oldest of these directions, counted from the newest direction.
+    /// Index of the oldest included direction, counted from the newest direction.
     last: usize,
     span_s: f64,
 }
@@ -89,9 +89,9 @@ impl Looks {
 
     /// Returns the largest swing in the half minute before `now`.
     ///
-    /// The result stays about constant while the vehicle swings to and fro. `gap_s` is the time between passes; all
-    /// heads pass a place within `apart_s`. Rotation within the navigation errors is excluded, with a continuous
-    /// transition.
+    /// The result stays about constant while the vehicle swings to and fro. `gap_s` is the time between passes, and
+    /// `apart_s` the time in which all heads pass a place. Rotation that navigation errors explain is excluded, without
+    /// a step at the limit.
     /// Allocates: never.
     pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing<'_> {
         let rate = |over_s: f64| {
@@ -118,11 +118,11 @@ impl Looks {
         let mut turned_rad = 0.0_f64;
         let mut earlier = self.newest_first().peekable();
         for (at, look) in self.recent(now) {
-            // Both iterators move back in time, so `earlier` never has to be rewound.
+            // Both iterators move back in time, so `earlier` need not start again for each later moment.
             while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < over.0) {
                 earlier.next();
             }
-            // If the duration exceeds the stored history, the oldest direction is used.
+            // If `over_s` exceeds the stored history, the oldest direction is used.
             let before = earlier.peek().map(|(_, before)| *before).or(oldest);
             turned_rad = turned_rad.max(before.map_or(0.0, |before| (*look + -before).norm()));
         }
@@ -154,15 +154,15 @@ impl Looks {
 }
 
 impl RecentSwing<'_> {
-    /// Length of this part of the history, seconds.
+    /// Length of the uninterrupted part of the history, seconds.
     pub fn span_s(&self) -> f64 {
         self.span_s
     }
 
-    /// Displacement along the tunnel of the beams to a place on the wall, m, some seconds from now.
+    /// Displacement, along the tunnel, of the point where beams meet the wall at a place, m, some seconds from now.
     ///
-    /// `from_vehicle_m` is the place relative to the vehicle: to the left and up. The vehicle is assumed to swing as
-    /// before: backwards through the history, then forwards, and so on.
+    /// `from_vehicle_m` is the position of the place relative to the vehicle: to the left and up. The vehicle is
+    /// assumed to go through the directions of the history backwards, then forwards, and so on.
     pub fn displacement_m(&self, seconds: f64, from_vehicle_m: Yz) -> f64 {
         if self.last == 0 || self.span_s <= 0.0 {
             return 0.0;
@@ -179,7 +179,7 @@ impl RecentSwing<'_> {
         at_m(before) * (1.0 - share) + at_m(before + 1) * share
     }
 
-    /// Smallest and largest displacement of the beams to a place, m.
+    /// Smallest and largest displacement, along the tunnel, of the beams that meet the wall at a place, m.
     pub fn displacements_m(&self, from_vehicle_m: Yz) -> [f64; 2] {
         let looks = self.looks.newest_first().take(self.last + 1);
         let all = looks.map(|(_, look)| displaced_m(Some(*look), from_vehicle_m));
@@ -188,7 +188,8 @@ impl RecentSwing<'_> {
     }
 }
 
-/// Displacement along the tunnel of the beams to a place, m, if the vehicle's x axis has this direction.
+/// Displacement, along the tunnel, of the beams that meet the wall at a place, m, if the vehicle's x axis points to
+/// `look`.
 ///
 /// The scan plane is normal to the x axis.
 fn displaced_m(look: Option<Vec3<Tunnel>>, [y_m, z_m]: Yz) -> f64 {
@@ -228,7 +229,8 @@ mod tests {
         for seconds in [60.0, 63.0, 65.0, 68.4, 200.0] {
             let (looks, now) = looks(seconds, swinging);
             let swing = looks.swing(now, 2.0, 0.0);
-            // Between two passes, a sine with the amplitude A turns by at most 2 A sin(omega t / 2).
+            // In the time t between two passes, a sinusoidal yaw of amplitude A changes by at most 2 A sin(omega t /
+            // 2).
             let expected = 0.2 * math::sin(TAU * 2.0 / 40.0) / 2.0;
             assert!((swing.rate_radps / expected - 1.0).abs() < 0.01, "{seconds}: {swing:?}, {expected}");
             assert!((swing.most_rad / 0.2 - 1.0).abs() < 0.01, "{swing:?}");

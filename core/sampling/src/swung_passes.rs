@@ -9,11 +9,12 @@ use super::swing::RecentSwing;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Yz;
 
-/// Maximum number of simulated passes over a place. At a speed that needs more passes, the gaps are unknown.
+/// Maximum number of simulated passes over a place. At a speed that needs more passes than this, the gaps count as
+/// infinite.
 const MOST_PASSES: usize = 512;
-/// Length of the stretch in which gaps count, as a multiple of the target.
+/// Length of the stretch along the tunnel in which gaps are checked, as a multiple of the target.
 const STRETCH: f64 = 3.0;
-/// Ratio of each tried speed to the speed tried before, and number of tried speeds.
+/// `SLOWER_BY` is the ratio of each tried speed to the speed tried before it, and `TRIED` the number of tried speeds.
 const SLOWER_BY: f64 = 0.93;
 const TRIED: u32 = 40;
 /// Multiples of a speed that must also meet the target. A single speed may meet the target by chance.
@@ -30,8 +31,8 @@ pub(crate) struct Place {
 
 /// Returns the largest speed up to `bound_mps` at which all gaps between passes meet the target, m/s.
 ///
-/// Zero if there is no such speed. `meets` tells whether a gap, m, meets the target at a speed, m/s. Speeds around the
-/// result meet the target, too. The vehicle is assumed to go on swinging as before.
+/// Zero if there is no such speed. `meets` tells whether a gap, m, meets the target at a speed, m/s. Several speeds
+/// around the result meet the target, too. The vehicle is assumed to continue the swing of the history.
 /// Allocates: never.
 pub(crate) fn highest_mps(
     bound_mps: f64,
@@ -54,7 +55,7 @@ pub(crate) fn highest_mps(
 
 /// Largest distance along the tunnel between neighbouring passes over a place, m.
 ///
-/// Infinite if more passes would have to be simulated than there is room for.
+/// Infinite if more than [`MOST_PASSES`] passes would have to be simulated.
 fn largest_gap_m(
     speed_mps: f64,
     (swing, phasing): (&RecentSwing<'_>, &Phasing),
@@ -66,11 +67,12 @@ fn largest_gap_m(
     let ahead =
         |of: fn(f64, f64) -> f64, start: f64| of_heads().fold(start, |so_far, head| of(so_far, head.ahead_m));
     let [least_m, most_m] = swing.displacements_m(place.from_vehicle_m);
-    // Outside this stretch, some passes come before the present or after the end of the simulation.
+    // Gaps are checked only in this stretch, because outside it some passes come before the present or after the
+    // simulation's end.
     let from_m = ahead(f64::max, f64::MIN) + most_m;
     let until_m = from_m + STRETCH * target_m;
     let takes_s = (until_m - ahead(f64::min, f64::MAX) - least_m) / speed_mps;
-    // Beams reach the place after this share of a turn.
+    // A head's beam reaches the place this share of a turn after it passes the vertical.
     let turned = math::atan2(y_m, -z_m) / math::TAU;
     let mut places_m = [0.0; MOST_PASSES];
     let mut count = 0;
@@ -155,7 +157,7 @@ mod tests {
         })
     }
 
-    /// Largest gap along 10 m of a wall at `y_m` to the left, from a sine of yaw that goes on for ever.
+    /// Largest gap along 10 m of a wall at `y_m` to the left, for a sinusoidal yaw that never ends.
     fn true_gap_m(
         speed_mps: f64,
         (yaw_rad, period_s, apart_m): (f64, f64, f64),
@@ -175,8 +177,8 @@ mod tests {
         inner.map(|pair| pair[1] - pair[0]).fold(0.0, f64::max)
     }
 
-    /// Without swing, the result is about a sixth below the bound, because speeds up to 20 % higher must also meet the
-    /// target.
+    /// Without swing, the result is about a sixth below the bound `bound_mps`, because speeds up to 20 % above the
+    /// result must also meet the target.
     #[test]
     fn steady_vehicle_gets_a_speed_10_to_25_percent_below_the_theoretical_limit() {
         let (bound_mps, found_mps) = (TARGET_M / (TURN_S / 2.0), highest(0.0, 20.0, 0.0));
@@ -184,7 +186,7 @@ mod tests {
         assert!(highest(0.005, 20.0, 0.0) < found_mps);
     }
 
-    /// A swing of ten degrees moves successive passes apart by up to 0.7 m, which exceeds the target of 0.5 m.
+    /// A swing of ten degrees puts successive passes up to 0.7 m apart, which exceeds the target of 0.5 m.
     #[test]
     fn passes_of_several_swings_meet_the_target_at_a_low_speed() {
         for (period_s, apart_m) in [(20.0, 0.0), (13.0, 0.0), (27.0, 0.0), (20.0, 1.1), (17.0, 0.6)] {

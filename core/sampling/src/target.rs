@@ -8,7 +8,8 @@ pub const CONFIDENCE_SD: f64 = 2.0;
 pub struct Target {
     /// Target T: the largest hole that passes, m.
     pub max_hole_m: f64,
-    /// Confidence k: number of standard deviations of D by which a pass or a fail must differ from T.
+    /// Confidence k: in a pass or fail, the hole diameter D differs from the target T by at least k standard deviations
+    /// of D.
     pub confidence_sd: f64,
 }
 
@@ -18,7 +19,8 @@ impl Target {
         Self { max_hole_m, confidence_sd: CONFIDENCE_SD }
     }
 
-    /// Returns the error of a size with a standard deviation of `sd_m`, m: the confidence times `sd_m`.
+    /// Returns the error, m, to allow for in a hole's size: the confidence times the standard deviation `sd_m` of the
+    /// size.
     pub fn error_m(&self, sd_m: f64) -> f64 {
         self.confidence_sd * sd_m
     }

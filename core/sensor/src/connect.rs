@@ -10,7 +10,7 @@ const USUAL_BAUD: u32 = 115_200;
 /// Highest accepted serial rate, baud.
 const MAX_BAUD: u32 = 12_000_000;
 
-/// A USB device, identified by its descriptors, which are the same on any port.
+/// A USB device, identified by its descriptors, which do not depend on the USB port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbIdentity {
     /// USB vendor id.
@@ -87,7 +87,7 @@ pub struct ConnectError {
     pub allowed: String,
 }
 
-/// All forms of `connect`, listed in errors about a text that has none of them.
+/// All forms of `connect`, listed in the error about a text that has none of these forms.
 const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
      tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
 

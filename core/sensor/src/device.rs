@@ -1,10 +1,10 @@
 //! Interface that the crate of each kind of device implements.
 //!
-//! A kind parses its own keys in a sensor's table of a vehicle file. Each configured sensor has a driver, a decoder
-//! and an emulator.
+//! A kind parses its own keys in a sensor's table of a vehicle file. Each configured sensor has a driver, a decoder and
+//! an emulator.
 //!
-//! Opening the port, decoding bytes (pure) and using the readings (in the loop) are separate concerns. This file
-//! covers decoding, and the device's side of the wire for simulations.
+//! Opening the port, decoding bytes (pure) and using the readings (in the loop) are separate concerns. This file covers
+//! decoding, and for simulations the device's side of the line.
 
 use super::driver::{Carrier, Driver, DriverSetup, Probe};
 use super::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
@@ -35,7 +35,7 @@ pub struct SensorConfig {
     pub latency: DurNs,
 }
 
-/// Mount and kind of a sensor, for navigation.
+/// Mount and kind of one sensor, as far as navigation needs them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorInfo {
     /// Position and attitude of the sensor on the vehicle.
@@ -45,7 +45,7 @@ pub struct SensorInfo {
 }
 
 impl SensorInfo {
-    /// Creates the information of a sensor at the vehicle's origin that navigation does not use.
+    /// Creates the entry of a source that navigation does not use, with a mount at the vehicle's origin.
     pub fn other() -> Self {
         Self { mount: Mount { position: Vec3::zero(), rotation: Rot::identity() }, kind: SensorKind::Other }
     }
@@ -56,7 +56,7 @@ impl SensorInfo {
 pub enum SensorKind {
     /// A profiling head.
     Head,
-    /// An echosounder; readings below `min_confidence` are ignored.
+    /// An echosounder; readings with a lower confidence than `min_confidence` are ignored.
     Echosounder {
         /// Minimum confidence of a used reading, 0 to 1.
         min_confidence: f64,
@@ -149,7 +149,8 @@ pub trait Device: Send + Sync {
         None
     }
 
-    /// Returns the modes of a profiling head at `range_m`, or at the configured range; none for other devices.
+    /// Returns the modes of a profiling head at `range_m`, or at the configured range if `None`; no modes for other
+    /// devices.
     ///
     /// Errors: a message, if the head does not have this range.
     fn modes(&self, range_m: Option<f64>) -> Result<Vec<HeadMode>, String> {
@@ -179,7 +180,7 @@ pub trait Device: Send + Sync {
         None
     }
 
-    /// Writes a packet to `shorter`, without the payload that a log may omit, and returns `true`.
+    /// Writes a packet to `shorter` without its optional payload, which a log may omit, and returns `true`.
     ///
     /// Returns `false` if the packet has no such payload, or if the payload cannot be recognised from these bytes
     /// alone.
@@ -207,7 +208,7 @@ pub trait Device: Send + Sync {
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
-/// Part of a packet that a log may omit. The readings are bit-identical without it.
+/// Part of a packet that a log may omit. The decoded readings are bit-identical without this part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OptionalPayload {
     /// Echo strengths, if the message also contains the range.
@@ -274,7 +275,7 @@ pub enum Direction {
 /// Function that receives the traffic on a line: direction, time of the first byte, bytes.
 pub type LineSink<'a> = &'a mut dyn FnMut(Direction, MonoNs, &[u8]);
 
-/// Device side of the wire, and optionally a host that polls it. `M` is the type of its measurements.
+/// Device side of the line, and optionally a host that polls the device. `M` is the type of its measurements.
 pub trait Emulator<M>: Send + Sync {
     /// Adds to `due` the measurements that the device begins before `until`, in order of time, each only once.
     ///
@@ -283,7 +284,7 @@ pub trait Emulator<M>: Send + Sync {
 
     /// Processes bytes that a host sent, at time `at` on the device's clock.
     ///
-    /// A device that is not polled ignores them. Responses without a measurement go to `line`.
+    /// A device that is not polled ignores the bytes. Responses without a measurement go to `line`.
     fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}
 
     /// Encodes a measurement and passes each message to `line` with its time.

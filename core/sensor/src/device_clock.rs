@@ -1,10 +1,10 @@
-//! Model of a device's clock against the host's: unwraps its ticks and estimates its drift.
+//! Model of a device's clock: undoes the wraps of its tick counter, and estimates its drift against the host's clock.
 //!
-//! A device stamp arrives at the host after a minimum delay, and buses and queues only add to that delay. So the
-//! receive time minus the device time has a lower envelope, and the slope of the envelope is the drift. Time is
+//! Each device stamp takes at least a constant minimum time to arrive at the host. Buses and queues only add to it. So
+//! the receive time minus the device time has a lower envelope, and the slope of the envelope is the drift. Time is
 //! divided into stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to the
-//! kept stamps. A constant delay shifts all stamps equally, which changes the offset but not the slope. If all slots
-//! are full, stretches are merged in pairs, so that ten hours need no more memory than two minutes.
+//! kept stamps. A constant delay shifts all stamps equally, so it changes the line's offset but not its slope. If
+//! memory for stamps is full, stretches are merged in pairs. Thus ten hours need no more memory than two minutes.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,24 +19,25 @@ const PLACES: usize = 128;
 /// clock. Each merge doubles it.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
-/// Minimum number of stretches of time for a drift estimate. The scatter of fewer stamps is a poor measure of the
-/// drift's error.
+/// Minimum number of stretches of time for a drift estimate. With fewer stamps, their scatter about the fitted line is
+/// a poor measure of the drift's error.
 const LEAST_STRETCHES: usize = 8;
 
-/// Largest deviation of a stamp from its predicted time that is attributed to queues.
+/// Largest deviation of a stamp from its predicted time that queues explain, ns.
 ///
-/// A larger deviation begins a new epoch. The prediction uses the last stamp and the receive times. The limit is at
-/// most a quarter of the wrap period, for a clock that wraps soon.
+/// A larger deviation begins a new epoch. The prediction uses the previous stamp and the receive times. For a clock
+/// with a short wrap period, the limit is a quarter of this period.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
 /// Largest plausible difference between the minimum delays in two stretches of time.
 ///
 /// This difference is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. No clock drifts by more
-/// than this ratio. The stamp of a stretch with a larger delay was queued, and is not kept.
+/// than `MOST_DRIFT`. If a stretch's delay is larger, its stamp was queued and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
 const MOST_DRIFT: f64 = 500e-6;
 
-/// Longest plausible queueing delay. If delays stay shifted for longer, a new clock epoch begins.
+/// Longest plausible delay by a queue, ns. If the delays of stamps stay implausible for longer, a new clock epoch
+/// begins.
 const LONGEST_QUEUE_NS: i64 = 30_000_000_000;
 
 const LONGEST_TICK_NS: i64 = 900_000_000_000;
@@ -52,7 +53,7 @@ pub struct ClockReport {
     pub restarts: u64,
     /// Number of times the clock ran ahead by more than queues explain.
     pub jumps: u64,
-    /// Length of the clock epoch used for the drift, measured by the device's clock.
+    /// Length of the clock epoch from which the drift was estimated, measured by the device's clock.
     pub span: DurNs,
     /// Drift against the host's clock; `None` until there is enough data.
     pub drift: Option<Drift>,
@@ -77,7 +78,7 @@ pub struct DeviceClock {
     restarts: u64,
     jumps: u64,
     epoch: Option<Epoch>,
-    /// Most certain drift of earlier clock epochs, and the length of the epoch that gave it.
+    /// Drift with the smallest standard deviation from earlier clock epochs, and the length of its epoch.
     before: Option<(Drift, DurNs)>,
 }
 
@@ -93,7 +94,7 @@ struct Epoch {
     edge: Edge,
 }
 
-/// Lower envelope of the delays: the least delayed stamp of each stretch.
+/// Lower envelope of the delays: the least delayed stamp of each stretch of time.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Edge {
     #[serde(with = "array")]
@@ -102,9 +103,9 @@ struct Edge {
     span_ns: i64,
     /// Number of the current stretch of time, and its least delayed stamp.
     open: Option<(i64, Stamp)>,
-    /// Drift by which delays of stamps within a stretch are corrected before comparison.
+    /// Drift for which the delays of stamps within a stretch are corrected before they are compared.
     slope: f64,
-    /// Device time since which the delays of new stretches have been shifted against the kept stamps.
+    /// Device time since which stamps of new stretches have had implausible delays compared with the kept stamps.
     shifted_since_ns: Option<i64>,
 }
 
@@ -115,7 +116,7 @@ struct Stamp {
     late_ns: i64,
 }
 
-/// A straight line fitted to stamps: late = `mean_late` + `slope` (device - `mean_device`).
+/// A straight line fitted to the kept stamps: delay = `mean_late` + `slope` (device time - `mean_device`).
 struct Line {
     slope: f64,
     slope_sd: f64,
@@ -123,7 +124,7 @@ struct Line {
     mean_late_ns: f64,
 }
 
-/// Shift of the delay in a completed stretch against the kept stamps of the epoch.
+/// Comparison of the delay in a completed stretch of time with the kept stamps of the epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shift {
     None,
@@ -267,7 +268,8 @@ impl Edge {
         let shift = self.shift(stamp);
         if shift != Shift::None {
             if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
-                // The earlier stamps were the delayed ones, because the epoch began while a queue was full.
+                // The new stamp is less delayed by far, so the kept stamps were queued: the epoch began while a queue
+                // was full.
                 self.len = 0;
             } else {
                 let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);
@@ -283,13 +285,13 @@ impl Edge {
         Shift::None
     }
 
-    /// Returns how the delay of a stamp is shifted against the stamp kept last.
+    /// Compares the delay of a stamp with the delay of the most recently kept stamp.
     fn shift(&self, stamp: Stamp) -> Shift {
         let Some(last) = self.kept().last() else { return Shift::None };
         let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
         let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
         let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
-        // If a clock falls behind, its stamps look delayed.
+        // A clock that falls behind makes its stamps look delayed.
         if late_ns > most_ns {
             Shift::Behind
         } else if late_ns < -most_ns {
@@ -349,7 +351,7 @@ impl Edge {
         let slope = xy / xx;
         let left = |(x, y): (f64, f64)| (y - slope * x) * (y - slope * x);
         let scatter = kept.iter().map(about).map(left).sum::<f64>() / (n - 2.0);
-        // Even if stamps have no scatter, they are uncertain by the rounding to a tick.
+        // Even stamps without scatter are uncertain, because they are rounded to ticks.
         let quantum = tick.0 as f64 * tick.0 as f64 / 12.0;
         let slope_sd = math::sqrt((scatter + quantum) / xx);
         (xx > 0.0).then_some(Line { slope, slope_sd, mean_device_ns, mean_late_ns })

@@ -21,7 +21,7 @@ pub trait Measurement: Copy + Send + Sync + 'static {
 pub struct Sounding {
     /// Time of the ping.
     pub at: MonoNs,
-    /// True beam angle of a head in the sensor's frame, radians; unused for an echosounder.
+    /// True angle of a profiling head's beam in the sensor's frame, radians; unused for an echosounder.
     pub angle_rad: f64,
     /// Beam angle reported by the head, radians.
     pub reported_rad: f64,

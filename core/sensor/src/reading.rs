@@ -83,7 +83,7 @@ pub struct SonarReturn {
     ///
     /// The angle may exceed one turn.
     pub angle_rad: f64,
-    /// Slant range computed by the device, m; `None` if nothing exceeded its threshold.
+    /// Slant range computed by the device, m; `None` if no echo exceeded its threshold.
     pub range_m: Option<f64>,
     /// Quantum (resolution step) of the range, m.
     pub resolution_m: f64,
@@ -118,7 +118,7 @@ pub struct WaterPressure {
 /// A reading of a cable counter: length of cable paid out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TetherLength {
-    /// Length counted since the counter's zero, m; increases as the vehicle goes in.
+    /// Length counted since the counter's zero, m; increases as the vehicle goes into the tunnel.
     pub length_m: f64,
     /// Quantum (resolution step) of the length, m.
     pub resolution_m: f64,

@@ -1,10 +1,10 @@
 //! Corrected times of samples that arrive late, from the device's own clock.
 //!
 //! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms then
-//! have the same receive time. The first of them would count for the whole gap before the burst, even if it measured
-//! a short jerk. The device's stamps separate the samples. Receive time minus device time is usually near its
-//! minimum, and any excess is the delay of the sample. Receive times still define the order; only the time of
-//! validity is corrected.
+//! have the same receive time. By receive times, the first sample of a burst would count for the whole gap before the
+//! burst, even if it measured only a short jerk. The device's stamps separate the samples. Receive time minus device
+//! time is usually near its minimum, and any excess is the delay of the sample. Receive times still define the order of
+//! samples; only their times of validity are corrected.
 
 use core::cmp::Ordering;
 
@@ -14,20 +14,20 @@ use crate::device_clock::{ClockReport, DeviceClock};
 use crate::reading::Reading;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Rate at which the estimated usual delay rises while device stamps arrive later than usual, per second. Clocks
-/// drift apart more slowly.
+/// Rate at which the estimated usual delay rises while device stamps arrive later than usual, per second. Clocks drift
+/// apart more slowly.
 ///
-/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` times as fast. The estimate therefore
-/// converges to a delay that is longer than the delays of one stamp in ten. A garbled stamp has no larger effect than
-/// any other stamp.
+/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` times as fast. The estimate thus converges to
+/// the delay below which one stamp in ten lies. The step size does not depend on the stamp's delay, so a garbled stamp
+/// has no larger effect than any other.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
-/// A longer time between two stamps counts as this time when the usual delay is updated, s.
+/// Longest time between two stamps for which one update moves the usual delay, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// Smaller delays of a sample are not corrected. They come from clock ticks and from the time to send its frames.
+/// A delay below this is not corrected, because clock ticks and the sending of a sample's frames cause such delays.
 const LEAST: DurNs = DurNs(1_000_000);
-/// Larger delays of a sample are not corrected. A stopped device clock also looks like a delay, and navigation waits no
-/// longer than this for samples.
+/// A delay above this is not corrected. It may come from a stopped device clock, and navigation waits no longer than
+/// this for samples.
 const MOST: DurNs = DurNs(150_000_000);
 
 /// Corrects the times of the samples of a device with a clock. Allocates: never.
@@ -44,7 +44,7 @@ pub struct SampleTimes {
     leads: i8,
 }
 
-/// A stamped sample: the stamp's receive time, its usual receive time, and which readings have arrived.
+/// A stamped sample: receive time of its stamp, this time with the usual delay, and which of its readings have arrived.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Stamped {
     received: MonoNs,
@@ -55,7 +55,7 @@ struct Stamped {
 /// Number of kinds of readings: turn rate, force, attitude. A stamp belongs to the first reading of each kind after
 /// it.
 const KINDS: usize = 3;
-/// Stamps count as coming before the readings if `leads` is at least the first value. The second value limits `leads`.
+/// Stamps count as coming before the readings if `leads` is at least `SURE_LEADS`. `MOST_LEADS` limits `leads`.
 const SURE_LEADS: i8 = 8;
 const MOST_LEADS: i8 = 16;
 
@@ -89,8 +89,8 @@ impl SampleTimes {
 
     /// Returns the receive time that a reading would have had without the delay of its sample.
     ///
-    /// Returns `received` for a reading without a stamp, with a usual delay, or with a delay that no queue
-    /// explains. The same holds for all readings of a unit that sends its stamps after its readings.
+    /// Returns `received` for a reading without a stamp, with a usual delay, or with a longer delay than queues cause.
+    /// The same holds for all readings of a unit that sends its stamps after its readings.
     pub fn arrival(&mut self, reading: &Reading, received: MonoNs) -> MonoNs {
         let kind = match reading {
             Reading::AngularRate(_) => 0,

@@ -1,5 +1,4 @@
-//! `[advice]` of a vehicle file: resolution and recast distance of the rays that locate the wall for the speed
-//! advice.
+//! `[advice]` of a vehicle file: settings of the rays that locate the wall for the speed advice.
 
 use core::ops::RangeInclusive;
 
@@ -9,10 +8,10 @@ use headrace_sampling::advice::Looks;
 
 /// Allowed angles between the rays of a ring (the rays cast from a head round the wall), degrees.
 ///
-/// The finest angle is the one that the command `plan` uses. With an angle above 1 degree, the steps of every
-/// mode would be rounded.
+/// The finest angle is the one that the command `plan` uses. Above 1 degree, the advice would round up the angular
+/// steps of every mode.
 const RING_DEG: RangeInclusive<f64> = 0.1..=1.0;
-/// Allowed distances that the vehicle moves across the tunnel before a ring of rays is cast again, m.
+/// Allowed distances that the vehicle may move across the tunnel before a ring of rays is cast again, m.
 const LOOK_M: RangeInclusive<f64> = 0.001..=0.1;
 
 /// Reads the `[advice]` table of a vehicle file.

@@ -33,28 +33,28 @@ impl Default for CoverageConfig {
     }
 }
 
-/// Default limit of the deviation from the design profile: a share of the radius, but at most 0.5 m.
+/// Default limit of a sample's deviation from the design profile, as a share of the radius. The limit is at most 0.5 m.
 ///
-/// The radius is that of a circle with the profile's perimeter.
+/// The radius is that of a circle whose circumference is the profile's perimeter.
 const CONTRADICTION_SHARE: f64 = 0.2;
 const MOST_CONTRADICTION_M: f64 = 0.5;
-/// Maximum number of samples that fill all openings together.
+/// Maximum number of samples with which all openings together are filled.
 const MAX_PLACES: i64 = 1_000_000;
 
 impl CoverageConfig {
     /// Returns the default deviation above which a sample contradicts a profile of this perimeter, m.
     ///
-    /// The value exceeds the thickness of a lining, and the error of a design that is 6 % off. It is smaller
-    /// than the deviation expected in a different tunnel.
+    /// The value exceeds the thickness of a lining, and the error of a design that is 6 % off. It is smaller than the
+    /// deviations that appear if the vehicle file describes a different tunnel.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
     /// Reads the tables `[coverage]` and `[[openings]]` from the root of a vehicle file.
     ///
-    /// The second value is the confidence of verdicts.
+    /// The second value of the result is the confidence of verdicts.
     ///
-    /// `profile` or `target_m` is `None` if its keys in the file are invalid. The tables are then checked as
+    /// `profile` or `target_m` is `None` if its keys in the file are invalid. Even then, the two tables are checked as
     /// far as possible.
     ///
     /// Errors: a key that is missing, unknown or out of range.

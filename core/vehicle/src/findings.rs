@@ -1,7 +1,7 @@
 //! Checks of a vehicle file as a whole, after its keys have been read.
 //!
-//! The checks find connections that cannot be shared, wall outside the heads' range limits, and heads whose
-//! passes cannot interleave.
+//! The checks find sensors that cannot share a connection, wall outside the heads' range limits, and heads whose passes
+//! cannot interleave.
 
 use core::fmt;
 
@@ -48,13 +48,13 @@ const BEAMS: u32 = 720;
 ///
 /// If the share is lower, the range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
-/// Heads stay in phase for hours if their turn periods differ by less than this ratio.
+/// Largest relative difference of turn periods at which heads stay in phase for hours.
 const SAME_TURN: f64 = 1e-6;
 /// Finest range step of a sonar, m: the step of an 881L with a range setting of 5 m or less (data sheet).
 ///
-/// No return resolves finer details of a wall.
+/// No sonar return resolves finer details of a wall.
 const FINEST_M: f64 = 0.002;
-/// Edge length of a polyline that approximates a wall's curve to within [`FINEST_M`] at any radius, m.
+/// Edge length, m, at which a polyline deviates from a curved wall by less than [`FINEST_M`] for any radius.
 ///
 /// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, whose radius is 0.1 m.
 const ENOUGH_M: f64 = 0.01;
@@ -77,7 +77,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns the sensors that cannot share the connection of an earlier sensor, each with the reason why.
+    /// Returns the index of each sensor that cannot share the connection of an earlier sensor, with the reason.
     pub fn excluded_from_lines(&self) -> Vec<(usize, String)> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -124,7 +124,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns the reason why two sensors cannot have these connections; `None` if they can.
+    /// Returns the reason why two sensors cannot have these two connections at once; `None` if they can.
     fn exclude(&self, a: usize, of_a: &Connect, b: usize, of_b: &Connect) -> Option<(Grade, String)> {
         let other = self.sensor_configs.get(a)?;
         let own = self.sensor_configs.get(b)?;
@@ -137,7 +137,7 @@ impl VehicleConfig {
             return Some((Grade::Error, problem));
         }
         if other.plugin != own.plugin {
-            // Frames on CAN have identifiers, so different devices can share the bus.
+            // CAN frames have identifiers, so devices of different kinds can share the bus.
             let shared = matches!(of_a, Connect::Can { .. });
             let problem = format!(
                 "is also the {end} of sensor {:?}, a {}; each device receives the other's bytes and skips them",
@@ -202,7 +202,7 @@ impl VehicleConfig {
         Some(Finding { grade, key: format!("sensors[{number}].range_m"), problem })
     }
 
-    /// Returns a warning if profile points are closer together than any sonar resolves.
+    /// Returns a warning if the profile's points are closer together than the finest detail that a sonar resolves.
     fn too_fine(&self) -> Option<Finding> {
         let tunnel = &self.tunnel;
         if tunnel.name != "polyline" {
@@ -267,8 +267,8 @@ fn warning(key: String, problem: String) -> Finding {
     Finding { grade: Grade::Warning, key, problem }
 }
 
-/// Names the end (port, address, interface or device) that two connections share. `None` if they lead to
-/// different ends.
+/// Returns what two connections share, in words: a serial port, address, interface or device. `None` if they share
+/// nothing.
 fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     match (a, b) {
         (Connect::Serial { port: a, .. }, Connect::Serial { port: b, .. }) => {
@@ -300,13 +300,13 @@ impl Wall {
     }
 }
 
-/// Lists the clock positions of places on the wall, each once, starting at the floor.
+/// Lists the clock positions of points on the wall, without duplicates, starting at the floor.
 fn clocks(walls: &[&Wall], profile: &Profile) -> String {
     let mut arcs: Vec<f64> = walls.iter().map(|wall| wall.arc_m).collect();
     arcs.sort_by(f64::total_cmp);
     let mut clocks: Vec<String> = arcs.into_iter().map(|arc_m| profile.clock(arc_m)).collect();
     clocks.dedup();
-    // Arc lengths begin and end at the floor.
+    // Both the first and the last arc lengths are at the floor, so its clock position may appear twice.
     if clocks.len() > 1 && clocks.first() == clocks.last() {
         clocks.pop();
     }

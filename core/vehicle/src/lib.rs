@@ -1,6 +1,6 @@
 //! `VEHICLE.toml`: vehicle, sensors, tunnel, target, and parameters of verdicts and navigation.
 //!
-//! All errors of a file are found at once. The caller supplies the kinds of device that a file may name.
+//! One pass finds all errors of a file. The caller supplies the kinds of device that a file may name.
 //! `docs/reference/vehicle-file.md` lists the keys.
 //!
 //! ```

@@ -28,13 +28,14 @@ pub struct Mission {
     pub length_m: f64,
     /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
-    /// Speed for which the heads' phases are planned, m/s; zero if none is planned.
+    /// Speed for which the heads' phases are planned, m/s; zero if no speed is planned.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle, apart from the heads, that may occlude a head.
     pub hull: Vec<Obstacle>,
     /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// Resolution and recast distance of the rays that locate the wall for the speed advice.
+    /// Angle between the rays that locate the wall for the speed advice, and the vehicle's movement after which these
+    /// rays are cast again.
     pub looks: Looks,
     /// Time limit of the dive, counted from the first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
@@ -78,9 +79,9 @@ impl Mission {
             && [planned_speed_mps, hole_tolerance_m, confidence_sd].iter().all(|number| **number >= 0.0)
     }
 
-    /// Whether pings land at the same places on the wall as with the settings of another mission.
+    /// Whether pings hit the same places on the wall as under the settings of another mission.
     ///
-    /// True if tunnel, water, layout and hull are the same.
+    /// True if the tunnel, the water, the layout and the hull are equal in both missions.
     pub fn places_as(&self, other: &Self) -> bool {
         self.profile == other.profile
             && self.site == other.site

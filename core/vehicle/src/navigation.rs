@@ -16,16 +16,16 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// Allowed values of noise settings.
 ///
-/// Zero is excluded, because the filter would then rely on that sensor alone. Only the mount error may be zero.
+/// Zero is excluded, because the filter would rely on a sensor without noise alone. Only the mount error may be zero.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const MOUNT_DEGREES: RangeInclusive<f64> = 0.0..=5.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
-/// Allowed lengths of a filter epoch and of a time window, s. The filter's buffers suffice for both.
+/// Allowed lengths of a filter epoch and of a time window, s. The filter's buffers suffice for all allowed values.
 ///
-/// With epochs of 0.5 s, the estimated position of a field dive was wrong by metres. With 0.2 s, the error
-/// was no larger than with 0.1 s (trade-off "Navigation" of `headrace cost`).
+/// With epochs of 0.5 s, the estimated position of a field dive was wrong by metres. With 0.2 s, the error was no
+/// larger than with 0.1 s (trade-off "Navigation" of `headrace cost`).
 const EPOCH_S: RangeInclusive<f64> = 0.02..=0.2;
 const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 
@@ -42,8 +42,8 @@ pub enum NavigationConfig {
 impl NavigationConfig {
     /// Reads the `[navigation]` table; the default method is the filter.
     ///
-    /// A missing key gets its value from the inertial unit's `noise` or the cable `counter` if these are known. All
-    /// other missing keys get their defaults.
+    /// If the inertial unit's `noise` or the cable `counter` is known, it determines the missing keys that it concerns.
+    /// All other missing keys get their defaults.
     ///
     /// Errors: the first key that is unknown or out of range.
     pub fn parse(

@@ -28,7 +28,7 @@ use headrace_sensor::device::{CounterSpec, Device, DeviceKind, Sense};
 pub struct VehicleConfig {
     /// Name of the vehicle.
     pub name: String,
-    /// Target.
+    /// Coverage target, with the confidence of verdicts.
     pub target: Target,
     /// Length of a section along the tunnel, m.
     pub section_m: f64,
@@ -40,8 +40,8 @@ pub struct VehicleConfig {
     pub tunnel: TunnelConfig,
     /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
-    /// Speed for which the heads' phases are planned, m/s. With zero, the heads' positions along the hull are
-    /// ignored.
+    /// Speed for which the heads' phases are planned, m/s. With zero, the plan ignores the heads' positions along the
+    /// hull.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
@@ -49,7 +49,8 @@ pub struct VehicleConfig {
     pub coverage: CoverageConfig,
     /// Navigation method and settings.
     pub navigation: NavigationConfig,
-    /// Resolution and recast distance of the rays that locate the wall for the speed advice.
+    /// Angle between the rays that locate the wall for the speed advice, and the vehicle's movement after which these
+    /// rays are cast again.
     pub looks: Looks,
     /// Maximum duration of the dive.
     pub dive_time: Option<DurNs>,
@@ -73,8 +74,8 @@ pub type WaterConfig = Site;
 /// Allowed values of the target, m.
 pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 
-/// Limits on the number of sections and wall cells. They keep the startup allocation to some hundred
-/// megabytes for each.
+/// Limits on the number of sections and wall cells. Each limit keeps the memory allocated at startup below some hundred
+/// megabytes.
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 
@@ -106,7 +107,7 @@ impl VehicleConfig {
         Ok(Self { attachments: attachments.into_inner(), ..vehicle })
     }
 
-    /// Reads everything except the attachments.
+    /// Reads the whole vehicle file except the attachments.
     ///
     /// Checks that depend on an invalid part of the file are skipped.
     fn from_root(
@@ -212,7 +213,7 @@ impl VehicleConfig {
         self.sensors.iter().filter_map(|sensor| sensor.head()).collect()
     }
 
-    /// Returns the inspection with the heads as configured and the vehicle steady in the tunnel's centre.
+    /// Returns the input of a plan: the configured heads, on a vehicle that travels steadily in the tunnel's centre.
     ///
     /// Errors: no modes are known for a head's range setting.
     pub fn inspection(&self) -> Result<Inspection, String> {
@@ -233,7 +234,7 @@ impl VehicleConfig {
     }
 }
 
-/// Reads a table. The result is `default` without the table, and `None` if the table is wrong.
+/// Reads a table. The result is `default` if the table is absent, and `None` if the table is wrong.
 fn table_or<T>(
     root: &Section<'_>,
     name: &'static str,
@@ -295,7 +296,7 @@ fn parse_water(section: &Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option
     Ok((site, sound_speed_from))
 }
 
-/// Reads the valid boxes of the hull.
+/// Reads the boxes of the hull, except invalid ones.
 fn parse_hulls(root: &Section<'_>) -> Result<Vec<Obstacle>, ConfigError> {
     let mut hull = Vec::new();
     for section in root.sections("hull")? {
@@ -316,7 +317,7 @@ fn parse_hull(section: &Section<'_>) -> Result<Obstacle, ConfigError> {
     Ok(Obstacle::Box { least: point(least), most: point(most) })
 }
 
-/// Reads the navigation for these sensors; `None` if its table is wrong.
+/// Reads the navigation settings for these sensors; `None` if the `[navigation]` table is wrong.
 fn parse_navigation(
     root: &Section<'_>,
     devices: &[Box<dyn Device>],
@@ -344,7 +345,7 @@ fn check_sound(
 
 /// Checks the number of heads, and that no head is inside a hull box.
 ///
-/// A hull box around a head could not occlude this head.
+/// A hull box could not occlude a head inside it.
 fn check_heads(
     root: &Section<'_>,
     sensors: &[Box<dyn Device>],

@@ -12,10 +12,10 @@ use headrace_sensor::device::SensorKind;
 const MEMORY: u32 = 40;
 /// Minimum share of measurements within the gate. Below it, the measured quantity counts as lost and is reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// Standard deviations that are added, as variances, to those of a lost quantity: m, m/s, radians, a ratio.
+/// If a quantity is lost, the square of its constant below is added to its variance. Units: m, m/s, radians, a ratio.
 ///
 /// `LOST_M` and `LOST_MPS` apply to position and velocity across the tunnel. `LOST_WAY_M` and `LOST_WAY_MPS` apply to
-/// position and velocity along it. The others apply to the attitude and to the scale of ranges.
+/// position and velocity along the tunnel. The other constants apply to the attitude and to the scale of ranges.
 const LOST_M: f64 = 1.5;
 const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;
@@ -25,7 +25,8 @@ const LOST_YAW_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 const LOST_SCALE: f64 = 0.03;
 
-/// Tracks how well ranges agree with the wall, and attitudes with the estimated tilt. `cable.rs` judges the cable.
+/// Tracks how well ranges agree with the wall, and attitudes with the estimated tilt. The agreement of the cable is
+/// tracked in `cable.rs`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Agreement {
     wall: Memory,
@@ -52,7 +53,7 @@ impl Memory {
         self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
     }
 
-    /// Whether too few measurements passed the gate, so that the estimate is wrong. If so, restarts the average.
+    /// Whether the estimate is wrong, because too few measurements passed the gate. If true, restarts the average.
     fn is_lost(&mut self) -> bool {
         let is_lost = self.seen == MEMORY && self.agreeing < LEAST_AGREEING;
         if is_lost {
@@ -73,16 +74,16 @@ impl Agreement {
         }
     }
 
-    /// Adds to the variances of the estimate if one kind of measurement no longer agrees with the estimate.
+    /// Increases variances of the estimate if one kind of measurement no longer agrees with the estimate.
     ///
-    /// The additions go to the measured part of the state, and to the errors that may have caused the disagreement.
+    /// Variances increase for the measured part of the state, and for errors that may have caused the disagreement.
     pub fn seek(&mut self, variances: &mut Errors) {
         let [wall, tilt] = [&mut self.wall, &mut self.tilt].map(Memory::is_lost);
         if wall {
             add(variances, POSITION + 1..POSITION + 3, LOST_M);
             add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
             // A tilt error also moves the estimate, through gravity. The cause of the tilt error has probably also
-            // caused a yaw error, and the estimated compass deviation may have absorbed it.
+            // caused a yaw error, and the estimated compass deviation may have absorbed this yaw error.
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);
@@ -95,8 +96,8 @@ impl Agreement {
     }
 }
 
-/// Adds to the variances of chainage, speed and tilt when the chainage is lost. The addition may be large, because no
-/// model is linearised about the chainage.
+/// Increases the variances of chainage, speed and tilt when the chainage is lost. The increase of the chainage's
+/// variance may be large, because no model is linearised about the chainage.
 pub fn seek_way(variances: &mut Errors) {
     add(variances, POSITION..POSITION + 1, LOST_WAY_M);
     add(variances, VELOCITY..VELOCITY + 1, LOST_WAY_MPS);

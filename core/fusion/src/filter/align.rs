@@ -26,7 +26,8 @@ pub const LISTENS: DurNs = DurNs(1_000_000_000);
 const ECHOES: usize = 9;
 /// Initial standard deviations of the estimate, in the order of this list:
 ///
-/// - Position in the cross-section with echoes, and without.
+/// - Position in the cross-section with echoes.
+/// - Position in the cross-section without echoes.
 /// - Chainage without a cable reading.
 /// - Yaw without a compass. The vehicle is then assumed to face along the tunnel.
 /// - Velocity.
@@ -39,8 +40,8 @@ const VELOCITY_SD_MPS: f64 = 0.5;
 const TILT_SD_RAD: f64 = 0.05;
 /// Initial standard deviation of the cable's local scale error, a ratio; practically zero.
 ///
-/// Only a velocity log could distinguish a scale error from a speed error. Without this limit, the smallest
-/// persistent speed error would become a scale error, and then metres of chainage.
+/// Only a velocity log could distinguish a scale error from a speed error. With a larger value, the smallest persistent
+/// speed error would be taken for a scale error, and would become metres of chainage error.
 const SCALE_SD: f64 = 1e-6;
 
 /// Readings collected during the alignment.
@@ -133,8 +134,8 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // After the silence in which the estimate was lost, other sensors may also have begun to send only now. So
-            // the alignment restarts at this echo.
+            // The estimate was lost in a silence of the sensors. Other sensors may also have begun to send again only
+            // now, so the alignment restarts at this echo.
             self.since = Some(at);
         }
     }
@@ -195,7 +196,8 @@ impl Listening {
     /// Builds the initial covariance.
     ///
     /// Chainage and yaw errors are correlated with the errors of cable and compass. So repeated readings of cable and
-    /// compass do not reduce the uncertainty below these errors. Slack is correlated with its rate.
+    /// compass do not reduce the uncertainty of chainage and yaw below these errors. The slack error is correlated with
+    /// the error of the slack rate.
     fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
         let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
@@ -288,7 +290,7 @@ mod tests {
 
     /// Repeated readings of cable and compass have the same errors, so they do not make the estimate more certain.
     ///
-    /// The chainage stays as uncertain as slack and scale make it. The yaw stays as uncertain as the compass
+    /// The chainage stays as uncertain as slack and scale errors make it, and the yaw as uncertain as the compass
     /// deviation makes it.
     #[test]
     fn repeated_readings_do_not_reduce_systematic_errors_of_cable_and_compass() {

@@ -1,8 +1,8 @@
 //! Drift of inertial biases in excess of the declared drift, learnt from corrections of the biases.
 //!
-//! A measurement corrects a bias by its gain times the innovation. The expected square of this correction is the
-//! gain squared times the innovation's variance. If corrections are larger, the bias drifts more than the filter
-//! assumes. Derivation: `docs/why/navigation.md`, "Noise that is learnt".
+//! A measurement corrects a bias by its gain times the innovation. The expected square of this correction is the gain
+//! squared times the innovation's variance. If the squared corrections are larger than expected, the bias drifts more
+//! than the filter assumes. Derivation: `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
@@ -11,18 +11,17 @@ use headrace_geometry::math;
 
 /// Averaging time of the ratio of squared corrections to expected squares, s.
 const MEMORY_S: f64 = 10.0;
-/// The process noise is raised if the mean ratio is above this. Each second, the noise is multiplied by the ratio to
-/// the power `RAISES_PER_S`.
+/// The process noise is raised if the mean ratio of squared to expected corrections is above this. Each second, the
+/// noise is then multiplied by this mean ratio to the power `RAISES_PER_S`.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// A raised process noise decays if the mean ratio is below this. The second value is the time constant of the decay,
-/// s.
+/// A raised process noise decays if the mean ratio is below this. `FALLS_OVER_S` is the time constant of the decay, s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
 /// Initial noise factor: biases of an inertial unit are assumed to drift fast until its readings show otherwise.
 const AT_FIRST: f64 = 1e3;
-/// Random walk of the biases of the worst supported inertial unit, per root of a second: 0.3 degrees/s and 50 mm/s^2
-/// in 300 s.
+/// Random walks of the gyro bias (`MOST_RATE`) and the accelerometer bias in the worst supported inertial unit, per
+/// root of a second. In 300 s, they add up to 0.3 degrees/s and 50 mm/s^2.
 const MOST_RATE: f64 = 4.3e-4;
 const MOST_FORCE: f64 = 4.1e-3;
 
@@ -32,7 +31,7 @@ pub struct BiasDrift([Ratio; 2]);
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Ratio {
-    /// Decaying sums of the squared corrections and of their expected squares.
+    /// Decaying sums: `corrected` of the squared corrections, `expected` of their expected squares.
     corrected: f64,
     expected: f64,
     factor: f64,
@@ -44,7 +43,8 @@ impl Default for BiasDrift {
     }
 }
 
-/// Returns the largest noise factor of a bias. With it, the bias drifts as fast as in the worst supported unit.
+/// Returns the largest noise factor of a bias. With this factor, the bias drifts as fast as in the worst supported
+/// unit.
 fn most(wander: GaussMarkov, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)
@@ -57,8 +57,8 @@ impl BiasDrift {
     /// normalised squared innovation.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
-            // The expected square is (P h / s)^2 s, summed over the axes. P h is a covariance, and s is the
-            // innovation's variance.
+            // The expected square is (c / s)^2 s, summed over the axes. c is the covariance of a bias with the
+            // innovation, and s is the innovation's variance.
             let expected = covariances.iter().map(|c| c * c).sum::<f64>() / variance;
             ratio.expected += expected;
             ratio.corrected += expected * nis;

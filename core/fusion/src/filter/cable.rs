@@ -1,9 +1,9 @@
 //! Decides whether cable counter and estimate agree.
 //!
-//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement, both stay possible. The
-//! counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the chainage
-//! equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and estimate
-//! disagree".
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement, either of them may be
+//! wrong. The counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the
+//! chainage equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
+//! estimate disagree".
 
 use serde::{Deserialize, Serialize};
 
@@ -14,31 +14,32 @@ use headrace_sensor::reading::SourceId;
 
 /// Averaging time of the cable counter's innovations, s.
 const RECENT_S: f64 = 1.0;
-/// Mean innovation at which counter and estimate disagree, in units of the sd that it would have if innovations were
-/// white.
+/// Mean innovation at which counter and estimate disagree, in units of the sd that the mean would have for white
+/// innovations.
 ///
-/// For limits from 3 to 6, about the same number of seeded dives has an unreported error. With 4, a slack of seven
-/// times the declared size makes a sound counter disagree.
+/// With any limit from 3 to 6, about the same number of seeded dives has an unreported error. With a limit of 4, a
+/// slack of seven times the declared size makes a sound counter disagree.
 const DISPUTED_SDS: f64 = 5.0;
 /// Each innovation is clipped at this many standard deviations.
 const MOST_SDS: f64 = 6.0;
-/// A mean innovation over its limit starts a disagreement only if the latest innovation is larger than this, m.
+/// A mean innovation beyond `DISPUTED_SDS` starts a disagreement only if the latest innovation is larger than this, m.
 const LEAST_M: f64 = 0.01;
-/// If slack has moved the counter constantly before, a count that is unchanged for this time means a stuck counter.
+/// If slack has kept the count changing, a count that then stays the same for this time means a stuck counter.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
 /// Counts that differ by less than this are equal, m.
 const SAME_COUNT_M: f64 = 1e-6;
-/// Time after which a disagreement is reported, and time for which readings must agree with the estimate to end it.
+/// A disagreement is reported once it has lasted for `NOTICED_AFTER`. It ends once readings have agreed with the
+/// estimate for `RETURNED_AFTER`.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// An agreeing reading proves that the counter has lost no length only if the innovation's sd is at most this, m.
+/// A reading that agrees with the estimate proves that the counter has lost no length, but only if the innovation's sd
+/// is at most this, m.
 const SURE_M: f64 = 0.3;
-/// The counter has caught up with the vehicle if both differ by at most this, m: a share of the vehicle's distance
-/// since the disagreement began, plus a length.
+/// The counter has caught up with the vehicle if it differs from the estimate by at most `MISSING_SHARE` of the
+/// distance travelled since the disagreement began, plus `MISSING_M`.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// The counter follows the vehicle if their distances differ by at most this, m: a share of the distance, plus a
-/// length.
+/// The counter follows the vehicle if their distances differ by at most `SAME_SHARE` of the distance, plus `SAME_M`.
 ///
 /// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
@@ -47,17 +48,17 @@ const SAME_M: f64 = 0.01;
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// The estimate is given up if counter and estimate differ by more than this, m. The difference is the root sum square
-/// of the innovation and its sd.
+/// The estimate is given up if it differs from the counter by more than this, m. The difference is the root sum square
+/// of the innovation and the innovation's sd.
 ///
 /// The counter must also have counted `ALIVE_M` since the limit was exceeded, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
-/// A disagreement between cable counter and estimate.
+/// A disagreement of the cable counter with the estimate or the velocity log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableDoubt {
-    /// Time at which the counter's readings left the range that the estimate predicts.
+    /// Time since which the counter's readings are outside the range that the estimate predicts.
     pub since: MonoNs,
     /// Chainage that the estimate predicted when the disagreement began, m.
     pub from_m: f64,
@@ -80,7 +81,7 @@ pub struct CableReading {
     pub sd_m: f64,
     /// Whether the reading is within the gate.
     pub agrees: bool,
-    /// Whether the reading differs from the inertial motion by no more than usual.
+    /// Whether the count differs from the motion by the inertial unit by no more than usual.
     pub is_usual: bool,
     /// Whether varying cable slack keeps the count changing by several steps.
     pub is_lively: bool,
@@ -116,7 +117,7 @@ pub struct Cable {
     last: Option<CableReading>,
     /// The latest reading whose count differs from the count before it.
     changed: Option<CableReading>,
-    /// First reading in the present series of readings beyond the gate.
+    /// First reading of the present series of readings beyond the gate.
     left: Option<CableReading>,
     /// Recent corrections of the estimate by the counter's readings.
     pub corrections: CounterCorrections,
@@ -135,8 +136,8 @@ struct Dispute {
     agreeing_from: Option<MonoNs>,
     /// Counter reading when the difference from the estimate first exceeded `LOST_M`, m.
     lost_from_m: Option<f64>,
-    /// Since the first withheld reading: longest distance, by counter or estimate, and largest difference between
-    /// them, m.
+    /// Since the first withheld reading: `longest_m` is the longest distance, by counter or estimate. `most_m` is the
+    /// largest difference between the two, m.
     longest_m: f64,
     most_m: f64,
 }
@@ -149,7 +150,7 @@ impl Cable {
         has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), differs_m, log: None })
     }
 
-    /// Difference between the chainages by counter and by estimate, m; 0 while they agree and the count changes.
+    /// Difference between the chainages by counter and by estimate, m; 0 while both agree and the count changes.
     pub fn differs_m(&self) -> f64 {
         let disagrees = self.dispute.is_some() || self.left.is_some();
         let off_m = self.last.filter(|_| disagrees).map_or(0.0, |last| last.off_m);
@@ -174,7 +175,7 @@ impl Cable {
         self.corrections.pass(dt_s, is_same);
         let off_sds = (reading.off_m / reading.sd_m).clamp(-MOST_SDS, MOST_SDS);
         self.mean_sds = left * self.mean_sds + (1.0 - left) * off_sds;
-        // The mean innovation is compared with the standard deviation that it would have if innovations were white.
+        // The limit is a multiple of the standard deviation that this running mean has for white innovations.
         let is_apart = self.mean_sds.abs() > DISPUTED_SDS * math::sqrt((1.0 - left) / (1.0 + left));
         if let Some(first) = self.goes_wrong(reading, is_apart) {
             self.dispute = Some(Dispute::between(first, reading));
@@ -185,14 +186,14 @@ impl Cable {
 
     /// Returns the first of the readings that show a disagreement between counter and estimate.
     ///
-    /// `None` if they agree.
+    /// `None` if counter and estimate agree.
     fn goes_wrong(&mut self, reading: &CableReading, is_apart: bool) -> Option<CableReading> {
         let lasts = |since: &CableReading, time: DurNs| reading.at.since(since.at).0 >= time.0;
         let changed = *self.changed.get_or_insert(*reading);
         if (changed.shown_m - reading.shown_m).abs() > SAME_COUNT_M {
             self.changed = Some(*reading);
         }
-        // If slack constantly moves the counter, a count that suddenly stops changing means a stuck wheel.
+        // If slack keeps the count changing, a count that suddenly stops changing means a stuck wheel.
         if reading.is_lively && lasts(&changed, STANDS_FOR) {
             return Some(changed);
         }
@@ -201,7 +202,7 @@ impl Cable {
             self.left = None;
         }
         // If the estimate is uncertain, unusual readings start no disagreement, because the estimate needs the
-        // counter.
+        // counter's readings.
         let is_unusual = !reading.is_usual && reading.sd_m <= SURE_M;
         let disagrees = is_unusual || is_apart && reading.off_m.abs() > LEAST_M;
         disagrees.then_some(first)
@@ -302,8 +303,8 @@ mod tests {
     }
 
     /// The running mean of white innovations has a standard deviation of 0.22, in units of an innovation's sd. A
-    /// constant innovation of 1.5 sd brings the mean to five times this value after 1.4 s. A constant innovation of 1
-    /// sd never does.
+    /// constant innovation of 1.5 sd brings the mean to five times this standard deviation after 1.4 s. A constant
+    /// innovation of 1 sd never brings the mean so far.
     #[test]
     fn persistently_biased_innovations_start_a_cable_disagreement() {
         let off = |sds: f64, sd_m: f64| {
@@ -352,8 +353,8 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // The sum gets ten equal corrections a second and decays with a time constant of a second. It tends to
-        // 1 / (e^0.1 - 1) corrections.
+        // The sum gets ten equal corrections a second and decays with a time constant of a second. The sum tends to 1 /
+        // (e^0.1 - 1) corrections.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
@@ -375,8 +376,8 @@ mod tests {
         assert!((doubt.from_m - 7.02).abs() < 1e-12 && (doubt.differs_m - 0.5).abs() < 1e-12, "{doubt:?}");
     }
 
-    /// Returns the time at which a disagreement ends, s, and the decision that ends it. At first, the counter is
-    /// wrong by -0.4 m.
+    /// Returns the time at which a disagreement ends, s, and the decision that ends it. At first, the counter shows 0.4
+    /// m too little.
     ///
     /// The vehicle moves at `speed_mps`, and the counter shows `share` of this motion. The innovation has the sd
     /// `sd_m`.
@@ -401,7 +402,7 @@ mod tests {
             (0.95, 0.1, 0.0, 1.0, -0.405),
             (0.8, 0.1, 0.5, 1.0, -0.42),
             (1.3, 0.1, 0.5, 1.0, -0.37),
-            // At this speed, the vehicle needs more than a second for 5 cm.
+            // At 0.03 m/s, the vehicle needs more than a second to travel 5 cm.
             (1.0, 0.03, 0.0, 1.7, -0.4),
         ] {
             let Some((found_s, Use::Slipped(found_m))) = ends(share, speed_mps, sd_m) else {

@@ -1,12 +1,11 @@
 //! Relative error covariance between two epochs, by stochastic cloning.
 //!
-//! The relative error is the error of the displacement between the epochs. It matters because coverage compares two
-//! head passes, and it is smaller than the error of either position. A sample stays where it was georeferenced, so
-//! its error is the error of the estimate at that time.
+//! The relative error is the error of the displacement between the epochs. The relative error matters because coverage
+//! compares two head passes. It is smaller than the error of either position. A sample stays where it was
+//! georeferenced, so its error is that of the estimate at the time of its ping.
 //!
-//! Each clone keeps the covariance of the errors at its time, and the transition of errors since the previous
-//! clone. The transition includes propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative
-//! uncertainty".
+//! Each clone keeps the error covariance at its time, and the transition of errors since the previous clone. The
+//! transition includes propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative uncertainty".
 
 use serde::{Deserialize, Serialize};
 
@@ -19,9 +18,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Time between two clones of the filter's errors.
 pub const STEP: DurNs = DurNs(2_000_000_000);
-/// Number of clones kept. Together they cover over four turns of a head in its slowest mode (4 x 28 s).
+/// Number of clones kept. Together, these clones cover over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// The chainage counts as suddenly more certain if its variance falls below this share of the old variance.
+/// The chainage counts as suddenly more certain if its variance falls below this share of its earlier variance.
 ///
 /// This happens, for instance, when the cable counter sends again after a silence.
 const SURE_SHARE: f64 = 0.1;
@@ -47,7 +46,7 @@ impl Moment {
         self.rows[0][POSITION]
     }
 
-    /// Whether this clone's chainage is much more uncertain than a later chainage with the variance `later_m2`.
+    /// Whether this clone's chainage is much more uncertain than a later chainage, whose variance is `later_m2`.
     fn is_unsure_beside(&self, later_m2: f64) -> bool {
         later_m2 < SURE_SHARE * self.chainage_m2()
     }
@@ -78,14 +77,14 @@ impl ErrorClones {
         (self.count, self.since) = (0, identity());
     }
 
-    /// Propagates the present errors by an error transition.
+    /// Extends the propagation since the newest clone by an error transition.
     pub fn carry(&mut self, transition: &Transition) {
         for column in &mut self.since {
             transition.apply(column);
         }
     }
 
-    /// Applies the correction by a measurement to the propagated errors.
+    /// Extends the propagation since the newest clone by the correction of a measurement.
     pub fn measure(&mut self, h: &Errors, gain: &Gain<ERRORS>) {
         for column in &mut self.since {
             let seen: f64 = column.iter().zip(h).map(|(c, h)| c * h).sum();
@@ -95,7 +94,8 @@ impl ErrorClones {
         }
     }
 
-    /// Adds a clone if the newest one is old enough, or if the chainage has suddenly become more certain since then.
+    /// Adds a clone if the newest clone is old enough, or if the chainage has suddenly become more certain since that
+    /// clone.
     pub fn note(&mut self, at: MonoNs, factors: &Factors<ERRORS>) {
         let is_enough = |newest: &Moment| {
             at.since(newest.at).0 < STEP.0 && !newest.is_unsure_beside(factors.variance(POSITION))
@@ -135,7 +135,8 @@ impl ErrorClones {
             let clone = self.back(back)?;
             let age_s = newest.at.since(clone.at).as_secs_f64();
             if age_s >= wanted_s {
-                // All soundings before the chainage suddenly became more certain are as uncertain as the older clone.
+                // Soundings from before the chainage suddenly became more certain are all as uncertain as the older
+                // clone.
                 if clone.is_unsure_beside(newer_m2) {
                     return Some(clone.relative);
                 }
@@ -151,8 +152,8 @@ impl ErrorClones {
 
     /// Computes the covariance of each older clone relative to the newest one.
     ///
-    /// The method goes back through the clones. At each clone, it updates the matrix that maps the clone's errors to
-    /// those of the newest clone.
+    /// The method goes back through the clones. At each clone, the method updates the matrix that maps the clone's
+    /// errors to those of the newest clone.
     fn compare(&mut self) {
         let Some(now) = self.newest().copied() else {
             debug_assert!(false, "there is a clone to compare with: {} so far", self.count);
@@ -183,7 +184,7 @@ impl ErrorClones {
 
 /// Returns the covariance of the difference between the present and earlier errors.
 ///
-/// `depends` maps the earlier errors to the present errors.
+/// `depends` contains the rows of the matrix that maps the earlier errors to the present errors.
 fn against(now: &[Errors; 3], then: &[Errors; 3], depends: &[Errors; 3]) -> Relative {
     let cross: [[f64; 3]; 3] = depends.map(|row| then.map(|column| sum(&row, &column)));
     let mut relative = [[0.0; 3]; 3];
@@ -221,7 +222,7 @@ mod tests {
 
     /// Soundings placed while the cable counter is silent stay uncertain.
     ///
-    /// They do not become gradually more certain over the last 2 s before the counter sends again.
+    /// In the last 2 s before the counter sends again, soundings do not become gradually more certain.
     #[test]
     fn soundings_placed_while_the_cable_counter_is_silent_stay_uncertain() {
         let mut clones = ErrorClones::default();
@@ -245,8 +246,8 @@ mod tests {
         for k in 52..=90 {
             clones.note(at(k), &factors);
         }
-        // The clones taken since the counter sent again, at 5.1 s and 7.1 s, are certain. Soundings placed before
-        // them stay uncertain.
+        // The clones at 5.1 s and 7.1 s, after the counter sent again, are certain. Soundings placed before these
+        // clones stay uncertain.
         let [since_m, before_m] = [1.9, 4.0].map(|lag_s| sd_m(&clones, lag_s));
         assert!(since_m < 0.1 && (before_m - 1.0).abs() < 0.01, "{since_m} {before_m}");
     }

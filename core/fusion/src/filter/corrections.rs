@@ -1,9 +1,10 @@
-//! Recent corrections of the estimate by the cable counter, and the error they cause if the counter's wheel has
-//! stuck.
+//! Recent corrections of the estimate by the cable counter, and the error that these corrections cause if the counter's
+//! wheel has stuck.
 //!
 //! A count that does not change means either that the vehicle is stationary or that the wheel has stuck. A filter that
-//! trusts the count estimates a speed of zero in both cases. So the filter also keeps the alternative hypothesis: the
-//! estimate without these corrections. Derivation: `docs/why/navigation.md`, "When cable and estimate disagree".
+//! trusts the count estimates a speed of zero in both cases. So the filter also tracks the alternative: the estimate
+//! without the recent corrections by the counter. Derivation: `docs/why/navigation.md`, "When cable and estimate
+//! disagree".
 
 use serde::{Deserialize, Serialize};
 
@@ -11,26 +12,27 @@ use headrace_geometry::math;
 
 /// Time constant with which the correction sums decay while the cable count changes, s.
 ///
-/// Corrections are kept for a while, because a counter fails some time before the failure is noticed.
+/// Corrections are summed up for a while, because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
 /// Minimum time after which an unchanged count means a stop of the vehicle, s. Shorter pauses may come from slow
 /// motion and coarse steps.
 const STANDS_S: f64 = 2.0;
 /// Standard deviation of the length that a stuck wheel may have lost, as a share of the summed chainage corrections.
 ///
-/// The wheel is assumed to be stuck in one of ten such cases, so the variance of the lost length is a tenth of the
-/// squared corrections.
+/// The wheel is assumed to be stuck in one of ten cases of a stationary count, so the variance of the lost length is a
+/// tenth of the squared corrections.
 const STUCK_SHARE: f64 = 0.3;
-/// A sum of corrections up to this many of its predicted standard deviations counts as chance.
+/// A sum of corrections counts as chance if it is at most this many of its predicted standard deviations.
 ///
-/// With a limit of 0, stops make positions uncertain: 24 % of all epochs of the seeded dives are `cannot_say`, instead
-/// of 19 %. With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, instead of 6.
+/// With a limit of 0, stops of the vehicle make positions uncertain: 24 % of all epochs of the seeded dives are
+/// `cannot_say`, and 19 % with 0.5. With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, and in 6
+/// dives with 0.5.
 const CHANCE_SDS: f64 = 0.5;
-/// Time constant with which a possibly lost length fades from the relative error between head passes, s: about one head
-/// turn.
+/// Time constant with which a possibly lost length fades from the relative error between head passes, s. It is about
+/// one turn of a head.
 ///
-/// Only the corrections in the first such period of a stationary count are added up. Later corrections of a
-/// hovering vehicle say nothing about the wheel.
+/// After the count stops changing, corrections are added up only for this time. Later corrections of a hovering vehicle
+/// say nothing about the wheel.
 const PASSES_S: f64 = 20.0;
 
 /// Corrections by the cable counter, and the length that the counter has lost if its wheel has stuck.
@@ -45,8 +47,8 @@ pub struct CounterCorrections {
     by_chance: [f64; 2],
     /// Time for which the cable count has not changed, s.
     stood_s: f64,
-    /// Standard deviations of the length lost if the wheel has stuck, m: since the count became stationary, and
-    /// between two head passes.
+    /// Standard deviations of the length lost if the wheel has stuck, m: `lacks_m` since the count became stationary,
+    /// `lost_m` between two head passes.
     lacks_m: f64,
     lost_m: f64,
     /// Variance of the length that the counter may have lost permanently since the last call of `take_slipped_m2`,
@@ -111,9 +113,9 @@ impl CounterCorrections {
 
     /// Returns the sums of the corrections in the last second, m and m/s, and clears all sums.
     ///
-    /// On a cable that is wound in half a metre at a time, most corrections after a change of the count are right.
-    /// When all corrections were reverted, the chainage error grew to between 4 and 18 m, instead of 1 to 3 m (scene
-    /// `leak-current`).
+    /// Older corrections are not reverted. On a cable that is wound in half a metre at a time, most corrections after a
+    /// change of the count are right. Reverting all of them caused chainage errors of 4 to 18 m instead of 1 to 3 m
+    /// (scene `leak-current`).
     pub fn take_back(&mut self) -> [f64; 2] {
         core::mem::take(self).recent
     }
@@ -135,7 +137,8 @@ impl CounterCorrections {
 mod tests {
     use super::*;
 
-    /// Returns the state after ten readings a second, each of which corrects by 1 mm and `speed_mps`.
+    /// Returns the state after ten readings a second. Each reading corrects the chainage by 1 mm and the speed by
+    /// `speed_mps`.
     ///
     /// The count changes for 10 s. Then it is stationary for `readings` readings.
     fn stood(readings: u32, speed_mps: f64, variances: [f64; 2]) -> CounterCorrections {
@@ -168,8 +171,8 @@ mod tests {
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
     }
 
-    /// The possibly lost length is the difference between the estimates with and without the counter. So a speed
-    /// correction adds speed times time.
+    /// The possibly lost length is the difference between the estimates with and without the counter. So a correction
+    /// of the speed adds the corrected speed times the time since then.
     #[test]
     fn speed_corrections_increase_the_length_that_a_stuck_counter_may_have_lost() {
         let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));
@@ -207,7 +210,7 @@ mod tests {
     }
 
     /// The length that a stuck wheel may have lost adds to the relative error between passes for one head turn, and
-    /// to the position error permanently. Short stops do not count, because a slow vehicle with coarse counter steps
+    /// permanently to the position error. Short stops do not count, because a slow vehicle with coarse counter steps
     /// makes many of them.
     #[test]
     fn position_error_keeps_the_length_that_a_stuck_wheel_lost_in_a_long_stop() {

@@ -1,16 +1,16 @@
 //! Resolution step of a tether counter, recognised from its counts.
 //!
 //! A vehicle file may state a smaller step than the counter has, for instance the converter's step instead of the
-//! wheel's. If a counter pauses between changes, its smallest change is the step. If all changes are multiples of one
-//! length, this length is the step.
+//! wheel's. If a counter pauses between changes of its count, the smallest change is the step. If all changes are
+//! multiples of one length, this length is the step.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of changes per block. The step is the larger of those found in the last two blocks, because a garbled reading
-/// spoils only one block.
+/// Number of changes of the count per block. The larger of the steps found in the last two blocks is used, because a
+/// garbled reading spoils only one block.
 const BLOCK: u32 = 50;
 /// Assumed step of a counter that has not moved yet, m; common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;
@@ -23,14 +23,16 @@ pub struct CountStep {
     last_m: Option<f64>,
     /// Time of the last change of the count.
     changed: MonoNs,
-    /// Smallest change of the count, largest change, and greatest common divisor of all changes in the present block.
+    /// `smallest` and `largest` change of the count in the present block, and the greatest common divisor of all
+    /// changes.
     smallest: u64,
     largest: u64,
     common: u64,
-    /// Number of readings that differ from the previous reading, and number of readings equal to it.
+    /// `changes` is the number of readings that differ from the previous reading, and `stands` the number of readings
+    /// equal to it.
     changes: u32,
     stands: u32,
-    /// Resolution steps found in the last two blocks that showed a step.
+    /// Steps found in the last two blocks that showed a step, in units of the stated step.
     blocks: [u64; 2],
 }
 
@@ -81,8 +83,8 @@ impl CountStep {
 
     /// Returns how many readings share the rounding error of the present reading.
     ///
-    /// `period` is the time between readings, and `way_m` the counter's movement in this time, m. All readings
-    /// since the last change of the count share an error. Readings also share an error if the movement between them
+    /// `period` is the time between two readings, and `way_m` the counter's movement in this time, m. All readings
+    /// since the last change of the count share a rounding error. Readings also share it if the movement between them
     /// is a whole number of steps.
     pub fn looks_at_an_error(&self, at: MonoNs, period: DurNs, way_m: f64, step_m: f64) -> f64 {
         let stood = at.since(self.changed).as_secs_f64() / period.as_secs_f64();
@@ -185,7 +187,7 @@ mod tests {
         }
     }
 
-    /// The assumed step is a common one before the first movement, and then the smallest change so far.
+    /// Before the first movement, a common step is assumed. After it, the smallest change so far is assumed.
     #[test]
     fn counter_step_is_guessed_before_the_first_block_of_readings() {
         let mut step = CountStep::default();

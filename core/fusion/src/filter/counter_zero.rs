@@ -15,8 +15,8 @@ pub struct CounterZero {
     restarts: u32,
     /// Time of the counter's last reading.
     heard: Option<MonoNs>,
-    /// Time of the last reading of any other sensor, and the longest silence of the others since the counter's last
-    /// reading.
+    /// `others` is the time of the last reading of any other sensor. `silence` is the longest silence of all other
+    /// sensors since the counter's last reading.
     others: Option<MonoNs>,
     silence: DurNs,
     is_lost: bool,
@@ -42,8 +42,8 @@ impl CounterZero {
         self.silence = DurNs(0);
         let Some(heard) = self.heard.replace(received) else { return };
         let was_away = length.restart.is_some_and(|restart| restart.was_away);
-        // If the whole vehicle or the log stops, all sensors are silent for about the same time. So only a silence that
-        // is over twice as long as that of the others is the counter's own.
+        // If the whole vehicle or the log stops, all sensors are silent for about the same time. So the counter alone
+        // was silent only if its silence is over twice as long as that of the other sensors.
         let is_alone = others.0.saturating_mul(2) < received.since(heard).0;
         self.is_lost |= number != before && !(was_away && is_alone && is_sure);
     }

@@ -1,12 +1,12 @@
 //! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
 //!
 //! The comparison detects differences that the data sheets do not explain. It uses only readings and the estimated
-//! chainage, and never the filter's covariance, gates or learnt noise. So it still works when the filter has settled
-//! on a wrong speed. The inertial unit is not compared here, because it only measures changes of speed;
+//! chainage, and never the filter's covariance, gates or learnt noise. So the comparison still works when the filter
+//! has settled on a wrong speed. The inertial unit is not compared here, because it measures only changes of speed;
 //! `slack_level.rs` compares it with the counter.
 //!
-//! Over a window W in s, a difference in m counts if it exceeds this limit. Here n is the variance of the counter,
-//! m^2, and v the noise of the log, m/s:
+//! Over a time window of W seconds, a difference in m counts if it exceeds the following limit. In it, n is the
+//! variance of the counter, m^2, and v the noise of the velocity log, m/s:
 //!
 //! ```text
 //! 2 max(0.15 m, 3 slack_sd) + 5 sqrt(2 n + (scale distance)^2 + v^2 0.25 s W)
@@ -26,16 +26,16 @@ use headrace_sensor::reading::{Reading, SourceId};
 
 /// Time windows over which distances are compared, s.
 const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
-/// Time between two rows of distances, and capacity for the rows of the longest window.
+/// `EVERY` is the time between two rows of distances. `ROOM` rows suffice for the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// Maximum number of kept readings of a source, and the minimum time between two kept readings.
+/// At most `READINGS` readings of a source are kept, at least `NEAR` apart.
 ///
-/// Together they cover more than the filter's longest window at any reading rate.
+/// Together, these readings cover more than the filter's longest window at any reading rate.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
-/// Duration of silence after which a source is no longer compared. A velocity log may send a reading only every two
-/// seconds.
+/// Duration of silence after which a source is no longer compared. It is this long because a velocity log may send a
+/// reading only every two seconds.
 const SILENT: DurNs = DurNs(3_000_000_000);
 /// Time by which the comparison lags behind the present, because some readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
@@ -48,7 +48,7 @@ const LOG_SCALE: f64 = 0.015;
 /// Correlation time of a velocity log's noise, s.
 const LOG_TIME_S: f64 = 0.25;
 
-/// Columns of a row: distances by the cable counter, by the velocity log, and by the estimate.
+/// Columns of a row of distances: `CABLE` by the cable counter, `LOG` by the velocity log, `ESTIMATE` by the estimate.
 const CABLE: usize = 0;
 const LOG: usize = 1;
 const ESTIMATE: usize = 2;
@@ -56,7 +56,8 @@ const ESTIMATE: usize = 2;
 /// Recent distances by each source, and the doubt about the cable counter if the distances differ.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceComparison {
-    /// Recent chainages by the counter, distances by the velocity log, and chainages by the estimate, m.
+    /// Recent values by source, m: `cable` holds chainages by the counter, `log` distances by the velocity log,
+    /// `estimate` chainages by the estimate.
     cable: Vec<(MonoNs, [f64; 1])>,
     log: Vec<(MonoNs, [f64; 1])>,
     estimate: Vec<(MonoNs, [f64; 1])>,
@@ -66,7 +67,8 @@ pub(super) struct DistanceComparison {
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
     /// Rows of the distances by each source at one time, m; NaN for a missing distance.
     rows: Vec<(MonoNs, [f64; 3])>,
-    /// Times since which the cable's distance has differed from the velocity log's, and from the estimate's.
+    /// Times since which the distance by cable has differed: first from the distance by velocity log, second from that
+    /// by the estimate.
     since: [Option<MonoNs>; 2],
     doubt: Option<CableDoubt>,
     /// Value of [`super::eskf::Eskf::ties`] at the last comparison.
@@ -136,7 +138,7 @@ impl DistanceComparison {
     /// Compares the distances at the end of an epoch.
     ///
     /// `estimate_m` is the estimated chainage at that time, m; `None` while the filter itself reports a disagreement
-    /// with the cable. If `ties` has changed, earlier chainages are unrelated to later ones.
+    /// with the cable. If the number `ties` has changed, chainages before the change are unrelated to those after it.
     ///
     /// Allocates: never.
     pub(super) fn compare(&mut self, at: MonoNs, estimate_m: Option<f64>, ties: u32, settings: &Settings) {
@@ -164,8 +166,8 @@ impl DistanceComparison {
         self.judge(at, settings);
     }
 
-    /// Updates the times since which the cable has differed from the log and from the estimate, and the doubt. The
-    /// doubt is about the largest difference that has lasted.
+    /// Updates the times since which the distance by cable has differed from those by log and estimate. Also updates
+    /// the doubt, which states the largest of the differences that have lasted.
     fn judge(&mut self, at: MonoNs, settings: &Settings) {
         let mut doubt: Option<CableDoubt> = None;
         for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
@@ -206,7 +208,7 @@ impl DistanceComparison {
         self.doubt
     }
 
-    /// Marks all distances of a column as missing.
+    /// Marks all distances in a column of the rows as missing.
     fn forget(&mut self, column: usize) {
         for (_, row) in &mut self.rows {
             if let Some(way_m) = row.get_mut(column) {
@@ -235,7 +237,7 @@ impl DistanceComparison {
         let of_scale_m = math::hypot(settings.scale_sd, log_scale) * f64::max(cable_m.abs(), other_m.abs());
         let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
         let variance_m2 = counter_m2 + of_scale_m * of_scale_m + log_mps * log_mps * LOG_TIME_S * window_s;
-        // Slack may change from one of its limits to the other, so a distance may be wrong by twice the limit.
+        // Slack may change from its negative to its positive limit, so a distance may be wrong by twice the limit.
         let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
         (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
     }
@@ -288,7 +290,7 @@ mod tests {
     }
 
     /// Compares distances as `compared` does. There are `rate_hz` counter readings a second, and one log reading for
-    /// every `log_every` of them.
+    /// every `log_every` counter readings.
     fn compared_at(
         rate_hz: u32,
         log_every: u32,
@@ -337,8 +339,8 @@ mod tests {
     fn velocity_log_wrong_by_a_fifth_is_reported_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
-        // The vehicle travels about 12 m in a window of a minute, and the log shows a fifth too much. While the
-        // vehicle is slow, the difference between the distances is smaller.
+        // In a window of a minute, the vehicle travels about 12 m, so the log shows about 2.4 m too much. In windows
+        // with slow motion, this difference is smaller.
         assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
         assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
     }

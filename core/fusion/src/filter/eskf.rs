@@ -40,31 +40,33 @@ const KNOTS: usize = 256;
 const REST_SD_MPS: f64 = 0.02;
 /// Standard deviation of the mean turn rate over a second at rest, rad/s.
 const REST_SD_RADPS: f64 = 1e-3;
-/// Gate for zero-velocity updates (chi-square). A vehicle at rest exceeds the gate once in ten thousand times.
+/// Gate for zero-velocity updates (chi-square). An update of a vehicle at rest exceeds the gate once in ten thousand
+/// times.
 const REST_GATE: f64 = 15.1;
 /// The wall counts as flat if the standard deviation of a predicted range is below this, m.
 ///
-/// If the standard deviation of the range noise is smaller, it is the limit instead.
+/// If the standard deviation of the range noise is smaller, this standard deviation is the limit.
 const NEAR_M: f64 = 0.03;
 /// Standard deviation of the prior for the vehicle's speed, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// Standard deviation that is added, as a variance, to the position of an estimate beyond the wall, m.
+/// If an estimate is beyond the wall, the square of this is added to the variances of its position, m.
 const BEYOND_M: f64 = 1.5;
 
 /// Standard deviation below which the gyro bias counts as known, rad/s.
 ///
 /// An error of this size turns the attitude by a milliradian in a head pass of 3 s. A longer stop would gain little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
-/// The learnt smoothness of the wall applies to a range if its normalised squared innovation is at most this.
+/// The learnt smoothness of the wall is applied to a range if the range's normalised squared innovation is at most
+/// this.
 const SMOOTH: f64 = 4.0;
 /// The rounding of a counter is negligible if the counter's step is at most this share of its noise.
 const FINE_SHARE: f64 = 0.2;
-/// Time after the start of an estimate within which the estimate settles: its yaw becomes certain.
+/// Time after its start in which an estimate settles, which means that its yaw becomes certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// An estimate counts as settled if the standard deviation of its yaw is at most this.
 ///
-/// A yaw error of this size moves a sounding at 6 m by 5 cm. One more restart of the relation between earlier and
-/// later soundings would cost more than it gains.
+/// A yaw error of this size moves a sounding at 6 m by 5 cm. Smaller changes of yaw do not justify that the relation
+/// between earlier and later soundings is lost once more.
 const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
 /// Maximum number of recorded steps in an epoch: the propagation, two additions to the covariance, and an end.
@@ -85,9 +87,10 @@ pub struct Eskf {
     pub way_sought: Option<MonoNs>,
     /// Variance of the length that the counter may have lost permanently, m^2.
     slipped_m2: f64,
-    /// Number of times that the relative position of later and earlier soundings has become unknown.
+    /// Number of times that the position of later soundings relative to earlier ones has become unknown.
     pub ties: u32,
-    /// Start time of the estimate, and the standard deviation of yaw at the start or its last halving, radians.
+    /// Start time of the estimate, and the standard deviation of yaw, radians, at the start or when it was last found
+    /// halved.
     begun: (MonoNs, f64),
     /// Number of times that the standard deviation of yaw has halved while the estimate settled.
     pub settled: u32,
@@ -101,9 +104,9 @@ pub struct Eskf {
     /// Learnt roughness of the wall.
     roughness: Roughness,
     seen_again: RepeatedBumps,
-    /// Share of the declared variance that applies to ranges of heads until the gyro bias is known.
+    /// Share of the declared variance that is used for ranges of heads until the gyro bias is known.
     ///
-    /// It is the largest such share among the heads.
+    /// Each head has learnt such a share; the largest one is used.
     smoothness: f64,
     /// Whether the vehicle is known to be at rest. Its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
@@ -111,7 +114,7 @@ pub struct Eskf {
     is_blind: bool,
     /// Checks of settings by the residuals of ranges.
     pub suspicions: SettingChecks,
-    /// Variances to add to the errors at the end of the epoch, because the estimate may be wrong.
+    /// Variances to add to those of the errors at the end of the epoch, because the estimate may be wrong.
     doubts: Errors,
     /// Filter steps of the last epoch, for smoothing; empty unless `keeps_steps`.
     pub steps: Vec<Step>,
@@ -154,13 +157,13 @@ impl Default for Eskf {
 /// Innovation of an update, with the variances that determine its weight.
 struct Weighed {
     innovation: f64,
-    /// Variance of the estimate.
+    /// Variance of the innovation that comes from the estimate.
     of_estimate: f64,
-    /// Declared noise.
+    /// Declared variance of the measurement noise.
     declared: f64,
-    /// Noise of a single reading, as learnt.
+    /// Learnt noise variance of a single reading.
     white: f64,
-    /// Variance from bumps of the wall that many readings see.
+    /// Variance that bumps of the wall cause, if many readings see the same bump.
     bumps: f64,
 }
 
@@ -188,7 +191,7 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// Each time the standard deviation of yaw has halved, records that earlier samples are unrelated to later ones.
+    /// Records that earlier samples are unrelated to later ones each time the standard deviation of yaw has halved.
     ///
     /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
     /// about the errors between later passes.
@@ -287,7 +290,7 @@ impl Eskf {
         }
     }
 
-    /// Adds the speed change by an implausible force to the uncertainty, because the force may have been real.
+    /// Adds the speed change that an implausible force would cause to the uncertainty, because the force may be real.
     fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
         let way = variance * epoch_s * epoch_s;
@@ -378,7 +381,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Fuses a scalar update. The residual of `row` refers to the estimate corrected by the errors in `known`.
+    /// Fuses a scalar update. The residual of `row` refers to the estimate after the corrections in `known`.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
@@ -400,7 +403,8 @@ impl Eskf {
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         if settings.learns && is_head_square {
-            // If the residual of a range is too large for a smooth wall, the declared noise of a rough wall applies.
+            // If the residual of a range is too large for a smooth wall, the declared noise, which suits a rough wall,
+            // is used.
             let smooth = row.noise * self.smoothness;
             if innovation * innovation <= SMOOTH * (of_estimate + smooth) {
                 row.noise = smooth;
@@ -417,7 +421,8 @@ impl Eskf {
             source.noise_level.note_share((innovation * innovation - of_estimate) / declared, is_near);
         }
         let relative = source.noise_level.relative(nis.min(settings.gate));
-        // Ranges of heads are excluded, because rocks change them in the same way as drifting gyro biases would.
+        // Ranges of heads are excluded, because rocks change these ranges in the same way as drifting gyro biases
+        // would.
         if kind != SensorKind::Head {
             self.unrest.note([part(RATE_BIAS), part(FORCE_BIAS)], variance, relative);
         }
@@ -528,9 +533,10 @@ impl Eskf {
         0.75 * bent * bent
     }
 
-    /// Inflates the noise of a measurement by its curvature, evaluated at +-1 sd (sigma-point check).
+    /// Increases the noise of a measurement by the error of its linear prediction at +-1 sd of the estimate
+    /// (sigma-point check).
     ///
-    /// `None` if the measurement cannot be predicted at these points.
+    /// `None` if the measurement cannot be predicted at these two points.
     fn straight(
         &self,
         mut row: ScalarUpdate,
@@ -585,12 +591,12 @@ impl Eskf {
 
     /// Returns the standard deviation of the chainage error that later samples share, m.
     ///
-    /// It excludes length that the counter may have lost permanently.
+    /// This error excludes length that the counter may have lost permanently.
     pub fn along_sd_m(&self) -> f64 {
         math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
 
-    /// Bounds the speed by its prior, so that unaided accelerometers do not integrate gravity without limit.
+    /// Fuses the prior of the speed. Otherwise accelerometers without aiding would integrate gravity without limit.
     fn bound_speed(&mut self) {
         let mut errors = [0.0; ERRORS];
         for (axis, row) in measure::rest(&self.state, SPEED_SD_MPS).iter().enumerate() {
@@ -608,8 +614,8 @@ impl Eskf {
 
     /// Corrects by a range to the wall, with only a share of the computed correction of attitude and related errors.
     ///
-    /// The covariance has Joseph's form with the smaller gain. It equals the optimal covariance plus a dyad of the
-    /// omitted gain.
+    /// The covariance has Joseph's form with the smaller gain. This covariance equals the optimal one plus a dyad of
+    /// the omitted gain.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
@@ -678,7 +684,7 @@ impl Eskf {
         self.cable.corrections.note(by, [before_p[1] - after_p[1], before_v[1] - after_v[1]]);
     }
 
-    /// Decides whether to fuse a cable reading. A length that the counter has lost is added to the creep.
+    /// Decides whether to fuse a cable reading. If the counter has lost a length, this length is added to the creep.
     fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
         let used = self.cable.take(reading);
         self.slipped_m2 += self.cable.corrections.take_slipped_m2();
@@ -698,7 +704,7 @@ impl Eskf {
                 // disagreement.
                 add_to(errors, CREEP, lost_m);
                 add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                // Either the counter has lost this length, or the estimated motion was wrong during the cable
+                // Either the counter has lost the length `lost_m`, or the estimated motion was wrong during the
                 // disagreement.
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
@@ -716,7 +722,7 @@ impl Eskf {
     }
 }
 
-/// Whether the noise of a reading is independent of that of other readings.
+/// Whether the noise of a reading is independent of the noise of other readings.
 ///
 /// Several readings share the rounding error of a counter. If this error matters, no noise is learnt from the
 /// innovation.

@@ -1,4 +1,5 @@
-//! Sums of residuals that show whether a setting is wrong: the value of a parameter, or the mount of a sensor.
+//! Sums of residuals that show whether a setting is wrong. The setting is the value of a parameter or the mount of a
+//! sensor.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,16 +7,19 @@ use headrace_geometry::math;
 
 /// Maximum number of range sources whose settings are checked.
 pub(super) const FOLLOWED: usize = 12;
-/// One reading in this many is compared with alternative mounts, because each comparison costs a ray cast.
+/// Only one reading in this many is compared with predictions for alternative mounts, because each comparison costs a
+/// ray cast.
 pub(super) const COMPARED: u32 = 4;
 /// Minimum number of blocks for computing the uncertainty of a parameter. A block covers a distance of at least 3 m.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
 /// A fitted parameter is certainly not zero if it is at least this many standard deviations from zero.
 ///
-/// The limit for an alternative mount is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
+/// The limit for an alternative mount is lower (`SURE_GAIN`), because the gain by another mount varies with the
+/// vehicle's position.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
-/// Minimum sum of normalised squares that a parameter must explain, per reading of all sources.
+/// Minimum sum of normalised squared residuals that a parameter must explain, divided by the number of all sources'
+/// readings.
 ///
 /// A parameter that changes ranges by a seventh of their noise explains this much.
 const EXPLAINS: f64 = 0.02;
@@ -24,8 +28,8 @@ pub(super) const POSE: usize = 5;
 /// Residuals are clipped at this limit in a comparison of mounts, m, because some echoes come from objects other than
 /// the wall.
 const MOST_MISSED_M: f64 = 0.5;
-/// A mount is doubted if the mean square residual is at least the first value, m^2, and if the alternative mount leaves
-/// at most the second value, as a share of the squared residuals.
+/// A mount is doubted if its mean square residual is at least `MISSES_M2`, m^2, and if an alternative mount would leave
+/// at most the share `LEAVES` of its squared residuals.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
@@ -49,17 +53,16 @@ pub(super) struct Fit {
     values_2: f64,
 }
 
-/// Comparison of a sonar's residuals at its configured mount with those at an alternative. The alternative is the mount
-/// of another sonar, or the sonar's own mount turned by half a turn.
+/// Comparison of a sonar's residuals with its configured mount and with an alternative mount. The alternative is the
+/// mount of another sonar, or the configured mount turned by half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Alternative {
     pub(super) source: u16,
     pub(super) other: u16,
     pub(super) is_echo: bool,
-    /// Sums of the present block, and of all earlier blocks.
+    /// Sums of the present block (`block`) and of all earlier blocks.
     ///
-    /// Each contains the squared residuals at the configured mount and at the alternative, and the number of
-    /// readings.
+    /// Each contains the squared residuals at the configured mount and at the alternative, and the number of readings.
     pub(super) block: [f64; 3],
     pub(super) all: [f64; 3],
     pub(super) blocks: u32,
@@ -128,8 +131,8 @@ impl Fit {
     /// certainly not zero.
     ///
     /// The standard deviation is the larger of two: one from the scatter of blocks, and one from the noise of ranges.
-    /// Blocks alone may hardly scatter. `None` if the parameter hardly changes any range: changes of millimetres only
-    /// show errors of the wall and beam models.
+    /// The second one is needed because blocks may hardly scatter. `None` if the parameter changes ranges only by
+    /// millimetres, because such changes show mere errors of the wall and beam models.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
@@ -174,8 +177,8 @@ impl Alternative {
 
     /// Returns by how many standard deviations the alternative mount fits better than the configured one.
     ///
-    /// `None` unless it certainly fits better and the ratio `share_left` is small. For two swapped sources,
-    /// `share_left` covers both of them.
+    /// `None` unless the alternative certainly fits better and the ratio `share_left` is small. For two swapped
+    /// sources, `share_left` is the ratio for both together.
     pub(super) fn certain(&self, share_left: f64) -> Option<f64> {
         let [own, _, readings] = self.all;
         let n = f64::from(self.blocks);
@@ -208,7 +211,7 @@ mod tests {
         fit
     }
 
-    /// The gain of an alternative mount varies between blocks. The mount is only as certain as the mean of these
+    /// The gain by an alternative mount varies between blocks. The alternative is only as certain as the mean of these
     /// gains.
     #[test]
     fn alternative_mount_is_less_certain_if_its_gain_scatters_between_blocks() {
@@ -222,8 +225,8 @@ mod tests {
             }
             alternative.certain(alternative.share_left())
         };
-        // The mean gain is 0.2 m^2. Eight gains lie alternately above and below it by the scatter, so its sd is the
-        // scatter over the root of seven.
+        // The mean gain is 0.2 m^2. Eight gains lie alternately above and below this mean by the scatter. So the mean's
+        // sd is the scatter divided by the root of seven.
         for scatter_m2 in [0.05, 0.04, 0.02] {
             let expected = 0.2 / scatter_m2 * math::sqrt(7.0);
             let found = sure_sd(scatter_m2).unwrap();

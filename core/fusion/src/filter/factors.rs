@@ -1,11 +1,11 @@
 //! A covariance kept as its factors: P = U D U^T, with U unit upper triangular and D diagonal.
 //!
-//! Updates change D only by products and quotients of positive numbers. P therefore stays symmetric and
-//! non-negative, however badly it is scaled. Updates of P itself, Joseph's form included, fail when a precise
-//! measurement follows a long drift (see the tests).
+//! Updates change D only by products and quotients of positive numbers. P therefore stays symmetric and non-negative,
+//! however badly it is scaled. Updates of the full P, even in Joseph's form, fail when a precise measurement follows a
+//! long drift (see the tests).
 //!
-//! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4
-//! (addition of a dyad, after Agee and Turner).
+//! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4 (addition
+//! of a dyad, after Agee and Turner).
 
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
@@ -178,7 +178,7 @@ impl<const N: usize> Factors<N> {
         core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
     }
 
-    /// Returns the elements of U above the diagonal and those of D, column by column.
+    /// Returns the elements of U above the diagonal and the elements of D, column by column.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let columns = self.u.iter().zip(&self.d).enumerate();
         columns.flat_map(|(j, (column, d))| column.iter().take(j).copied().chain([*d]))
@@ -247,9 +247,9 @@ impl<const N: usize> Factors<N> {
 
     /// Adds several noises in order, interleaved column by column.
     ///
-    /// The result is bit-identical to adding the noises one after the other, because each noise depends on earlier
-    /// noises only through the current column. Interleaving is faster: while one noise waits for the quotient that
-    /// its next column needs, the processor works on the other noises.
+    /// The result is bit-identical to adding the noises one after the other, because earlier noises affect a noise only
+    /// through the current column. Interleaving is faster: while one noise waits for the quotient for its next column,
+    /// the processor works on other noises.
     pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
         let mut variances = noises.map(|noise| noise.variance);
         debug_assert!(variances.iter().all(is_variance), "added noises have variances: {variances:?}");
@@ -296,8 +296,8 @@ impl<const N: usize> Factors<N> {
 
     /// Whether no variance is negative.
     ///
-    /// This holds after any sequence of changes. Numbers that are no longer finite pass; [`Self::is_sound`] detects
-    /// them.
+    /// The result is true after any sequence of changes. Numbers that are not finite are accepted here;
+    /// [`Self::is_sound`] detects them.
     pub fn has_variances(&self) -> bool {
         self.d.iter().all(is_variance)
     }
@@ -321,7 +321,7 @@ impl Noise {
         Self { variance, weights: [(i, 1.0); 2] }
     }
 
-    /// Creates process noise of one error that also acts by `share` on an error with a lower index.
+    /// Creates process noise of one error. The share `share` of this noise also acts on an error with a lower index.
     pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0), (before, share)] }
     }

@@ -12,20 +12,21 @@ use headrace_geometry::math;
 
 /// Minimum share of a tilt's weight that must remain after the constant excess of the ranges is eliminated.
 ///
-/// If less weight remains, the vehicle has not turned to both sides enough.
+/// If less weight remains, the vehicle has not turned enough to both sides.
 const LEAST_LEFT: f64 = 0.05;
 /// Minimum lean of the beams along the tunnel in a pose window, rms, radians.
 ///
-/// A smaller lean is mostly error of the heading, so the window shows nothing.
+/// A smaller lean comes mostly from errors of the heading, so the pose window shows nothing about the tilt.
 const LEAST_LEAN_RAD: f64 = 0.012;
 
-/// Minimum ratio of the smallest reported tilt to the sd that declared range noise causes in the tilt.
+/// A head's tilt is judged only if the smallest reported tilt is this many times the sd that declared range noise
+/// causes.
 const SHOWS: f64 = 3.0;
 /// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
 
-/// Number of sums: pattern squared, pattern x derivative, derivative squared, pattern x residual, derivative x
-/// residual.
+/// Number of sums. They add up these products: pattern squared, pattern times derivative, derivative squared, pattern
+/// times residual, derivative times residual.
 const SUMS: usize = 5;
 
 /// Tilt sums of one head about one axis within a pose window, and the cross sums with the vehicle's pose.
@@ -47,8 +48,8 @@ pub(super) struct TiltFit {
 impl TiltSums {
     /// Adds a reading.
     ///
-    /// Inputs: derivatives of the range with respect to the pose, to the tilt, and to half of the squared tilt at
-    /// zero lean (`pattern`).
+    /// Inputs: derivatives of the range with respect to the pose, to the tilt, and to half of the squared tilt. The
+    /// last one is taken at zero lean (`pattern`).
     pub(super) fn add(
         &mut self,
         by_pose: [f64; POSE],
@@ -100,7 +101,7 @@ impl TiltSums {
 impl TiltFit {
     /// Adds the tilt sums of a pose window to the fit.
     ///
-    /// Unlike other settings, a tilt needs no blocks of distance. Its effect changes sign as the vehicle swings, and
+    /// Unlike other settings, a tilt needs no blocks of distance: its effect changes sign as the vehicle swings, but
     /// the effect of the wall's shape does not. The vehicle must move on between windows, because bumps that are seen
     /// again in every swing do not average out.
     pub(super) fn add(&mut self, window: [f64; SUMS]) {
@@ -134,14 +135,14 @@ impl TiltFit {
 
     /// Returns the standard deviation of the head's tilt, radians; `None` if the vehicle has not turned enough.
     ///
-    /// The value comes from the scatter of pose windows, but range noise sets a lower limit. The variance of this noise
-    /// is `level` times the declared variance.
+    /// The value comes from the scatter of pose windows, but is at least the sd that range noise causes. The variance
+    /// of range noise is `level` times the declared variance.
     pub(super) fn sd_rad(&self, level: f64) -> Option<f64> {
         let (rad, weight) = self.estimate()?;
         let [pattern_2, both, _, pattern_off, _] = self.sums;
         let share = both / pattern_2;
         let steady = (pattern_off - rad * both) / pattern_2;
-        // Weights that combine a window's sums into the residual that the fit leaves in this window.
+        // Weights of a window's sums; the weighted sum is the residual that the fit leaves in this window.
         let left = [share * steady, share * rad - steady, -rad, -share, 1.0];
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.windows);
@@ -152,7 +153,8 @@ impl TiltFit {
     /// Returns the head's tilt and its distance from zero in standard deviations, if its size is at least `least_rad`
     /// and it is certainly not zero.
     ///
-    /// `None` if declared noise would hide a tilt of `least_rad`, or if the tilt is too large for the linear model.
+    /// `None` if declared range noise would hide a tilt of `least_rad`, or if the tilt is too large for the linear
+    /// model.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
         if weight * least_rad * least_rad < SHOWS * SHOWS {
@@ -220,8 +222,8 @@ mod tests {
             let whole = pp * tt - pt * pt;
             let (found_rad, found_steady) = ((pp * to - pt * po) / whole, (tt * po - pt * to) / whole);
             let fit = fit(&blocks);
-            // The tilt explains the difference between two sums of squares: left by a fit without a tilt, and by a
-            // fit with one.
+            // The tilt explains the difference between two sums of squared residuals: that of a fit without a tilt, and
+            // that of a fit with a tilt.
             let left = |tilt: f64, steady: f64| sum(&|r| square(r[2] - tilt * r[1] - steady * r[0]));
             let explained = left(0.0, po / pp) - left(found_rad, found_steady);
             assert!((fit.explains() / explained - 1.0).abs() < 1e-6, "{} {explained}", fit.explains());
@@ -246,8 +248,8 @@ mod tests {
             None,
             "a tilt below the limit is not reported"
         );
-        // The certainty of the tilt is limited by the range noise if that is large, and otherwise by the scatter of
-        // pose windows.
+        // Large range noise limits the certainty of the tilt. With less range noise, the scatter of pose windows limits
+        // it.
         let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
         assert!(
             (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,

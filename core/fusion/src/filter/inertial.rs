@@ -17,10 +17,10 @@ use headrace_geometry::math;
 /// Mean of an inertial unit's samples over an interval, in the body frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InertialSample {
-    /// Turn rate, rad/s; `None` without gyro data. The attitude is then unchanged, and its error grows fast.
+    /// Turn rate, rad/s; `None` without gyro data. Without gyro data, the attitude is kept, and its error grows fast.
     pub rate_radps: Option<Vec3<Body>>,
-    /// Specific force, m/s^2; `None` without accelerometer data. The velocity is then unchanged, and its error grows
-    /// fast.
+    /// Specific force, m/s^2; `None` without accelerometer data. Without such data, the velocity is kept, and its error
+    /// grows fast.
     pub force_mps2: Option<Vec3<Body>>,
 }
 
@@ -33,19 +33,20 @@ pub struct Leg {
     dt_s: f64,
     /// Integral of the rotation matrix over times with gyro data.
     turned: Matrix3<f64>,
-    /// Integral and double integral of the rotation matrix over times with accelerometer data.
+    /// Integral (`pushed`) and double integral of the rotation matrix over times with accelerometer data.
     pushed: Matrix3<f64>,
     pushed_twice: Matrix3<f64>,
-    /// Change of velocity and displacement caused by specific force, without gravity.
+    /// Change of velocity and displacement (`way`) that specific force without gravity causes.
     velocity: Vector3<f64>,
     way: Vector3<f64>,
-    /// Effect of a gyro bias on velocity and displacement, because the bias tilts the estimated direction of the
-    /// force.
+    /// Effects of a gyro bias on velocity (`tilting`) and displacement, because the bias tilts the estimated direction
+    /// of the force.
     tilting: Matrix3<f64>,
     tilting_twice: Matrix3<f64>,
     /// Duration without gyro data, and duration without accelerometer data, s.
     blind_s: [f64; 2],
-    /// Distance along the tunnel, m, and the cable's scale error on it; their product is the creep.
+    /// Distance along the tunnel, m, and the cable's scale error on this distance; the product of both adds to the
+    /// creep.
     creeping: [f64; 2],
     /// Factors that multiply the process noise of gyro and accelerometer biases.
     unrest: [f64; 2],
@@ -129,7 +130,7 @@ impl Leg {
         *without_force += if force.is_some() { 0.0 } else { dt_s };
     }
 
-    /// Returns the process noise of the cable's slack, which is modelled as white noise through two equal lags in
+    /// Returns the process noise of the cable's slack, which is modelled as white noise that passes two equal lags in
     /// series.
     fn slack_noises(&self) -> [Noise; 2] {
         let slack = self.slack();
@@ -242,8 +243,8 @@ impl Leg {
         let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
         for k in 0..3 {
             factors.add_all([
-                // White force noise over the leg causes a displacement in two parts. One is correlated with the
-                // velocity. The other is independent and has a variance factor of dt^2 / 12.
+                // White force noise over the leg causes a displacement of two parts. One part is correlated with the
+                // velocity. The other part is independent of it, with the noise variance times dt^2 / 12.
                 Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
                 Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
                 Noise::of_one(ATTITUDE + k, rate),
@@ -280,8 +281,8 @@ impl Leg {
     }
 }
 
-/// Minimum decay factor of an error over a leg. It avoids a division by zero, and an error with a smaller factor would
-/// be negligible anyway.
+/// Minimum decay factor of an error over a leg. It avoids a division by zero. An error with a smaller factor would be
+/// negligible.
 const LEAST_FADING: f64 = 1e-3;
 
 /// Transition of errors between two times: e' = F e.
@@ -295,7 +296,7 @@ pub struct Transition {
     way_pushed: Matrix3<f64>,
     velocity_turned: Matrix3<f64>,
     way_turned: Matrix3<f64>,
-    /// Distance along the tunnel, m, and the cable's scale error on it.
+    /// Distance along the tunnel, m, and the cable's scale error on this distance.
     creeping: [f64; 2],
     /// Indices of the errors that decay over time, each with its decay factor.
     fading: [(usize, f64); 9],

@@ -10,7 +10,7 @@ use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// A head's range may get more weight than declared only if the cosine of its incidence is above this.
+/// A head's range may get more weight than declared only if the cosine of the beam's incidence is above this.
 ///
 /// If the hull is pitched steeply, the beams look along the tunnel, and only few of them determine the attitude.
 const SQUARE: f64 = 0.8;
@@ -28,21 +28,21 @@ pub struct ScalarUpdate {
     pub lean: Option<Lean>,
     /// Second derivatives of the expected value, which the update neglects.
     ///
-    /// They are with respect to position, 1/m; to rotation, m; and to both.
+    /// The three values are the derivatives with respect to position twice, 1/m; to rotation twice, m; and to both.
     pub bends: [f64; 3],
 }
 
 /// Inclination of a beam along the tunnel.
 ///
-/// An inclination to either side lengthens the range. So a filter that does not know the side would confirm its own
-/// first guess.
+/// An inclination to either side lengthens the range. So a filter that does not know the side would only confirm its
+/// first guess of the side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lean {
     /// Component of the beam's unit vector along the tunnel.
     pub along: f64,
     /// Change of `along` per unit of each error of the estimate.
     pub by: Errors,
-    /// Change of the range per unit of `along`, divided by `along`, m.
+    /// Ratio of two values, m: the change of the range per unit of `along`, and `along` itself.
     pub slope_m: f64,
 }
 
@@ -86,13 +86,13 @@ impl ScalarUpdate {
         self
     }
 
-    /// Whether the beam meets the wall squarely. Per metre of position, the range changes by one over the cosine of
-    /// incidence.
+    /// Whether the beam meets the wall squarely. The incidence follows from the change of the range per metre of
+    /// position, which is one over the cosine of incidence.
     pub fn is_square(&self) -> bool {
         vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
-    /// Returns the part of the residual that the corrections from `known` to `errors` explain.
+    /// Returns the part of the residual that is explained by the corrections made since `known`, up to `errors`.
     pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
         self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
     }
@@ -114,9 +114,9 @@ impl ScalarUpdate {
 ///
 /// The range of a beam at a more grazing angle shows the wall's roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
-/// Minimum distance to the wall that is assumed when its curvature is computed, m.
+/// Smallest distance to the wall that is used to compute the curvature of a range, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// The side of a beam's inclination is certain if the inclination is at least this many sds from zero.
+/// The side to which a beam inclines is certain if its inclination is at least this many sds from zero.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.
@@ -126,9 +126,9 @@ pub struct Beam {
     pub offset: Vec3<Body>,
     /// Direction of the beam's axis.
     pub along: Vec3<Body>,
-    /// Half angle of the cone around the axis in which the nearest part of the wall echoes first, radians.
+    /// Half angle of a cone around the beam's axis, radians. The nearest part of the wall in this cone echoes first.
     pub first_rad: f64,
-    /// Half width of the beam in which it is uncertain which part of the wall echoes first, radians.
+    /// Half angle of a wider cone, radians. Within it, it is uncertain which part of the wall echoes first.
     pub unsure_rad: f64,
 }
 
@@ -155,18 +155,20 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     let stretch = 1.0 + state.range_scale;
     let designed_m = height_m / cos;
     let expected_m = designed_m * stretch;
-    // The slope is d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
+    // The slope is the derivative of the expected range by the incidence angle. A small rotation `turn` changes this
+    // angle by turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The true range may be as short as the nearest ray of the wider cone. It is assumed to be uniformly distributed
-    // between this value and the expected one.
+    // The true range may be as short as the shortest ray of the wider cone. The true range is assumed to be uniformly
+    // distributed between this length and the expected range.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
     let across = 1.0 - along.x() * along.x();
-    // The second derivatives are those of a circular wall around the sonar, and of height / cos(incidence).
+    // By position, the second derivative is that of the range to a circular wall around the sonar. By rotation, it is
+    // that of height / cos(incidence).
     let secant = 1.0 / cosine;
     let by_turn = expected_m * (2.0 * secant * secant - 1.0);
     let tangent = math::sqrt((secant * secant - 1.0).max(0.0));
@@ -199,11 +201,10 @@ pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -
         .with_one(SLACK, 1.0)
 }
 
-/// Predicts the attitude that an inertial unit computes, as rotations about the tunnel's x, y and z. The rotation
-/// about z is modelled as a compass with a deviation.
+/// Predicts the attitude that an inertial unit computes, as rotations about the tunnel's x, y and z axes. For the
+/// rotation about z, the unit is modelled as a compass with a deviation.
 ///
-/// The model compares rotations instead of angles, so it is smooth at any attitude, including a pitch of 90
-/// degrees.
+/// The model compares rotations instead of angles, so it is smooth at any attitude, including a pitch of 90 degrees.
 pub fn attitude(
     state: &State,
     measured: Rot<Tunnel, Body>,
@@ -245,7 +246,7 @@ pub fn velocity(
     })
 }
 
-/// Measures the gyro bias by the mean turn rate of an inertial unit that does not turn, rad/s.
+/// Returns measurements of the gyro bias, rad/s: the mean turn rate of an inertial unit that does not turn.
 pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarUpdate; 3] {
     let off = mean_radps + -state.rate_bias_radps;
     let off = [off.x(), off.y(), off.z()];
@@ -262,7 +263,7 @@ pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
     })
 }
 
-/// Returns the standard deviation of noise and of rounding to a quantum together.
+/// Returns the standard deviation that noise and the rounding to a quantum cause together.
 pub fn with_quantum(sd: f64, quantum: f64) -> f64 {
     math::hypot(sd, quantum / math::sqrt(12.0))
 }

@@ -1,7 +1,7 @@
 //! Navigation by an error-state Kalman filter: inertial propagation, corrected by all other sensors.
 //!
 //! Readings wait in a window until all readings of their time have arrived. They are fused at their time of validity,
-//! epoch by epoch. A fix is the estimate of the last epoch, propagated by the inertial samples since. Derivation:
+//! epoch by epoch. A fix is the estimate of the last epoch, propagated by the later inertial samples. Derivation:
 //! `docs/why/navigation.md`.
 
 pub mod agreement;
@@ -69,19 +69,20 @@ use headrace_sensor::reading::{MAX_SOURCES, Reading};
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
 /// If the clock goes back by more than this, the clock has been reset.
 ///
-/// Readings whose timestamp is more than this ahead of their receive time are rejected.
+/// A reading is rejected if its timestamp is ahead of its receive time by more than this.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// An estimate with larger standard deviations is restarted, because linearised updates would not converge.
+/// An estimate is restarted if its standard deviation of position or tilt is larger than this, because linearised
+/// updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
 /// The estimate is restarted after all sensors have been silent for this time.
 const SILENCE: DurNs = DurNs(5_000_000_000);
-/// Largest plausible turn rate and specific force of an inertial sample. A unit that exceeds them is saturated or
-/// faulty.
+/// Largest plausible turn rate and specific force of an inertial sample. A unit that exceeds these values is saturated
+/// or faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
-/// Maximum number of estimates after the last epoch. An inertial unit at 600 Hz needs 720 for the longest window plus
-/// the longest epoch, 1.2 s.
+/// Maximum number of estimates after the last epoch. The longest window plus the longest epoch is 1.2 s, in which an
+/// inertial unit at 600 Hz needs 720 estimates.
 const AHEAD: usize = 1024;
 /// Assumed time between two passes of the heads over the same position if no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
@@ -106,8 +107,8 @@ pub struct FilterNavigation {
     /// Estimates after the last epoch, propagated by inertial samples.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// Error covariance relative to a much earlier visit to this position, whose error is independent and equally
-    /// large.
+    /// Error covariance relative to a much earlier visit to this position. That visit's error is assumed independent
+    /// and equally large.
     revisit: Relative,
     /// Number of restarts of the estimate, because it was lost or not finite, or because the clock went back.
     restarts: u64,
@@ -158,7 +159,7 @@ impl FilterNavigation {
         self.context.unit_at
     }
 
-    /// Number of restarts of the estimate.
+    /// Number of restarts of the estimate so far.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
@@ -252,7 +253,7 @@ impl FilterNavigation {
         debug_assert!(sd.is_valid(), "standard deviations of a sound estimate are numbers: {sd:?}");
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        // Until two clones exist, errors of new soundings are independent of errors of earlier soundings.
+        // Until two clones exist, errors of new soundings count as independent of errors of earlier soundings.
         self.revisit = sd.independent();
         let differs = Relative::along(self.running.cable.differs_m());
         let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);
@@ -267,7 +268,7 @@ impl FilterNavigation {
     /// Whether the chainage was reacquired since the heads last passed this position, or the cable counter's zero is
     /// lost.
     ///
-    /// If so, the offset between earlier and present soundings is unknown. Once the counter's zero is lost, the
+    /// If true, the offset between earlier and present soundings is unknown. Once the counter's zero is lost, this
     /// offset stays unknown.
     fn has_jumped(&self) -> bool {
         if self.zero.is_lost() {
@@ -385,8 +386,8 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // Either the clock was reset, or the previous timestamp was wrong. In both cases, a restart is better than
-            // to wait until the clock catches up.
+            // Either the clock was reset, or the previous timestamp was wrong. In both cases, the estimate is
+            // restarted, because the clock may catch up only much later.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();

@@ -1,32 +1,34 @@
 //! Level of a source's white noise relative to the declared noise, learnt from innovations.
 //!
-//! The innovations of a correct filter are white. Their variance is then half the mean square of the difference
-//! between two successive innovations. Biases and slow errors of the estimate cancel in that difference.
-//! Derivation: `docs/why/navigation.md`, "Noise that is learnt".
+//! The innovations of a correct filter are white. So half the mean square of the difference between two successive
+//! innovations is their variance. Biases and slow errors of the estimate cancel in this difference. Derivation:
+//! `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
 
-/// The noise level's natural logarithm changes by this times the excess of a normalised squared difference over 1.
+/// Gain of the learning: the natural logarithm of the noise level changes by this, times a normalised squared
+/// difference minus 1.
 const GAIN: f64 = 0.01;
 /// Squared normalised innovations are clipped at this limit, because one outlier does not show the noise.
 const MOST: f64 = 9.0;
 /// Smallest share of a head's declared range variance that may be learnt.
 ///
-/// The declared 3 cm suit a rough wall. On a smooth wall, a range step of 2 cm and noise of 1 cm still cause this
-/// share.
+/// The declared sd of 3 cm suits a rough wall. On a smooth wall, a range step of 2 cm and sensor noise of 1 cm still
+/// cause this share of the variance.
 const LEAST_OF_HEAD: f64 = 0.15;
-/// The square of a rejected innovation is clipped at this share of the declared variance.
+/// The square of a rejected innovation is clipped at this multiple of the declared variance.
 ///
-/// Rejected innovations come from rocks and stray echoes. If the wall differs from its design, many innovations are
-/// rejected.
+/// Rejected innovations come from rocks and stray echoes. A single one shows nothing, but many are rejected if the wall
+/// differs from its design.
 const MOST_UNUSED: f64 = 2.0;
-/// Number of measurements in the running mean, and the minimum number before that mean is used.
+/// `MEMORY` is the number of measurements in the running mean, and `FEW` the number after which this mean is used.
 const MEMORY: u32 = 200;
 const FEW: u32 = 30;
-/// Number of used returns in a turn of a head, one every three degrees. Fewer returns do not cover the whole wall.
+/// Number of used returns in a turn of a head, one every three degrees. With fewer returns, not all of the wall has
+/// been seen.
 const TURN: u32 = 120;
 /// Innovations are too large to be noise if their mean normalised square is above this.
 const UNUSUAL: f64 = 1.8;
@@ -38,10 +40,10 @@ pub struct NoiseLevel {
     last: [Option<f64>; 3],
     /// Learnt factor by which the declared variance is multiplied.
     factor: f64,
-    /// Running mean of all squared normalised innovations, and the number of innovations in it.
+    /// Running mean of all squared normalised innovations, and the number of innovations in this mean.
     nis: f64,
     seen: u32,
-    /// Running mean of squared innovations minus the estimate's own variance, as a share of the declared variance.
+    /// Running mean of each squared innovation minus the estimate's variance, as a share of the declared variance.
     share: f64,
     /// The same mean over the last few measurements, which shows changes of the wall.
     latest: f64,
@@ -56,9 +58,9 @@ impl Default for NoiseLevel {
 /// Returns the limits of the noise level, as factors of the declared variance; `None` if the level is not learnt.
 ///
 /// The declared tilt noise of an inertial unit covers its slow errors, which differences between successive innovations
-/// do not show. The declared range noise of a head also covers bumps and shape of the wall, which could be mistaken for
-/// yaw if beams lean. So differences can only raise a head's level. Only the square of the total residual can lower it
-/// ([`NoiseLevel::smoothness`]).
+/// do not show. The declared range noise of a head also covers bumps and the shape of the wall. With less noise, these
+/// could be mistaken for yaw if beams lean. So differences of innovations can only raise a head's level. A lower level
+/// comes only from the squares of the innovations themselves ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
         SensorKind::Head => Some([1.0, 9.0]),
@@ -92,7 +94,7 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Processes a squared innovation minus the estimate's own variance, as a share of the declared variance.
+    /// Processes a squared innovation minus the estimate's variance, as a share of the declared variance.
     pub fn note_share(&mut self, share: f64, is_used: bool) {
         let most = if is_used { MOST } else { MOST_UNUSED };
         let share = share.clamp(-most, most);
@@ -125,9 +127,9 @@ impl NoiseLevel {
 
     /// Returns the variance factor, at most 1, for a head's ranges whose beams meet the wall squarely.
     ///
-    /// The factor is the learnt share of the declared variance: over many measurements, or over the last few if that
-    /// is larger. It is 1 until there are measurements of a whole turn. It is large if the wall differs from its
-    /// design, by roughness or by shape. `None` for a head without measurements.
+    /// The factor is the learnt share of the declared variance: the larger of its mean over many measurements and its
+    /// mean over the last few. The factor is 1 until there are measurements of a whole turn. It is large if the wall
+    /// differs from its design in roughness or shape. `None` for a head without measurements.
     pub fn smoothness(&self) -> Option<f64> {
         let is_known = self.seen >= TURN;
         (self.seen > 0)
@@ -141,7 +143,8 @@ mod tests {
 
     const HEAD: SensorKind = SensorKind::Head;
 
-    /// Returns the noise level after `count` measurements whose innovation is `off` declared standard deviations.
+    /// Returns the noise level after `count` measurements; `off` gives the innovation of each, in declared standard
+    /// deviations.
     fn level(count: u32, off: impl Fn(u32) -> f64, is_used: bool) -> NoiseLevel {
         let mut level = NoiseLevel::default();
         for k in 0..count {

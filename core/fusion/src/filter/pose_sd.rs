@@ -9,16 +9,18 @@ use crate::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Largest standard deviations for georeferencing: of the position in the cross-section, m, and of yaw, radians.
+/// Largest standard deviations at which samples are georeferenced: of the position in the cross-section, m, and of yaw,
+/// radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
-/// Largest standard deviation of the chainage for georeferencing, relative to the previous head pass and absolute, m.
+/// Largest standard deviation of the chainage at which samples are georeferenced, m, both absolute and relative to the
+/// previous head pass.
 const ALONG_LIMIT_M: f64 = 1.0;
 
 /// Standard deviations of the parts of an estimated pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseSd {
-    /// Standard deviation of the chainage, without the part caused by the cable's scale, m.
+    /// Standard deviation of the chainage, m. It excludes the part that the cable's scale causes.
     pub along_m: f64,
     /// Standard deviation of the position in the cross-section, in the less certain direction, m.
     pub place_m: f64,
@@ -59,7 +61,7 @@ impl PoseSd {
         Relative::new([[along, 0.0, 0.0], [0.0, tilt, 0.0], [0.0, 0.0, yaw]])
     }
 
-    /// Returns `relative` if this estimate and `relative` are certain enough to georeference samples.
+    /// Returns `relative` if both this estimate and `relative` are certain enough to georeference samples.
     ///
     /// Errors: the part of the pose that is too uncertain.
     pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {

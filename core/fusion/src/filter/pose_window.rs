@@ -1,6 +1,6 @@
 //! Least-squares sums over a pose window of a few seconds, for the vehicle's pose and all fitted settings.
 //!
-//! Only residuals that the pose does not explain count for the settings.
+//! Only the part of the residuals that the pose does not explain counts for the settings.
 
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +54,7 @@ impl PoseWindow {
             .then_some(factor)
     }
 
-    /// Returns the weight and the weighted value of a fitted parameter after the vehicle's pose is eliminated.
+    /// Returns the weight and the weighted value of a fitted parameter, after elimination of the vehicle's pose.
     pub(super) fn freed(&self, line: &Line, factor: &[[f64; POSE]; POSE]) -> [f64; 2] {
         let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
         [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
@@ -67,8 +67,8 @@ mod tests {
 
     /// Three readings with residuals of 1, 2 and 3 m are fitted by a parameter.
     ///
-    /// In the first case, the pose has no effect on the parameter's fit. In the second case, pose and parameter
-    /// change the ranges in the same way.
+    /// In the first case, the pose does not change the ranges. In the second case, pose and parameter change the ranges
+    /// in the same way.
     #[test]
     fn residuals_explained_by_a_pose_error_are_removed() {
         let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };
@@ -83,7 +83,7 @@ mod tests {
         let alone = freed(&spell(1.0), &line([0.0; POSE]));
         assert!((alone[0] - 3.0).abs() < 1e-12 && (alone[1] - 6.0).abs() < 1e-12, "{alone:?}");
         // The three readings give an information of 3 / m^2 on the pose, and the prior of 0.3 m gives 11.1 / m^2. The
-        // pose explains the share 3 / 14.1 of the sums. The rest remains for the parameter.
+        // pose explains the share 3 / 14.1 of the residuals' sums. The parameter explains the rest.
         let like_it = freed(&spell(1.0), &line([3.0, 0.0, 0.0, 0.0, 0.0]));
         let left = 1.0 - 3.0 / (3.0 + 1.0 / 0.09);
         assert!(

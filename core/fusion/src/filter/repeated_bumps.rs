@@ -18,9 +18,9 @@ const MOST_PASSES: f64 = 10.0;
 /// Counts how often the heads have passed over the bumps that they see now.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct RepeatedBumps {
-    /// Chainage at which the heads began to see the present bumps, m.
+    /// Chainage of the vehicle when its heads began to see the present bumps, m.
     from_m: Option<f64>,
-    /// Number of returns of all heads since they began to see the present bumps.
+    /// Number of returns of all heads since the heads began to see the present bumps.
     returns: u32,
 }
 
@@ -34,7 +34,8 @@ impl RepeatedBumps {
 
     /// Returns how often the heads have seen a bump on average, including the present pass; at least 1.
     ///
-    /// A bump is seen once in each started turn. Averaged over a turn, that is the number of turns plus one half.
+    /// In each turn, a bump is seen once. Averaged over the bumps, the number of passes is the number of turns plus one
+    /// half.
     fn passes(&self, settings: &Settings) -> f64 {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }
@@ -42,8 +43,8 @@ impl RepeatedBumps {
     /// Counts a return, and returns the variance with which to fuse it, m^2.
     ///
     /// `declared_m2` is the variance of a single return, and `bumps` is the share of this variance that comes from
-    /// bumps. Together, all returns from one bump weigh as much as their mean. Each return adds the part of that
-    /// weight that is new.
+    /// bumps. Together, all returns from one bump weigh as much as their mean. So the variance of each return is such
+    /// that it adds only the weight that is new.
     pub(super) fn noise_m2(
         &mut self,
         range_m: f64,
@@ -68,8 +69,7 @@ mod tests {
 
     const DECLARED_M2: f64 = 9e-4;
 
-    /// Returns the noise of a return after `passes` passes, at a range where `around` returns of a turn see the
-    /// same bump.
+    /// Returns the noise variance of a return after `passes` passes, if `around` returns of a turn see the same bump.
     fn noise_m2(passes: f64, around: f64, bumps: f64) -> f64 {
         let settings = Settings::default();
         let returns = math::round_to_i64((passes - 0.5) * math::TAU / settings.return_step_rad);
@@ -100,7 +100,7 @@ mod tests {
         assert!((noise_m2(1e6, 1.0, 1.0) - noise_m2(MOST_PASSES, 1.0, 1.0)).abs() < 1e-15);
     }
 
-    /// Passes add up while the vehicle is stationary. The count restarts after a short motion ahead or astern.
+    /// Passes are counted while the vehicle is stationary. The count restarts after a short motion ahead or astern.
     #[test]
     fn passes_over_a_bump_accumulate_until_the_vehicle_moves_on() {
         let settings = Settings::default();

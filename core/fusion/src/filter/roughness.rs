@@ -10,14 +10,18 @@ use super::settings::Settings;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Maximum number of bumps in the running mean, and the number of bumps for which the declared roughness counts.
+/// `MEMORY` is the maximum number of bumps in the running mean. The declared roughness weighs as much as `DECLARED`
+/// bumps.
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
-/// The squared sum of two residuals is clipped at this many variances of the sum, because one outlier is no bump.
+/// The square of a sum of two residuals is clipped at this multiple of the sum's variance, because one outlier is no
+/// bump.
 const MOST: f64 = 9.0;
-/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to bumps with an sd of 6 cm.
+/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to bumps with an sd of 6 cm at
+/// the default settings.
 const ROUGHEST: f64 = 4.0;
-/// Minimum speed along the wall that is assumed, m/s. A slower vehicle drifts sideways at about this speed.
+/// Smallest assumed speed along the wall, m/s, because even a nearly stationary vehicle drifts sideways at about this
+/// speed.
 const STILL_MPS: f64 = 0.05;
 /// Number of echosounders whose last pings are kept.
 const ECHOSOUNDERS: usize = 8;
@@ -60,8 +64,8 @@ impl Default for Roughness {
 impl Roughness {
     /// Processes a ping that has corrected the estimate.
     ///
-    /// `bump` is the weight of the ping in bumps: one divided by the number of pings that see the same bump.
-    /// `scale_m2` is the variance that the unknown scale of ranges causes in a sum of two ranges.
+    /// `bump` is the share of a bump that the ping stands for: one divided by the number of pings that see the same
+    /// bump. `scale_m2` is the variance that the unknown scale of ranges causes in a sum of two ranges.
     pub(super) fn note(&mut self, look: Look, bump: f64, scale_m2: f64, settings: &Settings) {
         let faces = |other: &&Look| {
             other.by_place.dot(&look.by_place) < FACING
@@ -72,8 +76,8 @@ impl Roughness {
             let noise_m2 = look.white_m2 + other.white_m2 + scale_m2;
             let sum_m = look.left_m + other.left_m;
             let most_m2 = MOST * (noise_m2 + 2.0 * self.variance_m2(settings).max(declared_m2));
-            // The sum contains the bumps of both echosounders. Each pair of bumps is counted twice, once by each
-            // echosounder.
+            // The sum contains the bumps of both echosounders. So the bumps of one echosounder have half of the
+            // variance.
             let found_m2 = ((sum_m * sum_m).min(most_m2) - noise_m2) / 2.0;
             let share = bump / 2.0;
             self.seen = (self.seen + share).min(MEMORY);
@@ -175,8 +179,8 @@ mod tests {
         let looks = |apart_s: f64, speed_mps: f64| looks(DurNs::from_secs_f64(apart_s), speed_mps, 0.1);
         assert!((looks(0.1, 0.2) - 5.0).abs() < 1e-9);
         assert!((looks(0.1, -0.2) - 5.0).abs() < 1e-9 && (looks(-0.1, 0.2) - 5.0).abs() < 1e-9);
-        // A nearly stationary vehicle still sways. Pings farther apart than a bump count as one each, and so do
-        // simultaneous pings.
+        // A nearly stationary vehicle still sways. If pings are farther apart than a bump, or simultaneous, each of
+        // them counts as one look.
         assert!((looks(0.1, 0.0) - 20.0).abs() < 1e-9);
         assert_eq!((looks(1.0, 0.2), looks(0.0, 0.2)), (1.0, 1.0));
     }

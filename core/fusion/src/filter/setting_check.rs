@@ -2,16 +2,16 @@
 //!
 //! Each setting is a parameter that is fitted to the residuals. Within a pose window of a few seconds, the vehicle's
 //! pose explains as much of the residuals as it can, and the parameters explain the rest. The sums of pose windows are
-//! added up over blocks of distance. Blocks are about as independent as the wall allows, so their scatter gives the
+//! added up over blocks of distance. Blocks are nearly independent of each other, so their scatter gives the
 //! uncertainty of a parameter. For a head's tilt, each pose window is a block. Summary: `docs/why/navigation.md`,
 //! "Settings in doubt".
 //!
-//! A residual is r = x b, with x the error of the setting and b as follows. The vectors t, A and p belong to the
-//! range: its derivative by rotation, the sonar's lever arm, and its derivative by position.
+//! A residual is r = x b, with x the error of the setting and b as follows. t is the derivative of the range by
+//! rotation, p its derivative by position, and A the sonar's lever arm.
 //!
 //! - speed of sound, or a wider wall: b is the expected range
 //! - head turned about its axis a: b = (t - A x p) . a
-//! - head pitched or yawed on its mount: the same about that axis, without its constant part
+//! - head pitched or yawed on its mount: the same b about the axis of pitch or yaw, without its constant part
 
 use serde::{Deserialize, Serialize};
 
@@ -33,25 +33,25 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Length of a pose window. For about this time, a filter keeps its position although ranges are wrong.
+/// Length of a pose window. A filter keeps its position for about this time although ranges are wrong.
 const SPELL: DurNs = DurNs(5_000_000_000);
 /// Minimum distance between two pose windows that count for the tilt of a head, m. Bumps of the wall are about as long.
 const MOVES_ON_M: f64 = 0.2;
-/// Minimum duration and distance of a block of pose windows, and its maximum duration. A block that has not covered the
-/// minimum distance by then is dropped.
+/// A block of pose windows lasts at least `BLOCK` and covers at least `BLOCK_M`. It is dropped if it has not covered
+/// this distance after `LONGEST`.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
 /// Minimum number of readings in a block of pose windows.
 const FEWEST_READINGS: u32 = 100;
-/// Smallest setting errors that are reported: a share of the range, and an angle.
+/// Smallest setting errors that are reported: `LEAST_SCALE` as a share of the range, `LEAST_ANGLE_RAD` as an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
 /// A mount counts as verified if the standard deviations of the head's pitch and yaw are at most this, radians.
 ///
-/// The smallest angle that is reported then differs from zero by two standard deviations.
+/// Then an error of `LEAST_ANGLE_RAD`, the smallest that is reported, is at least two standard deviations from zero.
 const VERIFIED_RAD: f64 = LEAST_ANGLE_RAD / 2.0;
-/// A range loses weight if its residual exceeds the first value, and is ignored if it exceeds the second value, m.
+/// A range loses weight if its residual exceeds `FAR_M`, and is ignored if its residual exceeds `BEYOND_M`.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
 /// Maximum number of pairs of a sonar and an alternative mount for it.
@@ -66,7 +66,7 @@ const ASTRAY_M2: f64 = 0.04;
 pub enum Setting {
     /// Ranges are too long by this share.
     ///
-    /// Either the speed of sound is set too high, or the wall is wider than in the design by this share.
+    /// Either the speed of sound is set too high by this share, or the wall is wider than in the design by it.
     RangeScale(f64),
     /// A head is rotated about its axis relative to its configured mount, by this angle in radians.
     ///
@@ -76,7 +76,7 @@ pub enum Setting {
     HeadPitched(f64),
     /// A head is yawed on its mount by this angle, radians, which is to be added to the configured yaw.
     HeadYawed(f64),
-    /// A sensor is mounted facing the opposite direction.
+    /// A sensor faces the direction opposite to that of its configured mount.
     WrongWayRound,
     /// Two sources are swapped; the value is the number of the second source.
     Swapped(u16),
@@ -125,7 +125,8 @@ impl Setting {
         }
     }
 
-    /// Whether the setting is the direction in which a head points, so that its samples are displaced along the tunnel.
+    /// Whether the setting is the direction of a head's axis. If it is wrong, the head's samples are displaced along
+    /// the tunnel.
     pub fn is_of_pointing(self) -> bool {
         match self {
             Self::HeadPitched(_) | Self::HeadYawed(_) | Self::WrongWayRound | Self::Swapped(_) => true,
@@ -143,7 +144,7 @@ impl Setting {
 }
 
 impl SettingDoubt {
-    /// Whether both doubts concern the same setting, with equal or different values.
+    /// Whether this doubt and another one concern the same setting, with equal or different values.
     pub fn is_of_same(&self, other: &Self) -> bool {
         self.source == other.source
             && self.setting.as_str() == other.setting.as_str()
@@ -171,8 +172,8 @@ struct Look {
     sd_m: f64,
 }
 
-/// A range in the fits: its derivatives with respect to the vehicle's pose and to a rotation of the head, its
-/// expected value, residual and weight.
+/// A range as used in the fits: derivatives with respect to the vehicle's pose and to a rotation of the head, expected
+/// value, residual and weight.
 struct Seen {
     by_pose: [f64; POSE],
     own_turn: Vec3<Tunnel>,
@@ -202,7 +203,8 @@ pub struct SettingChecks {
     turned: [Fit; FOLLOWED],
     tilted: [[TiltFit; 2]; FOLLOWED],
     alternatives: Vec<Alternative>,
-    /// For each checked source, the number of readings and the observed share of the declared variance, at most 1.
+    /// For each checked source, the number of its readings (`heard`), and the observed share of the declared variance,
+    /// at most 1.
     heard: [u32; FOLLOWED],
     levels: [f64; FOLLOWED],
     /// Smallest standard deviation so far of each head's pitch and yaw on its mount, radians; infinite at first.
@@ -253,23 +255,24 @@ impl SettingChecks {
 
     /// Whether the ranges have not yet verified the pitch and yaw of all heads on their mounts.
     ///
-    /// Ranges verify them while the vehicle swings from side to side. A single head needs no check, because a tilt
-    /// moves all of its samples alike.
+    /// Ranges verify pitch and yaw of a mount while the vehicle swings from side to side. A single head needs no check,
+    /// because a wrong mount moves all of its samples alike.
     pub fn has_unverified_mounts(&self) -> bool {
         self.compared_heads().flatten().any(|sd_rad| *sd_rad > VERIFIED_RAD)
     }
 
     /// Returns the relative covariance that mount errors cause between samples of two heads.
     ///
-    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. A swing of the vehicle
-    /// does not reduce the covariance: each head is compared with others whose mounts are just as uncertain.
+    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. The ranges of a
+    /// swinging vehicle do not reduce this covariance, because each head is compared with heads whose mounts are just
+    /// as uncertain.
     pub fn mount_error(&self, declared_rad: f64) -> Relative {
         let is_compared = self.compared_heads().next().is_some();
         let variance = if is_compared { 2.0 * declared_rad * declared_rad } else { 0.0 };
         Relative::new([[0.0; 3], [0.0, variance, 0.0], [0.0, 0.0, variance]])
     }
 
-    /// Standard deviations of pitch and yaw of the heads, if there are several.
+    /// Standard deviations of each head's pitch and yaw on its mount, if there are several heads.
     fn compared_heads(&self) -> impl Iterator<Item = &[f64; 2]> {
         let heads = self.mounts.iter().flatten();
         let several = heads.clone().count() > 1;
@@ -321,8 +324,8 @@ impl SettingChecks {
         let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
         let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
-        // A known scale error must not make a range an outlier. Of the residuals with and without this error, the
-        // smaller one counts.
+        // A known scale error must not turn a range into an outlier. So the smaller of two residuals counts: with and
+        // without this scale error.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
@@ -335,7 +338,7 @@ impl SettingChecks {
         }
     }
 
-    /// Adds a head's return to the fits of its mount.
+    /// Adds a head's return to the fits of the head's mount.
     fn hear_head(
         &mut self,
         slot: usize,
@@ -426,7 +429,7 @@ impl SettingChecks {
         self.doubt = self.likeliest();
     }
 
-    /// Computes how well the ranges show the heads' pitch and yaw.
+    /// Computes how certain the ranges make each head's pitch and yaw on its mount.
     fn note_mounts(&mut self) {
         for ((head, fits), level) in self.mounts.iter_mut().zip(&self.tilted).zip(self.levels) {
             for (least_rad, fit) in head.iter_mut().flatten().zip(fits) {
@@ -523,7 +526,7 @@ fn tilt_axes(mount: &Rot<Body, Sensor>) -> [Vec3<Body>; 2] {
     [Vec3::new(-ahead.y() / level, ahead.x() / level, 0.0), Vec3::new(0.0, 0.0, 1.0)]
 }
 
-/// Returns the rotation by half a turn about the sensor's own vertical axis.
+/// Returns a rotation by half a turn about the z axis of the sensor's frame.
 fn round() -> Rot<Sensor, Sensor> {
     Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
 }

@@ -22,13 +22,14 @@ pub struct GaussMarkov {
 impl GaussMarkov {
     /// Creates the process of a bias that has a constant part and a drifting part.
     ///
-    /// The variance is the sum of both parts' variances. The process gains variance as fast as the drifting part.
+    /// The variance of the process is the sum of both parts' variances. The process drifts as fast as the drifting
+    /// part.
     pub fn of_bias(bias: &BiasSpec) -> Self {
         let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance per second that white noise adds to a process with a single lag.
+    /// Variance per second that the driving white noise adds to this process, if it has a single lag.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }
@@ -72,7 +73,7 @@ pub struct Settings {
     pub depth_offset_sd_m: f64,
     /// Random walk of the depth sensor's offset, m per root of a second.
     pub depth_noise: f64,
-    /// Noise of a measured attitude about the vertical axis, radians.
+    /// Noise of a measured attitude, about the vertical axis, radians.
     pub heading_sd_rad: f64,
     /// Deviation of a compass, radians.
     pub heading: GaussMarkov,
@@ -82,7 +83,7 @@ pub struct Settings {
     pub attitude_sd_rad: f64,
     /// Noise of an echosounder's range, m, wall roughness included.
     pub echo_sd_m: f64,
-    /// Length of wall along which an echosounder sees the same bump, m.
+    /// Length of a bump along the wall, m: within it, an echosounder sees the same bump.
     pub bump_m: f64,
     /// Distance along the tunnel within which heads see the same bumps again, m.
     pub seen_again_m: f64,
@@ -96,14 +97,14 @@ pub struct Settings {
     pub return_sd_m: f64,
     /// Full width of a head's beam, radians. The nearest part of the wall within the beam echoes first.
     pub return_beam_rad: f64,
-    /// Minimum angle between used returns of a head, radians. Returns that are closer see the same roughness.
+    /// Minimum angle between two used returns of a head, radians. Returns at smaller angles see the same roughness of
+    /// the wall.
     pub return_step_rad: f64,
     /// Noise of a velocity log's velocity over ground, m/s.
     pub velocity_sd_mps: f64,
-    /// Declared error of a head's pitch and yaw on its mount, radians.
+    /// Declared standard deviation of a head's pitch and yaw on its mount, radians.
     pub mount_sd_rad: f64,
-    /// Gate: a measurement is rejected if its squared innovation exceeds the innovation's variance times this
-    /// factor.
+    /// Gate: a measurement is rejected if its squared innovation exceeds this factor times the innovation's variance.
     pub gate: f64,
     /// Maximum age of a reading on arrival. Older readings are rejected as too late.
     pub window: DurNs,
@@ -111,8 +112,8 @@ pub struct Settings {
     ///
     /// Readings are fused, and errors propagated, once per epoch. Epochs begin at whole multiples of this length.
     pub epoch: DurNs,
-    /// Whether noise levels of the sources are learnt. Likelihoods of different settings can be compared only without
-    /// learning.
+    /// Whether noise levels of the sources are learnt. To compare the likelihoods of different settings, learning must
+    /// be off.
     pub learns: bool,
     /// Share of a wall range's computed correction that is applied to the attitude and related errors.
     ///
@@ -134,7 +135,7 @@ impl Default for Settings {
             tether_sd_m: 0.005,
             slack: GaussMarkov { reach: 0.06, time_s: 2.5 },
             scale_sd: 0.002,
-            // Not configurable, because a wheel's scale does not change within a dive. A small value keeps the
+            // Not configurable, because a wheel's scale does not change within a dive. The small value only keeps the
             // variance above zero.
             scale_noise: 1e-9,
             depth_sd_m: 0.02,
@@ -145,7 +146,7 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Length of a bump, not configurable: two thirds of the distance of 0.3 m between bumps in field dives
+            // Not configurable: bumps were 0.3 m apart in field dives, and two thirds of this count as a bump's length
             // (docs/why/field.md).
             bump_m: 0.2,
             // Not configurable: about the distance that the vehicle travels during half a turn of a head.
@@ -167,7 +168,7 @@ impl Default for Settings {
     }
 }
 
-/// A chi-square value with one degree of freedom exceeds this once in a thousand times.
+/// Gate that a chi-square value with one degree of freedom exceeds once in a thousand times.
 const GATE_999: f64 = 10.828;
 
 impl Settings {
@@ -183,8 +184,8 @@ impl Settings {
         }
     }
 
-    /// Declared noise variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
-    /// compared with it.
+    /// Declared noise variance of a kind of sensor, in the square of the measurement's unit. It is the reference for
+    /// innovation variances.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {
             SensorKind::Head => self.return_sd_m,

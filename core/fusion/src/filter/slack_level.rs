@@ -1,14 +1,13 @@
 //! Size and speed of the cable's slack, measured by comparing the counter with inertial motion.
 //!
 //! The difference between counter and inertial motion contains the slack. It also contains the effect of the inertial
-//! unit's constant errors, which is a polynomial of second degree in time. So its third differences show the slack
-//! alone. At several lags, they are compared with the third differences of the slack model. If they are larger than the
-//! model's, the slack is larger or faster than declared. A single third difference far above the usual size means that
-//! the counter or the inertial unit has failed. The comparison does not depend on earlier cable readings: it uses only
-//! the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
+//! unit's constant errors, which is a polynomial of second degree in time. So the third differences of counter minus
+//! inertial motion show the slack alone. At several lags, they are compared with those of the slack model. If the
+//! observed ones are larger, the slack is larger or faster than declared. A single third difference far above the usual
+//! size means that the counter or the inertial unit has failed. The comparison does not depend on the filter's use of
+//! cable readings: of the estimate, it uses only the heading. Summary: `docs/why/navigation.md`, "Slack".
 //!
-//! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant
-//! T:
+//! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant T:
 //!
 //! ```text
 //! d(L) = u(t) - 3 u(t - L) + 3 u(t - 2 L) - u(t - 3 L)
@@ -36,43 +35,45 @@ const ROOM: usize = 256;
 const KNOTS: usize = 256;
 /// Averaging time for the mean squares of third differences, s.
 const MEMORY_S: f64 = 40.0;
-/// A third difference is clipped at this multiple of the rms. Faults are rare and large; slack is not.
+/// A third difference is clipped at this multiple of the rms, because rare large values come from faults and not from
+/// slack.
 const MOST_SDS: f64 = 3.0;
-/// The noise is raised by this margin before it is subtracted from a mean square, in sds of the mean square.
+/// Before noise is subtracted from a mean square, the noise is raised by this many sds of the mean square.
 ///
 /// A margin is needed because the mean comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
-/// Time constant with which the inertial velocity decays, s. The decay keeps the values bounded and hardly changes a
-/// third difference.
+/// Time constant with which the inertial velocity decays, s. The decay keeps the integrated motion bounded and hardly
+/// changes a third difference.
 const FORGETS_S: f64 = 1000.0;
 /// Time constant for levelling the attitude and aligning it with the estimate's heading, s.
 ///
-/// It may be long, because only changes within a lag matter.
+/// It may be long, because only changes within a lag of some seconds matter.
 const LEVELS_S: f64 = 100.0;
-/// Largest difference between the integrated and the estimated attitude, rad. If exceeded, the integration restarts.
+/// Largest difference between the integrated and the estimated attitude, rad. Beyond it, the integration restarts.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Counter and inertial motion agree up to this third difference, in multiples of the usual size.
+/// Counter and inertial motion agree if the third difference is at most this multiple of its usual size.
 ///
-/// Agreement is judged once there are `FEW` differences. Once there are `ENOUGH`, their usual size counts as known.
+/// Agreement is judged once there are `FEW` third differences. Once there are `ENOUGH`, their usual size counts as
+/// known.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
 /// Until the first comparison, slack is assumed to be faster than declared by this factor.
 const AT_FIRST: f64 = 2.0;
 /// Third differences up to `AGREES_SDS` times this length always count as usual, m. A lever arm or a tilting vehicle
-/// causes them.
+/// causes such differences.
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// Slack is taken to move the counter constantly if the rms third difference at a lag of 1 s exceeds this many steps of
-/// the counter.
+/// If the rms third difference at a lag of 1 s exceeds this many counter steps, slack is assumed to keep the count
+/// changing.
 const LIVELY_STEPS: f64 = 4.0;
 /// Time between two comparisons of the averaged third differences with the slack model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
 /// Maximum time between two counter readings that are compared.
 const GAP: DurNs = DurNs(1_500_000_000);
-/// Shortest time constant, s, and largest standard deviation, m, of slack. Faster changes are counter noise, and
-/// larger ones are a fault.
+/// Slack has at least this time constant, s, and at most the standard deviation `MOST_REACH_M`, m. Faster changes are
+/// counter noise, and larger changes are a fault.
 const LEAST_TIME_S: f64 = 0.15;
 pub(super) const MOST_REACH_M: f64 = 0.15;
 
@@ -80,14 +81,14 @@ pub(super) const MOST_REACH_M: f64 = 0.15;
 #[derive(Debug, Clone)]
 pub(super) struct SlackEstimate {
     attitude: Option<Rot<Tunnel, Body>>,
-    /// Inertial position and velocity along the tunnel, each up to an unknown constant.
+    /// Position (`way_m`) and velocity along the tunnel by inertial data, each up to an unknown constant.
     way_m: f64,
     speed_mps: f64,
     /// Inertial positions along the tunnel within the last epoch.
     knots: Vec<(MonoNs, [f64; 1])>,
     /// Differences between counter and inertial position, m, each with the counter's reading, m.
     differences: Vec<(MonoNs, [f64; 2])>,
-    /// Third differences at each lag: their mean square, m^2, their mean, m, and their number so far.
+    /// Third differences at each lag: mean square (`squares_m2`), mean (`means_m`), and number so far (`seen`).
     squares_m2: [f64; LAGS_S.len()],
     means_m: [f64; LAGS_S.len()],
     seen: [u32; LAGS_S.len()],
@@ -123,9 +124,9 @@ impl SlackEstimate {
         self.slack.unwrap_or(GaussMarkov { time_s: declared.time_s / AT_FIRST, ..declared })
     }
 
-    /// Whether slack constantly moves a counter that has this step, m.
+    /// Whether slack keeps the count of a counter with this step, m, changing.
     ///
-    /// On average, third differences at a lag of 1 s then exceed [`LIVELY_STEPS`] steps and the noise.
+    /// True if the rms third difference at a lag of 1 s exceeds [`LIVELY_STEPS`] steps and the noise.
     pub(super) fn is_lively(&self, step_m: f64, noises: Noises, settings: &Settings) -> bool {
         let least_m = LIVELY_STEPS * step_m;
         self.squares_m2[1] > (least_m * least_m).max(noises.third_square_m2(1.0, settings))
@@ -166,8 +167,8 @@ impl SlackEstimate {
         let gain = up.x - self.speed_mps / FORGETS_S;
         self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
         self.speed_mps += gain * dt_s;
-        // On average, the specific force points up. So if its mean leans, the attitude is wrong. This error is removed
-        // slowly.
+        // On average, the specific force points up. So if the mean force leans, the attitude is wrong by the lean,
+        // which is removed slowly.
         let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
         let back = rotation(back.scaled(dt_s / LEVELS_S));
         self.attitude = Some(back * (middle * rotation(rate.scaled(dt_s / 2.0))));
@@ -215,8 +216,7 @@ impl SlackEstimate {
 
     /// Returns the third difference of counter minus inertial position, m.
     ///
-    /// The second value is the difference between the longest and the shortest of the counter's distances in the three
-    /// lags, m.
+    /// The second value, m, belongs to the counter's distances in the three lags: the longest minus the shortest.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
@@ -236,7 +236,7 @@ impl SlackEstimate {
         else {
             return true;
         };
-        // Once there are enough third differences, their observed mean square includes the noise.
+        // With few third differences, their mean square may miss the noise. With enough of them, it includes the noise.
         let seen_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 };
         let usual_m2 = seen_m2 + late_m2 + LEAST_M * LEAST_M;
         let off_m = third_m - *mean_m;
@@ -251,9 +251,9 @@ impl SlackEstimate {
         agrees
     }
 
-    /// Returns the slowest slack model whose third differences are as large as observed.
+    /// Returns the slack model with the longest time constant whose third differences are as large as observed.
     ///
-    /// The model's slack is at least as large as declared.
+    /// The slack of this model is at least as large as declared.
     fn shown(&self, noises: Noises, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
         let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
@@ -264,8 +264,8 @@ impl SlackEstimate {
         let least_reach =
             seen_m2.iter().map(|seen| math::sqrt(seen.max(0.0) / 20.0)).fold(declared.reach, f64::max);
         let most_reach = MOST_REACH_M.max(declared.reach);
-        // A faster slack gets a larger standard deviation. Sinusoidal slack requires this, because its spectrum has a
-        // peak.
+        // A faster slack gets a larger standard deviation. Sinusoidal slack requires the larger value, because its
+        // spectrum has a peak.
         let model = |time_s: f64| {
             let reach = declared.reach * math::sqrt(math::sqrt(math::sqrt(declared.time_s / time_s)));
             GaussMarkov { reach: reach.max(least_reach).min(most_reach), time_s }
@@ -316,8 +316,8 @@ impl Noises {
 
     /// Mean square of the noise's third difference at a lag, m^2.
     ///
-    /// The noise contains the white noise of the counter and the declared noise of the inertial unit. The latter is
-    /// white force noise, a random walk of tilt and bias, and a rotation of gravity.
+    /// The noise contains the white noise of the counter and the declared noise of the inertial unit. The noise of the
+    /// inertial unit is white force noise, a random walk of tilt and bias, and a rotation of gravity.
     fn third_square_m2(self, lag_s: f64, settings: &Settings) -> f64 {
         const GRAVITY_MPS2: f64 = 9.81;
         let tilting = GRAVITY_MPS2 * settings.rate_noise;
@@ -391,7 +391,7 @@ mod tests {
 
     /// The fastest change of a sine is its amplitude times its angular frequency.
     ///
-    /// Three standard deviations of the slack model's rate are compared with this speed.
+    /// The test compares three standard deviations of the slack model's rate with this speed.
     #[test]
     fn estimated_slack_covers_slack_larger_and_faster_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {

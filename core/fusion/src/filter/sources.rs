@@ -13,16 +13,16 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 
 /// Limits at which a head's range counts as stuck.
 ///
-/// At least this many returns have the same range although the expected range varies by more than `VARIES_M`. The
-/// standard deviation of the expected ranges must be at most `SURE_M`. The limit of three returns is safe, because a
-/// return that is dropped by mistake costs nothing.
+/// A range is stuck if at least `FEW_OF_ONE_RANGE` returns have it although the expected range varies by more than
+/// `VARIES_M`. The standard deviation of the expected ranges must be at most `SURE_M`. As few as three returns suffice,
+/// because a return that is dropped by mistake costs nothing.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Minimum time between two attitude readings that are used. Their errors stay correlated for longer than this, so more
-/// readings would add little.
+/// Minimum time between two attitude readings that are used. Errors of attitude readings stay correlated for longer
+/// than this, so more readings would add little.
 ///
-/// The periods for cable, depth and velocity readings have the same reason.
+/// The same is true for the minimum times of cable, depth and velocity readings.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 /// Minimum time between two used cable readings; see [`ATTITUDE_PERIOD`].
 pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
@@ -53,9 +53,9 @@ pub struct Consistency {
     pub nis_sum: f64,
     /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement.
     ///
-    /// Each innovation adds two terms. The first is the NIS (clipped at the gate) minus 1. The second is the
-    /// logarithm of the innovation's variance divided by the usual variance. If a log is interpreted in two ways, the
-    /// interpretation with the lower value is more likely.
+    /// Each innovation adds two terms. The first term is the NIS, clipped at the gate, minus 1. The second term is
+    /// ln(variance of the innovation / usual variance). If a log is interpreted in two ways, the interpretation with
+    /// the lower value is more likely.
     pub surprise: f64,
 }
 
@@ -92,7 +92,7 @@ pub struct Source {
     pub noise_level: NoiseLevel,
     /// Resolution step of the sensor if it is a tether counter.
     pub count_step: CountStep,
-    /// Record that shows whether the range of a head follows the wall.
+    /// Record that shows whether the ranges of a head follow the wall or stay constant.
     pub one_range: ConstantRange,
 }
 
@@ -137,7 +137,7 @@ impl Source {
         self.one_range.is_stuck(FEW_OF_ONE_RANGE, VARIES_M)
     }
 
-    /// Counts one scalar component of a reading as rejected; `number` is its index in the reading.
+    /// Counts one scalar component of a reading as rejected; `number` is the component's index in the reading.
     pub fn leave_out(&mut self, number: usize) {
         self.consistency.gated += 1;
         self.noise_level.skip(number);
@@ -156,8 +156,8 @@ impl Source {
 
 /// Whether the range of any other head follows the wall.
 ///
-/// If so, this head itself is the cause of its constant range. Otherwise an error of the estimate could be the
-/// cause, for instance in a round tunnel.
+/// If true, this head itself is the cause of its constant range. Otherwise an error of the estimate could be the cause,
+/// for instance in a round tunnel.
 pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     let mut others = sources.iter().enumerate().filter(|(number, _)| *number != source);
     others.any(|(_, other)| {
@@ -167,9 +167,10 @@ pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     })
 }
 
-/// Returns the share of the declared variance that applies to ranges of all heads: the largest share of any head.
+/// Returns the share of the declared variance that is used for ranges of all heads: the largest share that any head has
+/// learnt.
 ///
-/// The largest counts, because if one head begins to see rocks, the others soon will.
+/// The largest is used, because if one head begins to see rocks, the other heads soon will.
 pub fn smoothness(sources: &[Option<Source>]) -> f64 {
     let heads = sources.iter().flatten().filter(|source| source.sensor.kind == SensorKind::Head);
     heads.filter_map(|head| head.noise_level.smoothness()).reduce(f64::max).unwrap_or(1.0)

@@ -58,9 +58,9 @@ pub struct State {
     /// Rate at which the slack grows, apart from its decay, m/s. The rate decays with the same time constant as the
     /// slack.
     pub slack_rate_mps: f64,
-    /// Creep of the cable, m: the excess of shown chainage from all scale errors and slips so far.
+    /// Creep of the cable, m: the excess of the shown chainage that all scale errors and slips so far have caused.
     pub creep_m: f64,
-    /// Local scale error of the cable, a ratio; positive if the cable shows too much.
+    /// Local scale error of the cable, a ratio; positive if the cable shows too much distance.
     pub scale: f64,
     /// Offset of the depth sensor, m; positive if the sensor shows too much height.
     pub depth_offset_m: f64,
@@ -134,7 +134,7 @@ impl State {
         errors
     }
 
-    /// Interpolates by `share` towards another estimate. The sensor errors are taken from the other estimate.
+    /// Interpolates by `share` towards another estimate. The estimated sensor errors are those of the other estimate.
     #[must_use]
     pub fn between(&self, other: &Self, share: f64) -> Self {
         let turn = rotation_vector(other.attitude * self.attitude.inverse());
@@ -232,7 +232,7 @@ pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     }
 }
 
-/// Returns the errors as they were `by_s` seconds earlier, at constant velocity.
+/// Returns the errors as they were `by_s` seconds earlier if the velocity was constant.
 pub fn earlier(errors: &Errors, by_s: f64) -> Errors {
     let mut then = *errors;
     put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
@@ -249,8 +249,8 @@ pub fn add_to(errors: &mut Errors, i: usize, amount: f64) {
 /// Returns the rotation that has this rotation vector, radians.
 pub fn rotation<To: Copy>(by: Vec3<To>) -> Rot<To, To> {
     let angle = by.norm();
-    // The factor of the rotation vector is sin(a / 2) / a. For small angles, it is computed as a series, because the
-    // quotient would lose digits.
+    // The factor of the rotation vector is sin(a / 2) / a. For a small angle a, the factor is computed as a series,
+    // because the quotient would lose digits.
     let share = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { math::sin(angle / 2.0) / angle };
     let [x, y, z] = [by.x() * share, by.y() * share, by.z() * share];
     Rot::from_wxyz(math::cos(angle / 2.0), x, y, z).unwrap_or_else(Rot::identity)

@@ -10,16 +10,16 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Reading;
 
-/// Maximum number of waiting readings. Four heads, four echosounders and the other sensors need a tenth of it.
+/// Maximum number of waiting readings. Four heads, four echosounders and all other sensors need a tenth of this number.
 const MOST: usize = 1024;
 /// Maximum number of waiting samples of inertial units.
 const MOST_FELT: usize = 1024;
 /// Longest interval for which an inertial sample is valid.
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
-/// Time within which samples are merged into their mean.
+/// Samples whose times differ by at most this are merged into their mean.
 ///
-/// Merged samples are the turn rate and the force of one sample, or several samples that arrive in one burst. The
-/// mean of a burst applies to the whole time since the sample before it.
+/// This merges the turn rate and the force of one sample, and the samples that arrive in one burst. The mean of a burst
+/// is valid for the whole time since the sample before the burst.
 const SAME: DurNs = DurNs(500_000);
 
 /// A reading that waits in the window.
@@ -46,7 +46,7 @@ struct FeltAt {
 pub struct Window {
     waiting: Vec<Waiting>,
     felt: Vec<FeltAt>,
-    /// Time of the last implausible force, and the speed change by such forces, m/s. The forces may have been real.
+    /// Time of the last implausible force, and the speed change that such forces cause if they are real, m/s.
     jolt: Option<(MonoNs, f64)>,
 }
 
@@ -92,13 +92,13 @@ impl Window {
         self.jolt = Some((at, carried_mps + force_mps2 * lasted.as_secs_f64()));
     }
 
-    /// Returns the speed change by implausible forces up to a time, m/s, and clears it.
+    /// Returns and clears the speed change, m/s, that implausible forces until a time would cause.
     pub fn jolted(&mut self, until: MonoNs) -> f64 {
         self.jolt.take_if(|(at, _)| *at <= until).map_or(0.0, |(_, speed_mps)| speed_mps)
     }
 
-    /// Returns the time of the last implausible force that is not fused yet, and the speed change by such forces,
-    /// m/s.
+    /// Returns the time of the last implausible force whose speed change, m/s, is not yet taken over, and this speed
+    /// change.
     pub fn jolt(&self) -> Option<(MonoNs, f64)> {
         self.jolt
     }
@@ -116,7 +116,8 @@ impl Window {
         self.felt.get_mut(place)
     }
 
-    /// Returns the inertial data valid from `from` on, and the end of their validity, which is at most `until`.
+    /// Returns the inertial data that are valid from `from` on, and the end of their validity, which is `until` at the
+    /// latest.
     ///
     /// An inertial sample is the mean over the time before its timestamp.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (InertialSample, MonoNs) {
@@ -186,7 +187,7 @@ impl Window {
         self.waiting.drain(..old);
     }
 
-    /// Removes inertial samples that no time after `at` needs.
+    /// Removes inertial samples that are not needed for any time after `at`.
     pub fn forget(&mut self, at: MonoNs) {
         let old = self.felt.partition_point(|other| other.at + SPEAKS_FOR < at);
         self.felt.drain(..old.saturating_sub(2));

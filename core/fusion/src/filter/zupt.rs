@@ -9,7 +9,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// Averaging window, and the number of equal successive means that show rest. A floating vehicle has fewer of them.
+/// `MEAN_OVER` is the averaging window. `MEANS` equal successive means show rest; a floating vehicle has fewer equal
+/// means.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
 /// Number of mean turn rates at rest after which the gyro bias is known.
@@ -18,14 +19,15 @@ const ENOUGH: u32 = 25;
 const FLOATS: u32 = 15;
 /// Time after the first estimate during which the pilot is asked to keep the vehicle still.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
-/// Number of remembered pauses of the cable. The cable is at rest once it has been still for the longest of them times
-/// the second value.
+/// Number of remembered pauses of the cable. The cable is at rest once it has been still for `PAUSES_TO_REST` times the
+/// longest of these pauses.
 ///
 /// The pauses matter if a winch operator winds the cable in half a metre at a time. The cable is then stationary
 /// between pulls while the vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
-/// Largest difference between two means at rest: of turn rates, rad/s, and of specific forces, m/s^2.
+/// Largest difference between two means at rest: `SAME_RATE` for turn rates, rad/s, `SAME_FORCE` for specific forces,
+/// m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
 
@@ -37,7 +39,7 @@ pub struct RestDetector {
     cable_m: Option<f64>,
     cable_still: bool,
     cable_at: MonoNs,
-    /// Time of the cable's last movement, and the lengths of the pauses before it, the latest one last.
+    /// Time of the cable's last movement, and the lengths of the pauses before this movement, the latest pause last.
     cable_moved_at: Option<MonoNs>,
     pauses: [DurNs; PAUSES],
     /// Number of mean turn rates that were taken at rest.
@@ -91,7 +93,7 @@ impl RestDetector {
         match (kind, reading) {
             (SensorKind::Imu, Reading::AngularRate(rate)) => {
                 if at.since(self.cable_at).0 > MEAN_OVER.0 {
-                    // If the counter is silent, nothing shows that the cable is stationary.
+                    // A silent counter does not show that the cable is stationary, so the cable counts as moving.
                     self.moved();
                 }
                 let ended = self.rate.take(at, [rate.x(), rate.y(), rate.z()], SAME_RATE);
@@ -158,10 +160,10 @@ impl RestDetector {
         self.asks_from.get_or_insert(at);
     }
 
-    /// Returns how much longer the vehicle should stand still, s, until the gyro bias is known.
+    /// Returns how many more seconds the vehicle should stand still until the gyro bias is known.
     ///
-    /// 0 if the vehicle floats or its inertial unit is too noisy, because then no stop counts as rest. Also 0 later
-    /// in a dive, because by then the gyros seldom cause uncertain passes.
+    /// 0 if the vehicle floats or its inertial unit is too noisy, because no stop would count as rest. Also 0 later in
+    /// a dive, when the gyro bias seldom makes passes uncertain.
     pub fn lacking_s(&self, now: MonoNs) -> u32 {
         let lacking = ENOUGH.saturating_sub(self.rested);
         let begins = self.asks_from.is_some_and(|from| (0..ASKS_FOR.0).contains(&now.since(from).0));
@@ -209,8 +211,8 @@ mod tests {
         );
     }
 
-    /// If the cable is wound in half a metre at a time, its pauses are longer than the averaging windows for rest,
-    /// and the vehicle moves during the pauses.
+    /// A cable that is wound in half a metre at a time pauses for longer than the averaging windows for rest. During
+    /// the pauses, the vehicle moves.
     ///
     /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]

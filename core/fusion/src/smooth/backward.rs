@@ -27,7 +27,7 @@ pub struct Backward {
     settings: Settings,
     now: Option<(u32, Estimate)>,
     later: Later,
-    /// Pieces, points and relative covariances of the track so far, all in reverse order.
+    /// The track so far, in reverse order: its pieces, and in the next two fields its points and relative covariances.
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
@@ -54,7 +54,7 @@ impl Backward {
         let after = self.now.filter(|(piece, _)| *piece == placed.piece).map(|(_, after)| after);
         let smoothed = after.and_then(|after| self.smooth(step, &after));
         let now = smoothed.unwrap_or_else(|| {
-            // Without a later estimate in the same piece, the filter's estimate is kept.
+            // There is no later estimate in the same piece, so the filter's estimate is kept.
             self.end_piece();
             self.pieces.push(Piece::begin(placed, self.points.len(), self.relatives.len()));
             Estimate { at: step.at, state: step.state, factors: step.factors }
@@ -81,9 +81,9 @@ impl Backward {
         Track::of_reversed(self.pieces, self.points, self.relatives, self.settings.epoch)
     }
 
-    /// Smooths the estimate at the beginning of a step, given the smoothed estimate at its end.
+    /// Smooths the estimate at the beginning of a step, given the smoothed estimate at the step's end.
     ///
-    /// `None` if the step ends its piece, or if the result is not finite.
+    /// `None` if the step is the last of its piece, or if the result is not finite.
     fn smooth(&mut self, step: &Step, after: &Estimate) -> Option<Estimate> {
         if matches!(step.by, Move::End) {
             return None;

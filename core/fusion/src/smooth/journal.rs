@@ -37,7 +37,7 @@ impl Journal {
         (Self { queue: Arc::clone(&queue), piece: 0, clock: 0 }, JournalReader { queue })
     }
 
-    /// Begins a new piece of the track. Its first estimate is unrelated to earlier estimates.
+    /// Begins a new piece of the track, because its first estimate is unrelated to earlier estimates.
     pub fn begin(&mut self) {
         self.piece = self.piece.saturating_add(1);
     }
@@ -49,8 +49,8 @@ impl Journal {
 
     /// Writes a step of the filter to the queue.
     ///
-    /// A step is dropped if it is not finite or if the queue is full. The track then breaks: later steps can no
-    /// longer correct earlier ones.
+    /// A step is dropped if it is not finite or if the queue is full. If a step is dropped, the track breaks: later
+    /// steps can no longer correct earlier ones.
     ///
     /// Allocates: never.
     pub fn write(&mut self, step: &Step, unit_at: Vec3<Body>, gap: DurNs) {

@@ -1,7 +1,7 @@
 //! Relative error covariance between a smoothed epoch and the epoch of the previous head pass.
 //!
-//! The backward pass goes back in time, so it reaches the later epoch first. That epoch waits until the backward pass
-//! reaches the epoch of the previous head pass, one pass gap earlier.
+//! The backward pass goes back in time, so it reaches the later epoch first. This later epoch waits until the backward
+//! pass reaches the epoch of the previous head pass, one pass gap earlier.
 
 use super::rts_step::Gain;
 use crate::filter::clones::{CLONES, MOVING, STEP};
@@ -10,7 +10,8 @@ use crate::filter::state::{ERRORS, Errors};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Value of the pass gap if no earlier head pass is related to the epoch, because the cable has slipped since.
+/// Value of the pass gap of an epoch without a related earlier head pass, because the cable has slipped since that
+/// pass.
 pub const UNTIED: DurNs = DurNs(i64::MAX);
 /// Standard deviation of the relative chainage error of an epoch without a related earlier pass, m.
 const UNTIED_M: f64 = 1e3;
@@ -25,9 +26,10 @@ struct Moment {
     gap: DurNs,
     /// Rows of the epoch's covariance for the errors that move a sample.
     own: [Errors; 3],
-    /// Cross-covariances of these errors with all errors at the current epoch of the backward pass.
+    /// Cross-covariances of the errors in `own` with all errors at the current epoch of the backward pass.
     with: [Errors; 3],
-    /// Time from the current epoch of the backward pass to this epoch, s, and the relative covariance of both epochs.
+    /// Time from the current epoch of the backward pass to this epoch, s. `relative` is the relative covariance of the
+    /// two epochs.
     age_s: f64,
     relative: Relative,
 }
@@ -43,8 +45,8 @@ pub struct Later {
 pub type Answer = (usize, Relative);
 
 impl Later {
-    /// Whether an epoch at the time `at` is to be added: it is the first, or at least [`STEP`] before the last one
-    /// added.
+    /// Whether an epoch at the time `at` is to be added. True for the first epoch, and for epochs at least [`STEP`]
+    /// before the one added last.
     pub fn is_due(&self, at: MonoNs) -> bool {
         self.newest.is_none_or(|newest| newest.since(at).0 >= STEP.0)
     }
@@ -111,7 +113,7 @@ impl Moment {
 
 /// Returns the covariance of the difference between the errors of two epochs.
 ///
-/// `own` belongs to the later epoch and `before` to the earlier one; `with` is their cross-covariance.
+/// `own` is the covariance of the later epoch, `before` that of the earlier one, and `with` their cross-covariance.
 fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relative {
     let of = |rows: &[Errors; 3], row: usize, error: usize| {
         rows.get(row).and_then(|row| row.get(error)).copied().unwrap_or(0.0)
@@ -127,7 +129,7 @@ fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relat
 mod tests {
     use super::*;
 
-    /// Epochs arrive latest first. An epoch is due if it is at least [`STEP`] before the last one added.
+    /// Epochs arrive latest first. An epoch is due if it is at least [`STEP`] before the epoch added last.
     #[test]
     fn epoch_is_due_once_it_is_2_s_before_the_last_added_epoch() {
         let at = |s: u64| MonoNs(1_000_000_000 * s);

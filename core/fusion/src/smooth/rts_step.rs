@@ -12,15 +12,15 @@ use crate::filter::factors::Factors;
 pub struct Gain<const N: usize> {
     /// Rows of C = P F^T (F P F^T + Q)^-1.
     rows: [[f64; N]; N],
-    /// Rows of I - C F. They apply to the part of the error that the end of the step does not determine.
+    /// Rows of I - C F. These rows map the part of the error that the end of the step does not determine.
     rest: [[f64; N]; N],
 }
 
 impl<const N: usize> Gain<N> {
     /// Creates the gain of a step.
     ///
-    /// Inputs: the covariance at the beginning, the error transition of the step, and the covariance predicted for
-    /// the end.
+    /// Inputs: the covariance at the beginning of the step, the step's error transition, and the covariance predicted
+    /// for its end.
     pub fn new(before: &Factors<N>, carry: impl Fn(&mut [f64; N]), predicted: &Factors<N>) -> Self {
         let unit: [[f64; N]; N] =
             core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));

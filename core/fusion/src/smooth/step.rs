@@ -23,13 +23,14 @@ pub type Words = [u64; WORDS];
 pub enum Move {
     /// Propagation by the inertial motion of a leg.
     Leg(Leg),
-    /// Addition to the variances of errors that had been underestimated.
+    /// Addition to the variances of errors, because the variances were too small.
     Widened(Errors),
     /// No change, because this is the last estimate of its piece of the track.
     End,
 }
 
-/// A step of the filter. It begins with an estimate after its measurements, and ends before the next measurements.
+/// A step of the filter. It begins with the estimate after the measurements of an epoch, and ends before the next
+/// measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Start time of the step.

@@ -25,7 +25,7 @@ pub(super) struct Point {
     sd: PoseSd,
 }
 
-/// A part of the track without a missing estimate.
+/// A part of the track in which no estimate is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piece {
     clock: u32,
@@ -40,7 +40,7 @@ pub struct Track {
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
-    /// Length of the filter's epochs. The track extends this far beyond the last point of each piece.
+    /// Length of the filter's epochs. Each piece of the track extends this far beyond its last point.
     epoch: DurNs,
 }
 
@@ -52,7 +52,7 @@ impl Point {
 }
 
 impl Piece {
-    /// Begins a piece of a track in reverse order, which has this many points and relative covariances so far.
+    /// Begins a piece of a track in reverse order. The track has this many points and relative covariances so far.
     pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
         Self {
             clock: placed.clock,
@@ -110,7 +110,7 @@ impl Track {
         self.points.is_empty()
     }
 
-    /// Returns the fix at time `at`. The clock has been set back `clock` times before that time.
+    /// Returns the fix at time `at`. `clock` is the number of times that the clock has been set back before `at`.
     ///
     /// Errors: the part of the fix that is too uncertain or missing at time `at`.
     pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {
@@ -190,7 +190,7 @@ impl TrackNavigation {
 
 impl Navigation for TrackNavigation {
     fn update(&mut self, _: usize, _: &SensorInfo, times: Times, _: &Reading) {
-        // Clock resets are counted by the same rule as in the filter.
+        // Clock resets are counted by the same rule as in the filter, so that the counts agree.
         if self.received.since(times.received) > CLOCK_JUMP {
             self.clock = self.clock.saturating_add(1);
             self.received = times.received;
@@ -309,8 +309,8 @@ mod tests {
         assert_eq!((none.pieces(), none.len(), none.is_empty()), (0, 0, true));
     }
 
-    /// A reading over 10 s older than the newest one means that the clock was set back. From then on, fixes come from
-    /// the piece on the new clock.
+    /// A reading over 10 s older than the newest one means that the clock was set back. After it, fixes come from the
+    /// piece of the track on the new clock.
     #[test]
     fn track_navigation_uses_the_new_piece_after_a_clock_reset() {
         let mut navigation = TrackNavigation::new(track(), [None; MAX_SOURCES]);

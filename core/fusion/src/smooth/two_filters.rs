@@ -2,7 +2,7 @@
 //!
 //! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigation filter applies only a share of each
 //! wall correction and so discards some correlation on purpose. A backward pass over the navigation filter's steps
-//! would diverge. The second filter gets the same readings, applies wall corrections in full and records its steps.
+//! would diverge. So a second filter gets the same readings, applies wall corrections in full and records its steps.
 
 use super::journal::Journal;
 use crate::filter::FilterNavigation;

@@ -22,7 +22,7 @@ use world::{Fault, Log, Motion, Recipe};
 
 /// Seeds of the dives in the test that always runs; the full set has ten times as many seeds.
 const FEW: Range<u64> = 0..200;
-/// Seeds of dives with a velocity log; in turn, the log is sound or has one of three faults.
+/// Seeds of dives with a velocity log. From seed to seed, the log alternates between no fault and three faults.
 const WITH_LOG: Range<u64> = 0..80;
 /// Seeds of dives with a hovering vehicle.
 const HOVERING: Range<u64> = 0..24;
@@ -43,7 +43,7 @@ fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     all
 }
 
-/// Whether a dive has no fault, declared settings, slack of up to 6 cm, and counter steps of 4 mm or more.
+/// Whether a dive has no fault, correctly declared settings, slack of up to 6 cm, and counter steps of 4 mm or more.
 fn is_lively_and_stepped(recipe: &Recipe) -> bool {
     recipe.fault == Fault::None && recipe.is_declared && recipe.slack_m <= 0.06 && recipe.quantum_m >= 0.004
 }

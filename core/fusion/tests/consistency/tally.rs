@@ -11,13 +11,13 @@ use headrace_sensor::reading::Reading;
 
 use crate::world::{Dive, Recipe, VELOCITY_LOG, seconds, sensor};
 
-/// Settling times of the estimate, s: absolute errors are checked after the first, errors between passes after the
-/// second.
+/// Settling times of the estimate, s. Absolute errors are checked after `SETTLED_S`, errors between passes after
+/// `COMPARED_S`.
 const SETTLED_S: f64 = 10.0;
 const COMPARED_S: f64 = 20.0;
 /// Time between two passes of the heads over the same position, s.
 const PASS_S: f64 = 2.2;
-/// Errors of the estimate beyond this many standard deviations must be reported.
+/// Errors of the estimate that exceed this many standard deviations must be reported.
 const FAR_SDS: f64 = 5.0;
 /// Limit for twice the standard deviation between head passes, m; above it, the loop reports a doubtful position.
 ///
@@ -27,17 +27,18 @@ const DOUBTFUL_M: f64 = 0.2;
 /// Statistics of the filter's errors in a dive.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tally {
-    /// Number of epochs, number of epochs with a fix, and number of fixes within two standard deviations.
+    /// Numbers of epochs (`epochs`), of epochs with a fix (`fixes`), and of fixes within two standard deviations
+    /// (`within`).
     pub(crate) epochs: u64,
     pub(crate) fixes: u64,
     pub(crate) within: u64,
     /// Number of epochs in which the position is doubtful or unknown.
     pub(crate) unsure: u64,
-    /// Number of epochs with an unreported error of over five standard deviations, and the time of the first one,
-    /// s.
+    /// Number of epochs with an unreported error of over five standard deviations (`silent`), and the time of the first
+    /// such epoch, s.
     pub(crate) silent: u64,
     pub(crate) first_silent_s: Option<f64>,
-    /// Largest chainage errors in standard deviations: absolute, and between head passes.
+    /// Largest chainage errors, in standard deviations: absolute (`worst`), and between head passes (`worst_pass`).
     pub(crate) worst: f64,
     pub(crate) worst_pass: f64,
     /// Largest errors of chainage and speed while there is a fix, m and m/s.

@@ -1,6 +1,7 @@
 //! Dives drawn from seeds: a true motion, and readings of sensors with known errors.
 //!
-//! This module shares no code with the simulator. With the filter, it shares only the wall, the site and the units.
+//! This module shares no code with the simulator. With the filter, this module shares only the wall, the site and the
+//! units.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -182,14 +183,14 @@ impl Recipe {
         }
     }
 
-    /// Returns the dive parameters for a seed, with a velocity log. In turn, the log is sound or has one of three
-    /// faults.
+    /// Returns the dive parameters for a seed, with a velocity log. From seed to seed, the log alternates between no
+    /// fault and three faults.
     pub(crate) fn with_log(seed: u64) -> Self {
         Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
 
-    /// Returns the parameters of a dive in which the vehicle hovers for five minutes. The vehicle file declares the
-    /// cable correctly.
+    /// Returns the parameters of a dive in which the vehicle hovers for five minutes. The vehicle file declares slack
+    /// and inertial noise correctly.
     pub(crate) fn hovering(seed: u64) -> Self {
         let recipe = Self::of(seed);
         let slack_m = recipe.slack_m.min(0.06);
@@ -231,7 +232,8 @@ impl Recipe {
     }
 }
 
-/// Function that adds the readings of a source. Inputs: period and phase, s, source, and its reading at a time in s.
+/// Function that adds the readings of a source. Inputs: period and phase, s; number of the source; its reading at a
+/// time in s.
 type Every<'a> = dyn FnMut(f64, f64, usize, &mut dyn FnMut(f64) -> Option<Reading>) + 'a;
 
 /// A sum of sine functions of time, each with amplitude, angular frequency and phase.
@@ -246,7 +248,7 @@ pub(crate) struct Dive {
     pub(crate) recipe: Recipe,
     pub(crate) profile: Profile,
     pub(crate) site: Site,
-    /// Vehicle's true distance along the tunnel at times [`STEP_S`] apart, m.
+    /// The vehicle's true distances along the tunnel, m, at times that are [`STEP_S`] apart.
     way_m: Vec<f64>,
     slack: Sines,
     swaying: [Sines; 5],
@@ -443,7 +445,7 @@ impl Dive {
         }
         let payout_m = self.chainage_m(t) + value(&self.slack, t);
         let (stuck_m, lost_m) = stuck.get();
-        // A wheel that was stuck never counts the distance that it has missed.
+        // Once a stuck wheel is free again, it does not count the distance that it has missed.
         let shown_m = if self.is_faulty(t, Fault::CableSticks) {
             stuck.set((stuck_m, payout_m - stuck_m));
             stuck_m

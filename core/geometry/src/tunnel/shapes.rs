@@ -9,7 +9,7 @@ const CERAN_BASE_M: f64 = 10.4;
 const CERAN_RADIUS_M: f64 = 6.05;
 /// Perimeter on the plant's blueprint, m (Jorge et al. 2021, §9.2).
 ///
-/// The base and radius above give 35.90 m instead.
+/// The base width and radius above give a perimeter of 35.90 m instead.
 const CERAN_BLUEPRINT_PERIMETER_M: f64 = 34.17;
 
 /// A rectangle, with its reference point at the centre.

@@ -130,9 +130,9 @@ pub struct Alternative {
     pub v_max_mps: f64,
 }
 
-/// A restart of the heads in their present mode, with their phases set for a speed.
+/// A restart of the heads in their present mode, with phases that suit a given speed.
 ///
-/// The speed corresponds to `planned_speed_mps` in `[heads]` of the vehicle file.
+/// The given speed corresponds to `planned_speed_mps` in `[heads]` of the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Anew {
     /// Speed for which to start the heads, m/s: the largest speed that meets the target after the restart.
@@ -164,7 +164,7 @@ impl Left {
 /// Speed advice to the pilot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
-    /// The largest speed at which sections will pass, m/s; zero if there is none.
+    /// The largest speed at which sections will get the verdict pass, m/s; zero if there is none.
     pub v_max_mps: f64,
     /// Lower end of the advised interval of speeds, m/s; zero if all lower speeds meet the target.
     ///
@@ -172,7 +172,7 @@ pub struct Advice {
     pub from_mps: f64,
     /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
     ///
-    /// `None` if the present speed meets the target, or if no speed near the present speed meets it.
+    /// `None` if the present speed meets the target, or if no speed near the present speed meets the target.
     pub nearest_mps: Option<f64>,
     /// The limiting factor of the advice.
     pub reason: Reason,
@@ -182,7 +182,7 @@ pub struct Advice {
     pub will_exceed: bool,
     /// Whether the spacing T of the present turn may exceed the target; false without a prediction.
     ///
-    /// The predicted T then exceeds the target minus the margin for position errors.
+    /// True if the predicted T exceeds the target minus the margin for position errors.
     pub may_exceed: bool,
     /// Target T minus the margin for position errors, m.
     pub sure_m: f64,
@@ -192,7 +192,7 @@ pub struct Advice {
     pub even_pass_gap_s: f64,
     /// T_y: the largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// Time between two pings of a head, seconds; the longest of any head.
+    /// Longest time between two pings of any head, seconds.
     pub ping_period_s: f64,
     /// Phase error of the head farthest out of phase, in radians of the head's rotation.
     ///
@@ -204,13 +204,13 @@ pub struct Advice {
     ///
     /// `Some` only if this strip is the reason why a lower speed does not help.
     pub unseen_m: Option<[f64; 2]>,
-    /// Remedy if a lower speed does not help, or if only the passes of several swings meet the target.
+    /// Remedy if a lower speed does not help, or if only the passes of several swings together meet the target.
     pub remedy: Option<Remedy>,
     /// Largest speeds in the modes that all heads have.
     pub alternatives: [Option<Alternative>; MAX_MODES],
-    /// Restart of the heads for their best speed; `None` if their phases do not depend on the speed.
+    /// Restart of the heads in phase for the best speed; `None` if the heads' phases do not depend on the speed.
     pub anew: Option<Anew>,
-    /// Largest speeds for the target as the margins are added one after the other, updated every five seconds.
+    /// Largest speeds with more and more margins, which show what each margin costs; updated every five seconds.
     pub margins: Option<Margins>,
     /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,
@@ -219,8 +219,8 @@ pub struct Advice {
 impl Advice {
     /// Whether the figures of the advice agree with each other.
     ///
-    /// Speeds and times are finite and not negative. The advice states a speed if and only if a lower speed helps,
-    /// and the advised interval ends at this speed.
+    /// Speeds and times must be finite and not negative. The advice must state a speed if and only if a lower speed
+    /// helps. The advised interval must end at the stated speed.
     pub fn is_consistent(&self) -> bool {
         let figures = [self.v_max_mps, self.sure_m, self.pass_gap_s, self.even_pass_gap_s, self.t_y_m];
         let is_figure = |figure: f64| figure >= 0.0 && figure.is_finite();

@@ -24,16 +24,17 @@ const HELD: usize = 6;
 const BEYOND: f64 = SPEED_MARGIN / 2.0;
 /// Share by which the predicted spacing T must exceed the remaining target before a possible exceedance is displayed.
 ///
-/// The remaining target is the target minus the margin for position errors. A pilot may exceed the advised speed by 1
-/// or 2 %.
+/// The remaining target is the target minus the margin for position errors. The limit is above 2 %, because pilots may
+/// exceed the advised speed by 1 or 2 %.
 const MAYBE_BEYOND: f64 = 0.03;
 
 /// Displays the most restrictive advice of the last second.
 ///
 /// The most restrictive advice has the most severe reason and, for equal reasons, the lowest speed. A more severe
-/// reason appears at once; a less severe one appears after a second. A speed that is lower by 0.5 % appears at once.
-/// If all speeds are higher by 3 % for ten seconds, the lowest of them appears. Smaller changes do not appear. Advice
-/// is unfiltered until it first states a speed, or the reason why no speed meets the target.
+/// reason appears at once; a less severe reason appears after a second. A speed that is lower than the displayed speed
+/// by 0.5 % appears at once. If all speeds of ten seconds are higher than the displayed speed by 3 %, the lowest of
+/// them appears. Smaller changes do not appear. Before the first advice with a speed, or with the reason why no speed
+/// meets the target, nothing is filtered.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     target_m: f64,
@@ -65,7 +66,7 @@ impl Hysteresis {
         }
     }
 
-    /// Resets the filter, because the vehicle has reversed its direction and other speeds apply.
+    /// Resets the filter after the vehicle has reversed its direction, because other speeds then apply.
     pub fn forget(&mut self) {
         *self = Self::new(self.target_m);
     }
@@ -100,7 +101,7 @@ impl Hysteresis {
         shown
     }
 
-    /// Returns the speed to display, m/s; `speed_mps` is the lowest speed of the last second.
+    /// Returns the speed to display, m/s; `speed_mps` is the lowest advised speed of the last second.
     fn steadied_mps(&mut self, at: MonoNs, speed_mps: f64, is_speed: bool) -> f64 {
         let before = self.shown.filter(|(then, _)| at.since(*then).0.abs() <= HOLD.0);
         let Some((_, before_mps)) = before.filter(|_| is_speed) else {
@@ -212,7 +213,7 @@ mod tests {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
-        // The low speed stays in the history for a second, and the higher speed must then last for ten seconds.
+        // The low speed stays in the history for a second. After it, the higher speed must last for ten seconds.
         assert_eq!(speeds[10..66], [0.1; 56]);
         assert_eq!(speeds[66..], [0.2; 15]);
     }

@@ -2,9 +2,9 @@
 //!
 //! Heads that are apart along the hull are in phase only at some speeds, so several intervals may meet a target.
 //!
-//! The advised speed depends on the measured heads and the vehicle's pose, not on the present speed. It is the upper
-//! end of the highest interval. If that interval vanishes while heads run out of phase, the next interval may be far
-//! lower, and the advice jumps. [`EASE`] provides hysteresis in both directions.
+//! The advised speed depends on the heads' measured motion and the vehicle's pose, not on the present speed. The
+//! advised speed is the upper end of the highest interval. If that interval vanishes while heads run out of phase, the
+//! next interval may be far lower, and the advice jumps. [`EASE`] provides hysteresis in both directions.
 
 use super::search::{self, SPEED_MARGIN};
 use crate::margin::RemainingTarget;
@@ -13,12 +13,13 @@ use crate::spacing;
 use crate::strips::{Going, Strips};
 use headrace_geometry::math;
 
-/// Hysteresis as a share of the target.
+/// Hysteresis of the advised interval, as a share of the target.
 ///
-/// The advised interval may miss the target by this share. A higher interval must meet the target reduced by this
-/// share. A share of 2 % corresponds to 2 mm/s at 0.1 m/s.
+/// The previously advised interval is kept while its T exceeds the target by at most this share. A higher interval
+/// replaces it only if it meets a target that is smaller by this share. A share of 2 % corresponds to 2 mm/s at 0.1
+/// m/s.
 pub(super) const EASE: f64 = 0.02;
-/// Speeds closer together than this share belong to one interval.
+/// Speeds that differ by less than this share count as one interval.
 const NEAR: f64 = 0.05;
 /// Number of speeds tested on either side of the previous result, and the relative step between them.
 const TRIED: i32 = 30;
@@ -34,11 +35,11 @@ pub(super) struct Driving<'a> {
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: RemainingTarget,
-    /// Target minus the margin for position errors at unlimited speed, and the distance between the heads along the
-    /// hull, m.
+    /// Target minus the margin for position errors, if the speed were unlimited, m. `apart_m` is the distance between
+    /// the heads along the hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
-    /// Speed above which the target is missed whatever the heads' phases, m/s.
+    /// Speed above which the target is missed for any phases of the heads, m/s.
     pub(super) bound_mps: f64,
 }
 
@@ -50,11 +51,13 @@ impl Driving<'_> {
 
     /// Checks whether a speed meets the target when the target is enlarged by the share `more`.
     ///
-    /// The error is a lower or equal speed, m/s. No speed between this speed and the tested speed meets the target.
+    /// On a miss, returns an equal or lower speed, m/s. No speed between the returned and the tested speed meets the
+    /// target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
-        // No strip has more passes than all heads together, so this test alone rejects most speeds.
+        // The gap between the passes of all heads is the shortest of any strip, so this simple test rejects most
+        // speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
         if speed_mps * gap_s > most_m {
             return Err(self.below_mps(speed_mps, gap_s, most_m));
@@ -64,7 +67,8 @@ impl Driving<'_> {
             return Err(speed_mps);
         }
         let Some(unmet) = self.strips.unmet(0, &then, speed_mps, target_m, self.going) else { return Ok(()) };
-        // If a strip is narrower than the target, the samples on its two sides together may meet the target.
+        // If a strip is narrower than the target, samples on its two sides may keep holes small enough at a lower
+        // speed.
         let stays = unmet.width_m > most_m;
         let below_mps = |along_m| self.below_mps(speed_mps, unmet.gap_s, along_m).min(speed_mps);
         Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })
@@ -73,8 +77,8 @@ impl Driving<'_> {
     /// Returns the speed, m/s, down to which neighbouring passes stay more than `most_m` apart.
     ///
     /// At the given speed v, neighbouring passes are g = `gap_s` apart in time. At a lower speed u, heads at most a
-    /// apart along the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap is then
-    /// at least g minus that shift, so its length is at least u g - a (1 - u / v).
+    /// apart along the hull shift by up to a (1 / u - 1 / v) in time relative to each other. The longest gap then lasts
+    /// at least g minus this shift. Its length along the tunnel is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
         /// Allowance for rounding errors of the speed.
         const A_LITTLE: f64 = 1e-9;
@@ -145,7 +149,7 @@ impl Driving<'_> {
     /// Zero if all lower speeds meet the target.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
         const STEP: f64 = 0.99;
-        /// Share of the upper speed at which the search stops, since no pilot would go more slowly.
+        /// The search stops at this share of the upper speed, because no pilot would go more slowly.
         const SLOWEST: f64 = 0.2;
         if !self.phasing.fits_some_speeds() {
             return 0.0;

@@ -9,17 +9,17 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
 
-/// Relative change of the advised speed that is tolerated before rings are recast.
+/// Rings are recast if the vehicle's movement may have changed the advised speed by more than this share.
 const SHARE: f64 = 0.002;
-/// Limits of the movement across the tunnel that is tolerated before rings are recast, m.
+/// Smallest and largest limit of the movement across the tunnel after which rings are recast, m.
 ///
-/// The lower limit applies if the distance between neighbouring samples of a turn nearly reaches the target. The
-/// upper limit applies because hidden strips move with the vehicle.
+/// The smallest limit applies if the distance between neighbouring samples of a turn nearly reaches the target. The
+/// largest limit is needed because hidden strips move with the vehicle.
 const STILL_M: [f64; 2] = [0.004, 0.1];
-/// Tolerated rotation per metre of tolerated movement, as a quaternion component (half an angle, rad).
+/// Rotation limit per metre of the movement limit, as a quaternion component, which is half the angle in rad.
 const TURN_PER_M: f64 = 0.2;
 
-/// Angular resolution and update rate of the rays that find the wall for the advice.
+/// Number of the rays that find the wall for the advice, and the vehicle's movement after which they are cast again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
     /// Number of rays in a head's ring, spread evenly over a turn; at least one.
@@ -28,7 +28,7 @@ pub struct Looks {
     pub ring: u32,
     /// Movement across the tunnel before a ring is recast, m.
     ///
-    /// `None` means a movement that changes the advised speed by 0.2 %, limited to 4 mm to 0.1 m.
+    /// `None` means the movement that changes the advised speed by 0.2 %, but at least 4 mm and at most 0.1 m.
     pub anew_m: Option<f64>,
 }
 
@@ -41,9 +41,10 @@ impl Default for Looks {
 
 /// Returns the movement across the tunnel before rings are recast, m.
 ///
-/// Samples of a turn that are `t_y_m` apart on a wall `range_m` away bound the speed v for a target T. `swing_share`
-/// is w / v for a beam swing w. A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y
-/// / T_y. The distance T_y changes in proportion to the range, and by twice as much where the wall falls away.
+/// The distance T_y = `t_y_m` between samples of a turn, on a wall `range_m` away, limits the speed v for a target T.
+/// `swing_share` is w / v, with the speed w of beams due to swing. v + w is proportional to T_x = sqrt(T^2 - T_y^2). If
+/// T_y changes by dT_y, T_x changes by the share (T_y / T_x)^2 dT_y / T_y. T_y is proportional to the range, and
+/// changes twice as fast where the wall is oblique to the beam.
 pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
     let around2 = t_y_m * t_y_m;
     let along2 = (target_m * target_m - around2).max(0.0);
@@ -87,7 +88,8 @@ impl AdvisedHead {
         Ok(())
     }
 
-    /// Updates the head's view: the wall within its sector, the hidden wall, and the wall outside its range limits.
+    /// Updates the head's view: the wall within the head's sector, the hidden wall, and the wall outside the head's
+    /// range limits.
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else {

@@ -3,7 +3,7 @@
 /// Share by which the advised speed is reduced to allow for errors of the measured speed.
 pub const SPEED_MARGIN: f64 = 0.01;
 
-/// Returns the largest speed up to `bound_mps` that meets the target, provided that all lower speeds meet it.
+/// Returns the largest speed up to `bound_mps` that meets the target, assuming that all lower speeds meet it, too.
 ///
 /// Zero if no speed meets the target.
 pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
@@ -17,8 +17,8 @@ pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
 
 /// Finds the largest speed up to `bound_mps` that meets the target, by stepping down.
 ///
-/// Zero if no speed meets the target. For a speed that misses the target, `tries` returns the same speed or a lower
-/// speed. No speed between these two meets the target.
+/// Zero if no speed meets the target. For a tested speed that misses the target, `tries` returns the same or a lower
+/// speed. No speed between the returned and the tested speed meets the target.
 pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f64>) -> f64 {
     const TRIED: u32 = 256;
     let at = |k: u32| bound_mps * (1.0 - f64::from(k) / f64::from(TRIED));
@@ -53,7 +53,8 @@ pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) ->
     f64::midpoint(edge_mps(fastest_mps, less_mps, meets), fastest_mps)
 }
 
-/// Finds the edge of a speed interval by bisection: the speed `good` meets the target, the speed `bad` misses it.
+/// Finds the edge of a speed interval by bisection: the speed `good` meets the target, and the speed `bad` misses the
+/// target.
 pub(super) fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..30 {
         let middle = f64::midpoint(good, bad);

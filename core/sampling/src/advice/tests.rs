@@ -204,7 +204,8 @@ fn sector_alternatives_use_the_sweep_time_of_their_mode() {
     let advice = case.advice();
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
     assert!((fast - advice.v_max_mps).abs() < 1e-9, "the present mode: {fast} {}", advice.v_max_mps);
-    // The longest time between passes is 21.6 s plus a ping period, and the samples of a turn are close together.
+    // The longest time between passes is 21.6 s plus a ping period. The samples of a turn are so close together that
+    // they hardly matter.
     assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
 }
 
@@ -242,7 +243,7 @@ fn mutual_occlusion_lowers_the_speed() {
     let mut advisor = case.advisor();
     let hidden = advisor.advise(&case.situation, Swing::default(), None);
     assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
-    // From each head, its neighbour hides a strip of wall. Over these strips, half of the passes are missing.
+    // Each head hides a strip of wall from its neighbour. Over such a strip, half of the passes are missing.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
     // On the hidden strips, neighbouring samples of a turn are close together.
@@ -384,7 +385,7 @@ fn vehicle_swing_widens_pass_distances_of_heads_apart_along_the_hull() {
 fn position_error_lowers_the_speed_by_its_margin() {
     let mut case = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let sure = case.advice();
-    // The first 2 mm of the standard deviation of 17 mm need no margin. Twice the other 15 mm, which is 3 cm, is
+    // The standard deviation is 17 mm, of which 2 mm need no margin. Twice the other 15 mm, which is 3 cm, is
     // subtracted from the target of 0.5 m.
     case.situation.pass_error_m = 0.017;
     let unsure = case.advice();
@@ -397,13 +398,13 @@ fn position_error_lowers_the_speed_by_its_margin() {
     let fast = |advice: &Advice| advice.alternatives[1].unwrap().v_max_mps;
     assert!((meets_m(&unsure, fast(&unsure)) - 0.47).abs() < 1e-3, "{}", fast(&unsure));
     assert!(fast(&sure) > 1.05 * fast(&unsure));
-    // The cost appears in the margin for position errors; the other margins are unchanged.
+    // The lower speed appears in the margin for position errors, and all other margins are unchanged.
     let [margins, before] = [unsure.margins.unwrap(), sure.margins.unwrap()];
     assert!((margins.swing_mps - before.swing_mps).abs() < 1e-9);
     assert!((margins.position_mps - unsure.v_max_mps).abs() < 1e-9 && margins.pass_error_m >= 0.017);
 }
 
-/// A previously advised speed is kept only if T exceeds the target by at most `EASE`, whatever the phases become.
+/// A previously advised speed is kept only while its T exceeds the target by at most `EASE`, however the phases change.
 #[test]
 fn spacing_at_a_retained_speed_exceeds_the_target_by_at_most_the_hysteresis() {
     let mut advisor = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0).advisor();
@@ -445,7 +446,8 @@ fn target_is_met_within_the_advised_speed_interval_but_not_below_it() {
     assert!(t_at(0.985 * from) > 1.0, "{}", t_at(0.985 * from));
 }
 
-/// Each failed test of a speed rules out a range of speeds, and no speed in that range meets the target.
+/// If a tested speed misses the target, the search skips a range of lower speeds. No speed in the skipped range meets
+/// the target.
 ///
 /// The heads are at random places along and across the hull, with hidden wall, swing and position errors.
 #[test]
@@ -557,8 +559,8 @@ fn nearest_and_highest_speed_intervals_are_advised() {
         };
         outside += 1;
         assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
-        // All speeds that are nearer to the present speed miss the target. The search step of 1 % is left out. The
-        // limit is 0.48 m instead of 0.5 m, because the search may miss narrow intervals.
+        // All speeds nearer to the present speed than the result miss the target. The last 1 % is not checked, because
+        // it is the search step. The limit is 0.48 m instead of 0.5 m, because the search may miss narrow intervals.
         let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
         for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
             let by = math::exp(nearer);
@@ -575,7 +577,7 @@ fn nearest_and_highest_speed_intervals_are_advised() {
 
 /// The speed margin is up to 2 % instead of 1 % if heads run out of phase just above the largest speed.
 ///
-/// A vehicle 2 % above the advised speed then exceeds the target by at most 2 %.
+/// At 2 % above the advised speed, the spacing T then exceeds the target by at most 2 %.
 #[test]
 fn speed_margin_is_larger_where_the_spacing_grows_faster_than_speed() {
     let (mut even, mut steep) = (0, 0);

@@ -91,7 +91,7 @@ fn required_passes_leave_no_hole_in_19_of_20_stretches() {
         for (seed, rate) in (1..).zip(rates) {
             let passes = passes(t_y_m, &[rate]);
             let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
-            // The tolerance allows for the small number of stretches, and for holes that neighbours share.
+            // The share may be below 0.95, because there are few stretches and neighbouring stretches share holes.
             assert!(share >= 0.87, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
         }
     }
@@ -117,7 +117,7 @@ fn other_heads_make_up_for_the_passes_of_a_silent_head() {
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf, deaf, sound, sound]) - 3.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf]) - MOST_PASSES).abs() < 1e-12);
-    // One head is silent and the others lose returns. Together these losses cost more than either of them alone.
+    // One head is silent and the others lose returns. Together, both losses need more passes than either of them alone.
     let lossy = LossRate::independent(0.1);
     let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
     assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
@@ -163,7 +163,7 @@ fn hole_is_attributed_to_chance_if_enough_losses_can_coincide() {
     let [never, runs] = [LossRate::default(), LossRate { share: 0.58, after_lost: 0.98 }];
     assert!(!hole(0.55, never));
     assert!(hole(2.0, runs), "most of each turn is lost in long runs");
-    // If a hole counts as caused by chance, smaller holes do so, too, and so does the same hole with higher losses.
+    // If a hole counts as caused by chance, so do smaller holes, and so does the same hole at a higher loss rate.
     for share in 1..9 {
         let rate = LossRate::independent(f64::from(share) / 10.0);
         let largest = |from: i32| (from..60).rev().find(|n| hole(f64::from(*n) / 20.0, rate)).unwrap_or(0);

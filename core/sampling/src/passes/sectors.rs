@@ -6,16 +6,16 @@ use crate::head::{HeadMotion, MAX_HEADS, faces_aft};
 use crate::occlusion::AngleRange;
 use headrace_geometry::math::{self, TAU};
 
-/// Unevenness of neighbouring heads that reach the end of their sectors together; assumed if the sweeps are unknown.
+/// Unevenness of neighbouring heads that reach the end of their sectors together. Also assumed for unknown sweeps.
 pub(super) const AT_ONCE: f64 = 0.5;
 
 /// Position of a head in its sweep through its sector, there and back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Leg {
-    /// Number of the head's sector, counted in the body's sense of rotation, and number of all sectors.
+    /// Number of the head's sector, counted in the body's sense of rotation; `of` is the number of all sectors.
     sector: i64,
     of: i64,
-    /// Share of the sweep there and back that is done, counted from the beginning of the sector, 0 to 1.
+    /// Completed share of the sweep there and back, counted from the beginning of the sector, 0 to 1.
     share: f64,
 }
 
@@ -43,11 +43,12 @@ impl Leg {
     }
 }
 
-/// Largest unevenness of neighbouring heads at the end that their sectors share.
+/// Largest unevenness of passes by two neighbouring heads at the end that their sectors share.
 ///
 /// The unevenness is a share of the vehicle's advance in a sweep there and back. It is 0 if one head reaches the shared
-/// end half a sweep after the other head. It is [`AT_ONCE`] if both heads reach it at the same chainage, or if the
-/// timing is unknown. `ahead` is the position of each head along the hull, as a share of the same advance.
+/// end half a sweep after the other head. It is [`AT_ONCE`] if both heads reach the shared end at the same chainage, or
+/// if the timing is unknown. `ahead` is the position of each head along the hull, as a share of the vehicle's advance
+/// in a sweep there and back.
 pub(super) fn uneven(legs: &[Option<Leg>; MAX_HEADS], ahead: &[f64; MAX_HEADS]) -> f64 {
     let known = || legs.iter().zip(ahead).filter_map(|(leg, ahead)| Some(((*leg)?, *ahead)));
     let mut most: Option<f64> = None;
@@ -92,7 +93,7 @@ mod tests {
         for speed_mps in [0.05, 0.11, 0.2] {
             let schedule = Schedule::new(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
             let programs = layout::programs(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
-            // Several moments of a sweep there and back, including those near the turning points.
+            // Several moments of a sweep there and back, including moments near the turning points.
             for moment in 0..50 {
                 let at_s = 7.0 + 0.083 * f64::from(moment);
                 let legs = legs_at(&schedule, &specs, &programs, at_s);
@@ -124,8 +125,8 @@ mod tests {
         for (head, ((slot, spec), program)) in legs.iter_mut().zip(specs).zip(programs).enumerate() {
             let (from_rad, size_rad) = program.sector.unwrap();
             let angle_rad = |at_s: f64| schedule.angle_rad(head, DurNs::from_secs_f64(at_s)).unwrap();
-            // A received angle is the angle at the latest ping. The step is the difference from the angle of the ping
-            // before.
+            // The known angle of a head is that of its latest ping. The step is the difference between the angles of
+            // the latest ping and the ping before it.
             let pings = (at_s / spec.ping_period_s).floor() * spec.ping_period_s + 1e-6;
             let step_rad = math::wrap_signed(angle_rad(pings) - angle_rad(pings - spec.ping_period_s), TAU);
             let motion = HeadMotion {

@@ -51,8 +51,8 @@ fn place_hidden_from_some_heads_has_longer_times_between_passes_than_other_place
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-    // The place is hidden from two of four heads. If these two are half a turn apart, the longest gap doubles. If they
-    // are a quarter turn apart, two successive passes are missing.
+    // The place is hidden from two of four heads. If these two heads are half a turn apart, the longest gap doubles. If
+    // they are a quarter turn apart, two successive passes are missing, so the gap triples.
     assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
     assert_eq!(passes.gap_s(HeadSet::default()), None);
     assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
@@ -65,7 +65,7 @@ fn time_for_several_passes_is_the_time_of_the_slowest_sequence() {
     let all = even.heads();
     assert!((time_s(all, 1.0) - 2.0).abs() < 1e-12 && (time_s(all, 2.5) - 5.0).abs() < 1e-12);
     assert!((time_s(all, 9.0) - 18.0).abs() < 1e-12);
-    // Two heads a quarter of a turn apart pass with gaps of 6 s and 2 s in turn.
+    // Two heads that are a quarter of a turn apart pass with alternating gaps of 6 s and 2 s.
     let two = all.without(0).without(1);
     for (needed, seconds) in [(1.0, 6.0), (1.5, 7.0), (2.0, 8.0), (3.0, 14.0), (4.0, 16.0)] {
         assert!((time_s(two, needed) - seconds).abs() < 1e-9, "{needed}");
@@ -150,7 +150,8 @@ fn measured_sector_is_ignored_in_a_phase_shift_layout() {
         head.sector_rad = Some(f64::to_radians(0.9));
     }
     assert!((all(&Phasing::of(&jerked).at(0.2)) - 4.0).abs() < 1e-9);
-    // In the sector layout, an unmeasured sector of one of two heads counts as half a turn, swept there and back.
+    // In the sector layout with two heads, a sector that has not been measured counts as half a turn, swept there and
+    // back.
     let mut sectors = situation(&[0.0, 180.0], &[0.0, 0.0]);
     sectors.layout = HeadLayout::SectorOffset;
     assert!((all(&Phasing::of(&sectors).at(0.2)) - 8.0).abs() < 1e-9);
@@ -203,7 +204,7 @@ fn mean_distance_between_successive_heads_is_a_share_of_the_largest_distance() {
             assert_eq!(heads.fits_some_speeds(), apart_m > 0.0, "{x_m:?}");
         }
     }
-    // Heads that turn in opposite senses have no order of passes and thus no such distance.
+    // Heads that turn in opposite senses pass in no fixed order, so their distances count as zero.
     let mut loose = situation(&[0.0, 180.0], &[0.9, -0.3]);
     loose.heads[1].as_mut().unwrap().rate_radps = -TAU / 8.0;
     let heads = Phasing::of(&loose);

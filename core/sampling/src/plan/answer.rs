@@ -10,8 +10,8 @@ use crate::spacing::Spiral;
 
 /// A planning question: target, speed or time.
 ///
-/// With a target, the question asks for the speed. With a speed or a time, it asks for the target that can be met.
-/// With a target and a speed or time, it asks whether both are compatible.
+/// With a target alone, the question asks for the speed. With a speed or a time alone, the question asks for the target
+/// that can be met. With a target and a speed or time, the question asks whether the target is met.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Target T, m.
@@ -33,11 +33,12 @@ pub struct Answer {
     pub steps_per_turn: u32,
     /// T: time of a turn, seconds.
     pub turn_s: f64,
-    /// Source of the turn period: `measured`, `table` or `estimated`.
+    /// Origin of the turn period: `measured`, `table` or `estimated`.
     pub turn_basis: &'static str,
     /// epsilon: overlap of neighbouring beams; below 1, beams do not overlap. Eq. 22.
     pub overlap: f64,
-    /// Smallest T_y: straight-line distance between samples, at rest and at the nominal pose, m. Eq. 5 or 7.
+    /// Smallest T_y (straight-line distance between neighbouring samples of a turn), at rest and at the nominal pose,
+    /// m. Eq. 5 or 7.
     pub t_y_min_rest_m: f64,
     /// Mean straight-line T_y, at rest and at the nominal pose, m. Eq. 10.
     pub t_y_mean_rest_m: f64,
@@ -49,7 +50,8 @@ pub struct Answer {
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,
-    /// The largest speeds as the margins are added one after the other; the last speed is `v_max_mps`.
+    /// The largest speeds without margins, with the first margin, with the first two, and so on; the last is
+    /// `v_max_mps`.
     pub margins: Option<Margins>,
     /// Time for the whole length of the tunnel at `v_max_mps`, hours.
     pub needed_h: Option<f64>,
@@ -61,7 +63,7 @@ pub struct Answer {
     pub speed_mps: Option<f64>,
     /// Distances between samples at `speed_mps`.
     pub spacing: Option<Spacing>,
-    /// Part of the target reserved for position errors at `speed_mps`, m; zero if the errors are unknown.
+    /// Part of the target reserved for position errors at `speed_mps`, m; zero if the position errors are unknown.
     pub position_margin_m: f64,
     /// Whether the speed in the question meets the target, position errors included.
     pub meets_target: Option<bool>,
@@ -80,7 +82,7 @@ pub struct Spacing {
     pub pitch_m: f64,
     /// T_x: distance between passes where all heads see the wall.
     pub t_x_m: f64,
-    /// T_x: distance between passes on the strip of wall with the longest time between passes.
+    /// T_x on the strip of wall with the longest time between passes, which is hidden from some heads.
     pub t_x_hidden_m: f64,
     /// T_ymin, including the advance between two pings. Eq. 14.
     pub t_y_min_m: f64,
@@ -98,7 +100,8 @@ pub struct Spacing {
     pub t_max_m: Option<f64>,
     /// Size of the smallest feature that is certain to get one sample.
     pub hit_once_m: Option<f64>,
-    /// Size of the smallest feature that is certain to get two samples, as the sampling theorem requires.
+    /// Size of the smallest feature that is certain to get two samples, as the sampling theorem requires for each
+    /// feature.
     pub hit_twice_m: Option<f64>,
 }
 
@@ -213,7 +216,7 @@ struct Asked {
     needed_mps: Option<f64>,
 }
 
-/// Marks the best mode: the fastest mode for a target, or the mode with the smallest T_max for a speed.
+/// Marks the best mode. For a target, this is the fastest mode; for a speed, it is the mode with the smallest T_max.
 fn mark_best(answers: &mut [Answer], asked: &Asked) {
     let t_max = |answer: &Answer| answer.spacing.and_then(|spacing| spacing.t_max_m);
     let best = if asked.asked_mps.is_some() {

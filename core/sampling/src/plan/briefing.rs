@@ -68,18 +68,18 @@ pub struct Start {
     pub angle_deg: f64,
     /// Whether the head's angle grows after the first ping.
     pub growing: bool,
-    /// Least angle and size of the head's sector, degrees.
+    /// Smallest angle of the head's sector, and size of the sector, degrees; `None` without a sector.
     pub sector_deg: Option<[f64; 2]>,
 }
 
-/// The rule x = q v T / s for the distance x of a head behind the foremost head, see [`layout::HullRule`].
+/// The rule x = q v T / s for the distance x of a head behind the foremost of s heads; see [`layout::HullRule`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HullAdvice {
     /// Number of the head to which the rule applies.
     pub head: usize,
     /// Distance x of the head behind the foremost head, m.
     pub behind_m: f64,
-    /// q: time in which the vehicle travels the distance x, in units of T / s, rounded to the nearest whole number.
+    /// q: number of T / s (turn period / heads) in which the vehicle travels the distance x, rounded to a whole number.
     pub q: u32,
     /// Speed v that meets the rule with the present distance `behind_m`, m/s.
     pub speed_mps: f64,
@@ -87,7 +87,7 @@ pub struct HullAdvice {
     pub apart_m: f64,
 }
 
-/// Time in which two heads can receive each other's pings.
+/// Time for which two heads can receive each other's pings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Heard {
     /// Numbers of the two heads.

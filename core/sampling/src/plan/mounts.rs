@@ -20,7 +20,7 @@ pub struct InLine {
     pub positions_m: Vec<[f64; 3]>,
     /// Fastest mode with the heads in line.
     pub mode: &'static str,
-    /// Largest speed at which sections pass with the heads in line, m/s.
+    /// Largest speed at which sections get the verdict pass with the heads in line, m/s.
     pub v_max_mps: f64,
     /// Largest speed with the present mounts in their fastest mode, m/s; `None` if no mode meets the target.
     pub present_mps: Option<f64>,
@@ -82,7 +82,8 @@ fn in_line(inspection: &Inspection) -> Option<Inspection> {
         spec.mount.position = Vec3::new(at_m, y_m, z_m);
         last = Some((at_m, long_m));
     }
-    // The line is centred on the middle of the heads as mounted now, so that it extends equally ahead and astern.
+    // The line is centred on the mean position of the present mounts, so that it extends equally ahead and astern of
+    // it.
     let shift_m = x_m - moved.heads.iter().map(|(spec, _)| spec.mount.position.x()).sum::<f64>() / count;
     let mut farthest_m: f64 = 0.0;
     for ((spec, _), (before, _)) in moved.heads.iter_mut().zip(&inspection.heads) {

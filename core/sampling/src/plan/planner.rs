@@ -1,4 +1,4 @@
-//! The planner: speed and spacing of each mode, over all tolerated poses of the vehicle.
+//! The planner: largest speed and spacing of samples in each mode, valid at all tolerated poses of the vehicle.
 
 use crate::error::{SamplingError, not_negative, positive};
 use crate::head::{HeadMode, HeadSet, HeadSpec};
@@ -14,17 +14,17 @@ use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math::TAU;
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// Share of the largest speed for which heads should be started.
+/// Share of the planned largest speed; heads should be started for the resulting speed.
 ///
-/// A pilot keeps a speed within 5 %, and heads that are apart along the hull are in phase only near the planned
-/// speed. See docs/why/field.md.
+/// A pilot keeps a speed within 5 %, and heads that are apart along the hull are in phase only near the planned speed.
+/// See docs/why/field.md.
 pub const HELD_SHARE: f64 = 0.95;
 /// Number of rays that are cast per turn. Rays 0.1 degrees apart cover many start angles of each head step.
 pub(super) const RING: u32 = 3600;
 
 /// Maximum number of iterations until the speed converges.
 ///
-/// Each change of the speed is a fraction of the previous change.
+/// Few iterations suffice, because each change of the speed is a fraction of the previous change.
 const FALLS: u32 = 12;
 
 /// The inspection to plan: a tunnel, a vehicle and tolerances of its pose.
@@ -58,7 +58,8 @@ pub(super) struct Stance {
     strips: Strips,
     farthest_m: f64,
     parallax_rad: f64,
-    /// Largest difference between two heads' shifts along the tunnel that the heading causes, m.
+    /// The vehicle's heading shifts each head along the tunnel. This is the largest difference between two heads'
+    /// shifts, m.
     shift_m: f64,
     /// Distance along the tunnel between the planes in which the heads meet the wall, m.
     apart_m: f64,
@@ -144,8 +145,8 @@ impl Planner {
 
     /// Returns the largest T_max over all tolerated poses, with the heads evenly phased for the speed, m.
     ///
-    /// The result includes strips that the vehicle hides from some of its heads. It is infinite if no head sees a
-    /// strip.
+    /// The result includes strips that the vehicle hides from some of its heads. The result is infinite if no head sees
+    /// some strip.
     ///
     /// Errors: a speed that isn't above zero.
     /// Source: Jorge et al. 2021, Eq. 16.
@@ -157,7 +158,8 @@ impl Planner {
         Ok(self.over_stances(mode, t_m).fold(0.0, f64::max))
     }
 
-    /// Returns the largest speed at which sections will pass, with the heads evenly phased for that speed, m/s.
+    /// Returns the largest speed at which sections will get the verdict pass, with the heads evenly phased for that
+    /// speed, m/s.
     ///
     /// T_max plus the margin for position errors then equals the target.
     ///
@@ -169,8 +171,8 @@ impl Planner {
             return Ok(known_mps);
         };
         // At a lower speed, heads that are apart along the hull pass a place at longer intervals, so the margin is
-        // larger. The iteration starts above the solution, and each speed leads to a lower speed until the speeds
-        // converge.
+        // larger. The iteration starts at a speed above the solution. Each iteration lowers the speed, until it
+        // converges.
         let mut speed_mps = known_mps;
         for _ in 0..FALLS {
             let margin_m = self.margin_m(planned, target_m, speed_mps);
@@ -187,13 +189,13 @@ impl Planner {
         margin::position_margin_m(target, self.pass_error_m(planned, speed_mps), planned.t_y2_m)
     }
 
-    /// Target with the confidence of the expected errors; without them, the confidence is zero.
+    /// Target with the confidence that belongs to the expected errors; the confidence is zero if no errors are known.
     pub(super) fn target(&self, max_hole_m: f64) -> Target {
         let confidence_sd = self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd);
         Target { max_hole_m, confidence_sd }
     }
 
-    /// Standard deviation of a hole's size between two passes in a mode at a speed, m; zero if unknown.
+    /// Standard deviation of the size of a hole between two passes, in a mode at a speed, m; zero if unknown.
     pub(super) fn pass_error_m(&self, planned: &PlannedMode, speed_mps: f64) -> f64 {
         let Some(errors) = &self.errors else { return 0.0 };
         let passes_per_s = self.inspection.heads.len() as f64 / planned.mode.turn.period_s();
@@ -201,7 +203,8 @@ impl Planner {
         errors.pass_error_m(margin::error_time_s(passes_per_s, apart_m, speed_mps, APART_SHARE))
     }
 
-    /// Returns the largest speeds in a mode for a target as the margins are added one after the other.
+    /// Returns a mode's largest speed for a target without margins, with the first margin, with the first two, and so
+    /// on.
     ///
     /// Errors: as for [`Planner::v_max_mps`].
     pub fn margins(&self, mode: usize, target_m: f64) -> Result<Margins, SamplingError> {
@@ -268,7 +271,7 @@ impl Planner {
                 apart_m: stance.apart_m,
                 apart_swing_mps: swing_mps,
                 // The vehicle swings at most from the tolerated yaw on one side to the tolerated yaw on the other side.
-                // Without a yaw tolerance, a yaw rate may last indefinitely.
+                // Without a yaw tolerance, a yaw rate may last indefinitely, so no bound is known.
                 swing_most_m: (yaw_rad > 0.0).then_some(2.0 * yaw_rad * stance.farthest_m),
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
@@ -297,7 +300,7 @@ impl Planner {
         (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
     }
 
-    /// Shortest and longest footprint of the first head's beam on the wall in a turn, m.
+    /// Shortest and longest footprint of the first head's beam on the wall during a turn, m.
     ///
     /// Footprints are measured in the scan plane, at the nominal pose.
     ///
@@ -354,12 +357,12 @@ impl Planner {
 }
 
 impl PlannedMode {
-    /// T_s: time between two pings of a head, the longest of any head, seconds.
+    /// T_s: longest time between two pings of any head, seconds.
     pub fn ping_period_s(&self) -> f64 {
         self.ping_period_s
     }
 
-    /// Passes of the heads in this mode.
+    /// Passes of the heads over a place in this mode.
     pub fn passes(&self) -> &Passes {
         &self.passes
     }
@@ -368,7 +371,7 @@ impl PlannedMode {
 /// Returns the more severe of two errors.
 ///
 /// From least to most severe: samples of a turn too far apart, a strip that no head sees, any other error. Of two
-/// errors of one kind, the larger value counts.
+/// errors of the same kind, the error with the larger value is more severe.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),

@@ -59,7 +59,7 @@ impl Planner {
             lost_at_most: LossRate::default(),
         };
         let mut advisor = Advisor::new(&inspection.profile, task, &heads, &inspection.hull);
-        // Each call of the advisor recasts a single outdated ring of rays.
+        // Each call of the advisor recasts only one outdated ring of rays, so one call per head is needed.
         let calls = 0..specs.len().max(1);
         let advised = calls.map(|_| advisor.advise(&situation, Swing::default(), None).v_max_mps);
         Ok(advised.last().unwrap_or(0.0))

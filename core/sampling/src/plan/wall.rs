@@ -1,4 +1,4 @@
-//! Planned spacing of samples, and planned sample pattern, by place on the wall.
+//! Planned spacing of samples by place on the wall, and planned positions of the samples.
 
 use super::planner::{Planner, RING, stride_of};
 use crate::error::{SamplingError, positive};
@@ -15,9 +15,9 @@ pub struct WallPlace {
     pub arc_m: f64,
     /// Largest distance between neighbouring samples of one turn on the wall, m, over the heads that see the place.
     pub t_y_m: f64,
-    /// Smaller and larger distance between passes, m; `None` if no head sees the place.
+    /// Smaller and larger distance between successive passes, m; `None` if no head sees the place.
     ///
-    /// The two distances differ in sectors, where shorter and longer distances alternate.
+    /// The two differ only in sectors, where smaller and larger distances alternate.
     pub t_x_m: Option<[f64; 2]>,
     /// T at the place, m, from `t_y_m` and the larger `t_x_m`; `None` if no head sees the place.
     pub t_m: Option<f64>,
@@ -66,7 +66,7 @@ impl Planner {
             let share = around.share.get(k).copied().flatten();
             let t_x_m = gap_s.map(|gap_s| {
                 let longest_m = speed_mps * gap_s;
-                // In a sector, two distances between passes alternate, and `longest_m` is their sum.
+                // In a sector, two distances between passes alternate; `longest_m` is the sum of both.
                 share.map_or([longest_m; 2], |share| layout::divided_m(longest_m, share))
             });
             let t_y_m = around.t_y_m.get(k).copied().unwrap_or(0.0);
@@ -117,11 +117,11 @@ impl Planner {
     }
 }
 
-/// Equidistant places around the perimeter, with the spacing of the heads added so far.
+/// Equidistant places around the perimeter, with the spacing of samples from the heads added so far.
 struct Around {
     perimeter_m: f64,
     t_y_m: Vec<f64>,
-    /// Position of each place in the sector of its head, from 0 to 1.
+    /// Position of each place within the sector of the head that sweeps it, from 0 to 1.
     share: Vec<Option<f64>>,
 }
 
@@ -134,7 +134,8 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// Records the distance between a head's neighbouring samples at each place between them that the head sees.
+    /// Records the distance between two neighbouring samples of a head, at each place between the two that the head
+    /// sees.
     fn add(
         &mut self,
         planner: &Planner,

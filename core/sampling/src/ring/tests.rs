@@ -151,7 +151,8 @@ fn sample_distance_with_few_pings_per_turn_is_at_least_half_of_the_perimeter() {
 }
 
 proptest! {
-    /// Eq. 10: for any head position and profile, the mean chord of a turn is at most perimeter / pings.
+    /// Eq. 10: for any head position and profile, the mean chord between samples of a turn is at most perimeter /
+    /// pings.
     #[test]
     fn mean_sample_distance_is_bounded_by_the_perimeter(
         radii in prop::collection::vec(0.5..6.0f64, 5..40),
@@ -169,7 +170,7 @@ proptest! {
             })
             .collect();
         let profile = Profile::polygon(&points, Some([0.0, 0.0])).unwrap();
-        // A point between the reference point and the wall.
+        // Point at which the head is, between the reference point and the wall.
         let (sine, cosine) = math::sin_cos(around);
         let wall = profile.cast([0.0, 0.0], [cosine, sine]).unwrap().range_m;
         let pose = pose(&profile, along * wall * cosine, along * wall * sine, 0.0);

@@ -1,5 +1,5 @@
-//! Limit of the speed on a strip of wall, from the time between passes and the largest distance between samples of a
-//! turn.
+//! Largest speed that a strip of wall allows, from its time between passes and its largest distance between samples of
+//! a turn.
 
 use crate::spacing;
 use headrace_geometry::math;
@@ -7,13 +7,13 @@ use headrace_geometry::math;
 /// Motion of the vehicle and its beams, for the prediction of sample spacing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Going {
-    /// Time between two pings of a head, the longest of any head, seconds.
+    /// Longest time between two pings of any head, seconds.
     pub ping_period_s: f64,
     /// Largest speed of the beams along the wall due to swing, in addition to the vehicle's speed, m/s.
     pub swing_mps: f64,
-    /// Displacement of passes along the tunnel from their scheduled places, m, the same at any speed.
+    /// Displacement of passes along the tunnel from their scheduled places, m. It does not depend on the speed.
     pub shift_m: f64,
-    /// Distance between heads along the hull, m; the swing acts while the vehicle covers this distance.
+    /// Distance between the heads along the hull, m. The vehicle also swings while it covers this distance.
     pub apart_m: f64,
     /// Mean speed of the beams along the wall due to swing, m/s, while the vehicle covers `apart_m`.
     pub apart_swing_mps: f64,
@@ -26,7 +26,7 @@ pub struct Going {
 pub(super) struct Limit {
     pub(super) gap_s: f64,
     pub(super) t_y_m: f64,
-    /// Unevenness of passes across a strip that lies between two sectors; `None` for any other strip.
+    /// Unevenness of the passes on the two sides of a strip between two sectors; `None` for any other strip.
     ///
     /// The strip's width is `t_y_m`. See [`crate::passes::Passes::uneven_ends`].
     pub(super) uneven: Option<f64>,
@@ -49,11 +49,10 @@ impl Limit {
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
     ///
-    /// t is the sum of gap and ping period, w the swing speed, u the swing speed between heads that are apart along
-    /// the hull, and a their distance.
+    /// t is the sum of the pass gap and the ping period. w is `swing_mps`, u is `apart_swing_mps`, and a is `apart_m`.
     ///
-    /// Two other limits may allow a higher speed, which is then the result: the largest displacement by swing between
-    /// passes, and the circle between two rows of turning points.
+    /// Two facts may allow a higher speed, which is then the result: a known largest displacement by swing, and the
+    /// limited size of a circle between two rows of turning points.
     pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let staggered_m =
@@ -80,13 +79,14 @@ impl Limit {
 
 /// Diameter of the largest circle between two rows of samples, m.
 ///
-/// Samples in a row are `along_m` apart, and the rows are `across_m` apart. One row is shifted along the tunnel by half
-/// of `along_m`, by the share `uneven` of `along_m`, and by +-`moved_m`. The largest effective shift is `along_m`: the
-/// samples of both rows are then at the same chainages.
+/// Samples in a row are `along_m` apart, and the rows are `across_m` apart. One row is shifted along the tunnel by the
+/// sum of half of `along_m`, the share `uneven` of `along_m`, and `moved_m` in either direction. A shift by all of
+/// `along_m` is the worst case: both rows then have samples at the same chainages.
 ///
-/// The circle passes through two samples of a row and the sample of the other row between them, at distances a and b
-/// along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c = `across_m`. If c^2 < a b, the circle's centre is
-/// not between the rows. In that case, two samples of one row limit a circle centred on that row.
+/// The circle passes through two neighbouring samples of one row and through the sample of the other row that is
+/// between these two, a and b away from them along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c =
+/// `across_m`. If c^2 < a b, the circle's centre is not between the rows. In this case, the largest circle is centred
+/// on one row, between two samples of this row.
 fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let off_m = (uneven * along_m + moved_m).min(along_m / 2.0);
     let square = |x_m: f64| x_m * x_m;
@@ -98,7 +98,7 @@ fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     math::sqrt((a2 + across2) * (b2 + across2)) / across_m
 }
 
-/// Inverse of [`staggered_m`] with respect to `along_m`; at most the target, m.
+/// Returns the `along_m` for which [`staggered_m`] equals the target, but at most the target, m.
 fn along_staggered_m(target_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let (mut meets_m, mut misses_m) = (0.0, target_m);
     if staggered_m(misses_m, across_m, uneven, moved_m) <= target_m {
@@ -137,8 +137,8 @@ mod tests {
                 let told_m = staggered_m(along_m, across_m, uneven, 0.0);
                 let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
                 assert!(widest_m <= told_m + 1e-9, "{what}");
-                // If the circle's centre is not between the rows, `told_m` is only an upper bound: the samples of the
-                // other row also limit a circle that is centred on a row.
+                // If the circle's centre is not between the rows, `told_m` is only an upper bound, because the samples
+                // of the other row also limit a circle that is centred on one row.
                 let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
                 assert!(!is_between || widest_m > told_m - 0.005, "{what}");
                 assert!((staggered_m(along_m, across_m, 0.0, uneven * along_m) - told_m).abs() < 1e-12);

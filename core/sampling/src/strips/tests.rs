@@ -92,7 +92,7 @@ fn strip_hidden_from_some_heads_lowers_the_speed() {
 #[test]
 fn narrow_hidden_strip_counts_like_a_large_distance_between_samples() {
     let some = strips(&[all_around(&[arc(7.0, 0.1)]), all_around(&[])]);
-    // On each side, the nearest ping may be one step away from the hidden strip.
+    // On each side of the hidden strip, the nearest ping may be one angular step away from it.
     let v = speed(&some, &turning(2), 0.8).unwrap();
     assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
     // A hidden strip counts even if it is narrower than the distance between two rays on the wall.
@@ -128,8 +128,8 @@ fn gap_between_sectors_is_an_unseen_strip_that_limits_the_speed() {
     let some = strips(&views);
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
     assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
-    // For a large target, the spacing at the end of a sector limits the speed. For a small target, the circle through
-    // three samples limits it: two on one side of the gap, 8 s apart, and one between them on the other side.
+    // For a large target, the spacing at the end of a sector limits the speed. For a small target, a circle through
+    // three samples does: two samples on one side of the gap, 8 s apart, and one between these two on the other side.
     let v = speed(&some, &passes, 1.0).unwrap();
     assert!((v - closed(1.0, 0.2, 8.0)).abs() < 1e-9);
     let v = speed(&some, &passes, 0.35).unwrap();
@@ -151,7 +151,7 @@ fn hidden_arc_outside_a_sector_has_no_effect() {
     let passes = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
     let speeds = [&open, &beside].map(|views| speed(&strips(views), &passes, 0.5).unwrap());
     assert!((speeds[0] - speeds[1]).abs() < 1e-12, "{speeds:?}");
-    // A hidden arc within the head's own sector has an effect.
+    // No head sees a hidden arc within the head's own sector, so no speed meets the target.
     let mut own = open.clone();
     own[0].hidden = vec![arc(7.0, 0.4)];
     assert!(speed(&strips(&own), &passes, 0.5).is_err());
@@ -236,7 +236,7 @@ fn vehicle_swing_and_pass_shift_widen_the_distance_between_passes() {
     assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
     let worse = Going { swing_mps: 0.1, apart_swing_mps: 0.1, ..rough };
     assert!(one.bound_for_target(0, &turning(1), 0.5, &worse).is_err());
-    // A swing of bounded extent allows a higher speed.
+    // A swing whose extent is known to be small allows a higher speed.
     let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };
     let v = one.bound_for_target(0, &turning(1), 0.5, &to_and_fro).unwrap().speed_mps;
     assert!((one.t_max_m(0, &turning(1), v, &to_and_fro) - 0.5).abs() < 1e-12);
@@ -277,8 +277,8 @@ fn overlapping_hidden_arcs_across_the_seam_form_one_strip() {
 
 #[test]
 fn full_list_of_hidden_arcs_overestimates_the_hidden_wall() {
-    // Slots in the wall all around the profile are outside the range limits. One of the two views has too little
-    // capacity for the slots.
+    // Slots in the wall, all around the profile, are outside the range limits. One of the two views has too little
+    // capacity for arcs of all slots.
     let points: Vec<[f64; 2]> = (0..240)
         .map(|k| {
             let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);
@@ -304,7 +304,7 @@ fn full_list_of_hidden_arcs_overestimates_the_hidden_wall() {
     }
 }
 
-/// In either direction of rotation, the strip ends at the computed distance, even across the seam.
+/// In either direction of rotation, the strip ends at the computed distance, even across the start of arc lengths.
 #[test]
 fn distance_to_the_end_of_the_strip_is_right_for_each_sample() {
     let mut strips = strips(&[all_around(&[arc(4.0, 3.0), arc(28.0, 3.5)]), all_around(&[arc(10.0, 5.0)])]);

@@ -1,11 +1,11 @@
-//! Detection of wall strips over which heads pass less often than over other strips.
+//! Detection of wall strips that heads pass less often than the strip that is passed most often.
 
 use crate::head::HeadSet;
 use crate::passes::Passes;
 
 /// Number of head sets for which the longest time between passes is stored.
 ///
-/// There are rarely more different head sets, because strips are usually hidden from one or two heads.
+/// More sets are rare, because a strip is usually hidden from only one or two heads.
 const SETS: usize = 8;
 /// Number of strips whose head set is cached; for other strips, the time between passes is computed again.
 const STRIPS: usize = 64;
@@ -17,7 +17,8 @@ const NOT_KEPT: u8 = u8::MAX;
 /// A thin strip is passed less often than the strip that is passed most often.
 pub(super) struct Thin<'a> {
     passes: &'a Passes,
-    /// Head sets, each with its longest time between passes, s; many strips are seen by the same heads.
+    /// Head sets, each with its longest time between passes, s. Many strips share a set, because the same heads see
+    /// them.
     sets: [(HeadSet, Option<f64>); SETS],
     set_of: [u8; STRIPS],
     best_s: f64,
@@ -68,12 +69,12 @@ impl<'a> Thin<'a> {
         kept.map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| *gap_s)
     }
 
-    /// Longest time that `needed` passes over a strip take, s; see [`Passes::time_for_s`].
+    /// Longest time, s, that `needed` successive passes over a strip take; see [`Passes::time_for_s`].
     pub(super) fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         if needed > 1.0 { self.passes.time_for_s(seen_by, gap_s, needed) } else { gap_s }
     }
 
-    /// Unevenness of passes at shared sector ends, as in [`Passes::uneven_ends`].
+    /// Unevenness of two heads' passes where their sectors meet, as in [`Passes::uneven_ends`].
     pub(super) fn uneven_ends(&self) -> Option<f64> {
         self.passes.uneven_ends()
     }

@@ -1,4 +1,4 @@
-//! The parts of the wall that one head sees: arcs of the perimeter, and the sector of a head.
+//! The parts of the wall that one head sees, as arcs of the perimeter, and the wall within the head's sector.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ impl Arc {
             math::wrap(arc_m(angles.middle_rad())? - first, perimeter_m),
             math::wrap(last - first, perimeter_m),
         );
-        // A head that faces aft sweeps the wall in the opposite direction.
+        // A head that faces aft sweeps the wall in the direction of falling arc length.
         Ok(if middle <= whole {
             Self { from_m: first, length_m: whole }
         } else {
@@ -54,7 +54,8 @@ impl Arc {
 
 /// Number of equal angles into which a sector is divided.
 ///
-/// At the two ends of one part, the longest times between passes differ by an eighth of a sweep there and back.
+/// The longest time between passes is taken as constant within a part. At the two ends of a part, this time differs by
+/// an eighth of a sweep there and back.
 pub const PARTS: usize = 8;
 
 /// Wall within a head's sector, in parts of equal angle from one turning point to the other.
@@ -87,8 +88,9 @@ impl Sector {
     /// Longest time between two passes over the part of the sector that contains this place, 0.5 to 1.
     ///
     /// The time is a share of a sweep there and back; `None` outside the sector. At a turning point, a second pass
-    /// follows immediately, and the third pass comes a whole sweep later. In the middle of the sector, passes are
-    /// evenly spaced. A circle between two legs of the zigzag is at most as wide as the legs' distance at its centre.
+    /// follows immediately, and the third pass comes a whole sweep there and back later. In the middle of the sector,
+    /// passes are evenly spaced. The head's samples form a zigzag along the tunnel. An empty circle between two of its
+    /// legs is at most as wide as the distance between the legs at the circle's centre.
     /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
     pub(super) fn wait(&self, arc_m: f64, perimeter_m: f64) -> Option<f64> {
         let number = self.parts.iter().position(|part| part.has(arc_m, perimeter_m))?;
@@ -118,10 +120,10 @@ pub struct View {
 stateful!(View { state: sector; lists: hidden; });
 
 impl View {
-    /// Hides the parts of a ring that are outside the head's range limits.
+    /// Adds to `hidden` the wall of a ring that is outside the head's range limits.
     ///
-    /// Without capacity for another arc, the function extends the latest arc over visible wall to include the new arc.
-    /// Hiding too much wall is the safe error.
+    /// If there is no capacity for another arc, the latest arc is extended up to the new arc, over visible wall. Hiding
+    /// too much wall is the safe error.
     ///
     /// Allocates: not if the capacity suffices for one arc.
     pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {

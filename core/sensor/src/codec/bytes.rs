@@ -35,7 +35,7 @@ impl<const N: usize> Bytes<N> {
 
     /// Appends `bytes`.
     ///
-    /// Errors: the bytes do not fit; then none of them is appended.
+    /// Errors: the bytes do not fit. In this case nothing is appended.
     pub fn extend(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
         let len = self.len + bytes.len();
         let free = self.bytes.get_mut(self.len..len).ok_or(TooLong { len, max: N })?;

@@ -12,8 +12,8 @@ const SEED: u64 = 881;
 
 /// Proptest configuration of the contract's tests, which draw the same values on every run.
 ///
-/// Garbage sometimes passes a weak checksum by chance, and the test then fails although the codec is correct. With
-/// a fixed seed, this happens on every run or on none, and a failure is reproducible without a regression file. Set
+/// Garbage sometimes passes a weak checksum by chance, and the test then fails although the codec is correct. With a
+/// fixed seed, such a failure occurs on every run or never, and is reproducible without a regression file. Set
 /// `PROPTEST_RNG_SEED` to try other values.
 pub fn config() -> Config {
     let from_environment = Config::default();
@@ -66,7 +66,7 @@ fn is_one_frame<C: Codec>(codec: &mut C, bytes: &[u8]) -> bool {
     values.len() == 1 && counts.bad_frames == 0 && counts.skipped_bytes == 0
 }
 
-/// Sets the two bytes from `at` on such that `bytes` decodes as one frame; returns `false` if that is impossible.
+/// Sets the two bytes from index `at` on so that `bytes` decodes as one frame. Returns `false` if no values do this.
 fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) -> bool {
     let Some(before) = bytes.get(at..at + 2).map(<[u8]>::to_vec) else { return false };
     if bytes.len() > MOST_MATCHED {
@@ -84,7 +84,7 @@ fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) ->
 
 /// Positions in a frame to corrupt, each with the mask that is XORed into the byte; the same on every run.
 ///
-/// A mask of one mostly turns a digit into another digit.
+/// The mask 1 turns a digit into another digit in most cases.
 fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     const TURNS: [u8; 6] = [0x5B, 0x80, 0x24, 0xFF, 0x11, 0xC2];
     (0..12_usize).map(move |k| {
@@ -92,13 +92,12 @@ fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     })
 }
 
-/// Maximum length of frames to try, because trying all values of two bytes takes long. Longer frames have no
-/// checksum.
+/// Longest frame for which all values of two bytes are tried, because this takes long. Longer frames have no checksum.
 const MOST_MATCHED: usize = 100;
 
 /// Returns corrupted frames that decode as good frames by chance.
 ///
-/// One byte of a good frame is changed, and its checksum, if any, is changed to match.
+/// One byte of a good frame is changed. If the frame has a checksum, the checksum is changed to match.
 pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let wrong = attempts(frame.len()).filter_map(|(at, turn)| {
         let mut wrong = frame.to_vec();
@@ -114,7 +113,7 @@ pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<V
     wrong.collect()
 }
 
-/// Returns truncated frames that, together with the first bytes of the next good frame, decode as one frame.
+/// Returns truncated frames that decode as one frame together with the first bytes of the next good frame.
 pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let len = frame.len();
     let cut = (2..len).rev().step_by(len.div_ceil(6)).filter_map(|keep| {
@@ -225,7 +224,7 @@ macro_rules! codec_contract {
                 }
             }
 
-            /// A corrupted frame with a matching checksum decodes to a value. No later frame is lost.
+            /// A corrupted frame with a matching checksum decodes to a value, and no later frame is lost.
             #[test]
             fn corrupted_frame_with_matching_checksum_hides_no_other_frame() {
                 let mut tried = 0;
@@ -243,8 +242,8 @@ macro_rules! codec_contract {
                 assert!(tried > 0);
             }
 
-            /// A truncated frame may form a valid frame with the bytes after it. Then only the frame with those bytes
-            /// is lost.
+            /// A truncated frame and the first bytes of the next frame may form a valid frame. Then only this next
+            /// frame is lost.
             #[test]
             fn truncated_frame_completed_by_the_next_frame_hides_only_that_frame() {
                 for frame in $frames {

@@ -3,16 +3,16 @@
 use super::interface::{Codec, CodecCounts};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// Verdict on the bytes from the start of a frame candidate on.
+/// Verdict on received bytes that may begin with a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// No frame begins at this byte.
     NotAStart,
-    /// A frame may begin here; a verdict needs at least this many bytes in total.
+    /// A frame may begin here; deciding this needs at least this many bytes in total.
     Need(usize),
     /// A complete frame of this many bytes begins here.
     Frame(usize),
-    /// A start marker that no valid frame follows.
+    /// A start marker is here, but no valid frame.
     Bad,
 }
 
@@ -35,8 +35,8 @@ pub trait Framing: Copy {
     /// Whether the transport delivers whole messages; see [`Codec::WHOLE_MESSAGES`].
     const WHOLE_MESSAGES: bool = false;
 
-    /// Returns the verdict on a frame at the start of `front`, which has at least one byte; depends on `front`
-    /// alone.
+    /// Returns the verdict on a frame at the start of `front`, which has at least one byte. The verdict depends on
+    /// `front` alone.
     fn judge(&self, front: &[u8]) -> Verdict;
 
     /// Returns the value of a frame accepted by [`Framing::judge`]; `None` if the frame carries nothing useful.
@@ -45,13 +45,10 @@ pub trait Framing: Copy {
 
 /// Codec of a [`Framing`]: keeps an incomplete frame between pushes and finds frames in arbitrary input.
 ///
-/// `N` is the maximum frame length, bytes. A candidate that needs more bytes counts as a bad frame.
-///
-/// On a byte stream, a bad candidate may contain the start of a good frame. The search therefore continues at the
-/// second byte of the bad candidate. A byte that starts no frame is skipped and not counted.
-///
-/// In a whole message, the first byte outside a frame begins one bad frame, which extends to the end of the message. No
-/// frames are looked for in it.
+/// `N` is the maximum frame length; a candidate that needs more bytes is bad. On a byte stream, scanning resumes at the
+/// second byte of a failed candidate, so that a real frame inside the candidate is found. A byte that starts no frame
+/// is skipped, and does not count as a bad frame. If a whole message has a byte outside its frames, all bytes from
+/// there to the message's end count as one bad frame. Apparent frames among these bytes are ignored.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]
@@ -59,7 +56,7 @@ pub struct Framed<F, const N: usize> {
     framing: F,
     held: [u8; N],
     len: usize,
-    /// Whether the current message is bad, so that its remaining bytes are skipped.
+    /// Whether a bad frame was found in the current message. The rest of this message is then skipped.
     astray: bool,
     counts: CodecCounts,
 }
@@ -104,9 +101,9 @@ impl<F, const N: usize> Stateful for Framed<F, N> {
 }
 
 impl<F: Framing, const N: usize> Framed<F, N> {
-    /// Like [`Codec::push`], but passes each frame's bytes to `take`.
+    /// Like [`Codec::push`], but passes the bytes of each frame to `take`.
     ///
-    /// The second argument is the number of bytes from the frame's start to the last received byte.
+    /// The second argument of `take` is the number of bytes from the frame's start to the last received byte.
     pub fn push_frames(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[u8], usize)) {
         while !bytes.is_empty() && !self.astray {
             let (now, later) = bytes.split_at(bytes.len().min(N - self.len));
@@ -126,11 +123,12 @@ impl<F: Framing, const N: usize> Framed<F, N> {
         self.astray = false;
     }
 
-    /// Handles a silence on the line, before `next` is pushed. Drops held bytes only if they are provably no frame.
+    /// Handles a silence of the device before the bytes `next` are pushed. Drops held bytes only if they are provably
+    /// no frame.
     ///
-    /// A whole frame inside the held bytes or at the start of `next` is the proof. Without this proof, the held bytes
-    /// are kept, however late the rest of the frame comes, because a slow line looks the same as a false start.
-    /// Frames go to `take` as in [`Framed::push_frames`]. In message mode, the message ends with the silence.
+    /// The proof is a whole frame inside the held bytes or at the start of `next`. Without it, the held bytes are kept
+    /// for any time, because a frame on a slow line looks the same as a false start. Frames go to `take` as in
+    /// [`Framed::push_frames`]. In message mode, the message ends with the silence.
     pub fn settle_frames(&mut self, next: &[u8], mut take: impl FnMut(&[u8], usize)) {
         if F::WHOLE_MESSAGES || self.is_whole_frame(next) {
             return self.flush_frames(take);
@@ -148,7 +146,8 @@ impl<F: Framing, const N: usize> Framed<F, N> {
             && matches!(self.framing.judge(front), Verdict::Frame(n) if (1..=front.len().min(N)).contains(&n))
     }
 
-    /// Extracts frames from the held bytes, and gives up incomplete candidates that begin before `give_up_before`.
+    /// Extracts frames from the held bytes. Gives up incomplete candidates that begin before the index
+    /// `give_up_before`.
     fn scan(&mut self, later: usize, give_up_before: usize, take: &mut impl FnMut(&[u8], usize)) {
         let mut start = 0;
         while start < self.len {

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct CodecCounts {
     /// Number of complete, valid frames.
     pub good_frames: u64,
-    /// Number of frame candidates that begin with a start marker, but fail by checksum, terminator, length or range.
+    /// Number of frame candidates that begin with a start marker, but have a wrong checksum, terminator, length or
+    /// value.
     pub bad_frames: u64,
     /// Number of bytes that belong to no good frame.
     pub skipped_bytes: u64,
@@ -30,8 +31,8 @@ pub trait Codec {
 
     /// Whether the transport delivers whole messages (CAN frames, HID reports, I2C transactions).
     ///
-    /// If so, the port calls [`Codec::flush`] after each message, and garbage is a message of its own. On a byte
-    /// stream, garbage may directly precede a frame.
+    /// If true, the port calls [`Codec::flush`] after each message, and garbage never shares a message with a frame. On
+    /// a byte stream, garbage may directly precede a frame.
     const WHOLE_MESSAGES: bool;
 
     /// Takes received bytes and calls `sink` for each completed value, in order.
@@ -41,7 +42,7 @@ pub trait Codec {
 
     /// Signals the end of a message, or a silence that is longer than any pause within a frame.
     ///
-    /// Gives up an incomplete frame and rescans its bytes.
+    /// The codec gives up an incomplete frame and searches its bytes for other frames.
     fn flush(&mut self, sink: &mut dyn FnMut(Self::Value));
 
     /// Counters of frames and bytes so far.

@@ -44,7 +44,7 @@ impl Device {
         self.first_ticks.wrapping_add(elapsed) & mask
     }
 
-    /// Sends stamps from `from_s` to `to_s`; returns the last device time without wraps.
+    /// Sends stamps from `from_s` to `to_s`; returns the last device time, in which wraps are undone.
     #[expect(clippy::cast_possible_truncation, reason = "positive and below 2^63")]
     fn send(&self, clock: &mut DeviceClock, random: &mut Random, from_s: f64, to_s: f64) -> DurNs {
         let mut at = from_s * 1e9;
@@ -178,8 +178,8 @@ fn clock_restart_that_looks_like_a_delay_is_recognised() {
 
 #[test]
 fn clock_jump_ahead_by_1_h_begins_an_epoch() {
-    // If a clock wraps every 71.6 minutes, a jump of an hour ahead looks like 11.6 minutes behind, which is a
-    // restart.
+    // To a clock that wraps every 71.6 minutes, a jump ahead by an hour looks like a jump back by 11.6 minutes. It
+    // therefore counts as a restart.
     for (device, epochs) in [(xsens(30.0), (0, 1)), (sbg(30.0), (1, 0))] {
         let mut clock = device.clock();
         let mut random = Random(5);
@@ -202,7 +202,7 @@ fn burst_of_stamps_after_silence_counts_as_neither_restart_nor_drift() {
     let mut clock = device.clock();
     let mut random = Random(6);
     device.send(&mut clock, &mut random, 0.0, 200.0);
-    // The stamps of four seconds arrive late and all at once.
+    // All stamps from a period of four seconds arrive at once, at its end.
     for i in 0..200_u32 {
         let at_s = 200.0 + f64::from(i) * 0.02;
         clock.take(device.ticks(at_s * 1e9), MonoNs(5 * S + 204 * S));

@@ -1,6 +1,6 @@
 //! Splits a device's byte stream into frames.
 //!
-//! Each log message is therefore one frame, stamped with the receive time of its first byte.
+//! Thus each log message contains one frame, stamped with the receive time of its first byte.
 
 use std::collections::VecDeque;
 
@@ -9,9 +9,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Splits a byte stream that arrives in arbitrary parts into frames, and also passes on the bytes between frames.
 ///
-/// No byte is dropped or reordered: the concatenated pieces equal the input. The frames are the same however the
-/// stream is split and whenever its parts arrive. Each frame has the receive time of the part that contains its
-/// first byte. The last byte may arrive much later, for instance through a bridge that sends blocks.
+/// No byte is dropped or reordered: the concatenated pieces equal the input. The frames are the same however the stream
+/// is split and whenever its parts arrive. Each frame has the receive time of the part that contains its first byte.
+/// The frame's last byte may arrive much later, for instance through a bridge that sends blocks.
 #[derive(Debug, Clone)]
 pub struct Cutter<F, const N: usize> {
     codec: Framed<F, N>,
@@ -40,7 +40,8 @@ pub struct Piece<'a> {
 impl<F: Framing, const N: usize> Cutter<F, N> {
     /// Creates a cutter; `silence` is the longest usual gap within a frame.
     ///
-    /// After a longer gap, the cutter looks for a false start that holds frames back ([`Framed::settle_frames`]).
+    /// After a longer gap, the cutter checks for a false start of a frame that delays real frames
+    /// ([`Framed::settle_frames`]).
     pub fn new(framing: F, silence: DurNs) -> Self {
         let (pending, parts) = (Vec::with_capacity(2 * N), VecDeque::new());
         Self { codec: Framed::new(framing), silence, last: MonoNs(0), settled: true, pending, parts }
@@ -80,7 +81,8 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }
 
-    /// Whether these bytes alone contain a complete frame of this device; `one_of_its` checks a frame.
+    /// Whether these bytes alone contain a complete frame of this device; `one_of_its` tells whether a frame is the
+    /// device's.
     pub fn accepts(&self, bytes: &[u8], one_of_its: impl Fn(&[u8]) -> bool) -> bool {
         let (mut codec, mut found) = (Framed::<F, N>::new(*self.codec.framing()), false);
         codec.push_frames(bytes, |frame, _| found |= one_of_its(frame));
@@ -208,7 +210,7 @@ mod tests {
         let expected: Pieces = vec![(1, vec![0xA5, 1, 9, 0x5A], true), (67, vec![0xA5, 1, 8, 0x5A], true)];
         let mut cutter = cutter();
         assert_eq!(pushed(&mut cutter, &parts), expected);
-        // The start of a frame causes no repeated wake-ups of the driver.
+        // A pending start of a frame does not wake the driver again and again.
         assert!(pushed(&mut cutter, &[(133 + 52, &[])]).is_empty());
         assert_eq!(cutter.settles(), None);
     }

@@ -27,9 +27,10 @@ pub struct DriverSetup {
     /// Start of the dive.
     ///
     /// Each head runs its program from this time on. A head that joins later starts at the position that its program
-    /// gives for that time. So the heads keep their relative phase without communication between their drivers.
+    /// gives for the time of joining. So the heads keep their relative phase, although their drivers do not
+    /// communicate.
     pub begun: MonoNs,
-    /// Rotation program of a head; `None` for other devices.
+    /// Rotation program of a profiling head; `None` for other devices.
     pub head: Option<HeadProgram>,
 }
 
@@ -38,7 +39,7 @@ pub trait Wire {
     /// Sends bytes, as one message on a message-based carrier.
     fn send(&mut self, bytes: &[u8]);
 
-    /// Writes to a device on a polled bus, waits for the time `settle`, and reads `read_bytes` bytes.
+    /// Writes to a device on a polled bus, waits for the duration `settle`, and reads `read_bytes` bytes.
     ///
     /// [`Driver::heard`] then receives the written bytes followed by the read bytes.
     fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize);
@@ -54,7 +55,7 @@ pub struct DeviceHealth {
     pub good_frames: u64,
     /// Identity that the device has reported, if any.
     pub identity: Option<String>,
-    /// Description of a fault, with its remedy.
+    /// Description of the device's fault, with its remedy; `None` without a fault.
     pub complaint: Option<String>,
     /// Messages of other senders on the line that look like messages of the device.
     pub strangers: IgnoredSenders,
@@ -88,8 +89,8 @@ pub trait Driver: Send {
     /// Performs the action that is due at the time that [`Driver::due`] returned.
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Whether the driver waits for a response from the device. While it is pending, other drivers on the same line
-    /// must not transmit.
+    /// Whether the driver waits for a response from the device. While the response is pending, other drivers on the
+    /// same line must not transmit.
     fn awaits(&self) -> bool {
         false
     }
@@ -108,7 +109,7 @@ pub trait Driver: Send {
 /// The probe's requests are harmless to any other device on the line: they start no motion and change no stored
 /// setting.
 pub trait Probe: Send {
-    /// Returns the requests to send one after the other until the device has reported its identity.
+    /// Returns the requests, which are sent one by one until the device has reported its identity.
     ///
     /// A pause for the response follows each request.
     fn questions(&self) -> Vec<Vec<u8>>;

@@ -15,7 +15,7 @@ const RANGES: [usize; 6] = [3, 4, 5, 6, 7, 8];
 /// Time at which each simulated sensor fault begins.
 const FAULT_S: f64 = 20.0;
 
-/// Replaces the readings of some sensors for `for_s` from the start of the fault.
+/// Replaces the readings of some sensors, for `for_s` seconds from the start of the fault.
 fn say_otherwise(
     events: &mut [Event],
     sources: &[usize],
@@ -30,7 +30,7 @@ fn say_otherwise(
     }
 }
 
-/// Makes a sensor repeat its last reading before the fault, for `for_s`.
+/// Makes a sensor repeat the last reading from before the fault, for `for_s` seconds.
 fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     let before = events.to_vec();
     let last = |like: &Reading| {
@@ -41,8 +41,8 @@ fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     say_otherwise(events, &[source], for_s, |reading, _| last(reading));
 }
 
-/// Checks the filter before the fault and from `wrong_until_s` on. In the time between, the fault looks like real
-/// motion.
+/// Checks the filter before the fault and from `wrong_until_s` on. Between these times, the filter is not checked,
+/// because the fault looks like real motion.
 fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
     let mut nav = rig.navigation();
     let parts = [0.0, FAULT_S, wrong_until_s, f64::INFINITY];
@@ -64,7 +64,8 @@ fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
 
 #[test]
 fn fix_is_withheld_during_long_sensor_silence_and_returns_afterwards() {
-    /// Name, trajectory, silent sources, duration, and whether there is no fix at the end.
+    /// A test of silent sensors: name, trajectory, silent sources, duration in s, and whether a fix is missing at the
+    /// end.
     type Silence = (&'static str, Way, &'static [usize], f64, bool);
     let near_wall: Way = |t| Pose {
         position: Point3::new(3.0 + 0.1 * t, 5.2, 3.0),
@@ -167,8 +168,8 @@ fn saturated_inertial_samples_are_rejected() {
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &events);
             assert!(nav.consistency(IMU).unwrap().dropped > 0);
-            // The speed change by a rejected force is unknown. While this makes the speed too uncertain, there is
-            // no fix.
+            // The speed change by a rejected force is unknown. While the speed is too uncertain for this reason, there
+            // is no fix.
             let lacking = if is_rate { 0 } else { math::round_to_i64(10.0 * for_s) + 5 };
             assert!(i64::from(tally.lacking) <= lacking, "{magnitude} for {for_s} s: {tally:?}");
         }
@@ -231,8 +232,8 @@ fn jumping_sensor_is_rejected() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // The chainage is unknown while counter and estimate differ by metres. This lasts until a second after the
-        // jump.
+        // The chainage is unknown while counter and estimate differ by metres. This state lasts until a second after
+        // the jump.
         let lacking = if source == TETHER { 45 } else { 0 };
         assert!(
             tally.lacking <= lacking && consistency.gated >= 6,
@@ -278,7 +279,7 @@ fn ranged(reading: &Reading, share: f64) -> Reading {
 
 #[test]
 fn filter_recovers_from_plausible_wrong_inertial_readings_within_60_s() {
-    // The cause is a knock or a faulty unit, and no single sensor shows the fault. The fix is wrong until the other
+    // The cause may be a knock or a faulty unit; the unit alone does not show which. The fix is wrong until the other
     // sensors have corrected it.
     let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
     let rates = [(5.0, 0.02), (5.0, 0.2), (1.0, 1.0), (0.1, 5.0), (0.01, 20.0)].map(|jump| (jump, true));
@@ -299,8 +300,8 @@ fn filter_recovers_from_plausible_wrong_inertial_readings_within_60_s() {
 
 #[test]
 fn filter_recovers_from_a_frozen_sensor() {
-    // The other sensors outvote the depth sensor and one head at once. An echosounder moves the position by
-    // centimetres before its range becomes too improbable.
+    // The filter recognises a frozen depth sensor or a frozen head at once by the other sensors. An echosounder moves
+    // the position by centimetres before its range becomes too improbable.
     let frozen = [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 60.0)];
     for (source, wrong_s) in frozen {
         for seed in 1..=6 {
@@ -380,10 +381,10 @@ fn length_m(reading: &Reading) -> f64 {
     length.length_m
 }
 
-/// A counter sticks permanently while the vehicle moves on. Eventually the filter reports an unknown chainage.
+/// The counter sticks permanently while the vehicle moves on. After some time, the filter reports an unknown chainage.
 ///
-/// Gyros and accelerometers show the same readings in steady motion as at rest. The filter still does not take steady
-/// motion for rest.
+/// Gyros and accelerometers show the same readings in steady motion as at rest. Even so, the filter does not take the
+/// steady motion for rest.
 #[test]
 fn permanently_stuck_counter_leads_to_no_fix() {
     let steady: Way = |t| Pose { position: Point3::new(3.0 + 0.2 * t, 0.4, 4.0), attitude: Rot::identity() };

@@ -1,7 +1,7 @@
 //! Tests of the filter at extremes of dive duration, reading order, attitude and noise scale.
 //!
-//! Each test ends with a fix whose error is within the limit in standard deviations, or with the missing part of the
-//! fix.
+//! Each test ends with a fix or without one. The error of a fix is within the limit; without a fix, its missing part is
+//! reported.
 
 use super::super::factors::Factors;
 use super::super::inertial::{InertialSample, Leg};
@@ -116,7 +116,8 @@ fn propagation_over_any_duration_keeps_the_covariance_valid() {
             }
             assert!(state.is_sound() && factors.is_sound(), "{dt_s} s: {state:?}");
             for i in 0..ERRORS {
-                // Without measurements, pose errors never shrink over time. Only sensor errors that decay shrink.
+                // Without measurements, the variances of pose errors never shrink. Only some sensor errors decay, so
+                // their variances may shrink.
                 let least = if i < 9 { 1e-4 * (1.0 - 1e-12) } else { 0.0 };
                 assert!(factors.variance(i) > least, "{dt_s} s, error {i}: {}", factors.variance(i));
             }
@@ -133,8 +134,8 @@ fn repeated_inertial_sample_counts_once() {
     let rig = Rig::new(cruise, 1);
     let events = rig.events(0.0, 20.0);
     let right = outcome(&rig, &events);
-    // The second copy of a sample has the same two times, both times a nanosecond later, or only a later receive
-    // time.
+    // The second copy of a sample has the same two times as the first, or both a nanosecond later, or only a later
+    // receive time.
     for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
         let mut again = events.clone();
         let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));
@@ -177,7 +178,8 @@ fn readings_give_the_same_result_in_any_arrival_order() {
     let rig = Rig::new(cruise, 2);
     let events = rig.events(0.0, 30.0);
     let right = outcome(&rig, &events);
-    // Each source has its own delay within the window, so that readings arrive in a different order.
+    // Each source has its own delay within the reordering window, so readings arrive in another order than they were
+    // taken.
     for shift in 1..4 {
         let mut mixed = events.clone();
         for event in mixed.iter_mut().filter(|event| seconds(event.valid) > 2.0) {
@@ -232,7 +234,7 @@ fn errors_stay_within_limits_at_any_attitude() {
             let rig = Rig::new(way, seed);
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
-            // The first estimates have no height, and so give no fix, if no echosounder faces up or down.
+            // If no echosounder faces up or down, the first estimates have no height and give no fix.
             assert!(tally.lacking <= 2, "{name}: {tally:?}");
         }
     }
@@ -298,8 +300,8 @@ fn fix_at_a_past_time_has_the_position_of_that_time() {
 #[test]
 fn fix_survives_stopped_and_jumping_clocks() {
     let rig = Rig::new(rest, 2);
-    // The clock stands still for a second at a time, or in the second case runs backwards for a tenth of a second
-    // at a time.
+    // In the first case, the clock repeatedly stands still for a second. In the second case, it repeatedly runs
+    // backwards for a tenth of a second.
     for (stamp, back) in [(1_000_000_000_u64, false), (100_000_000, true)] {
         let mut events = rig.events(0.0, 40.0);
         for event in &mut events {
@@ -330,8 +332,7 @@ fn fix_survives_stopped_and_jumping_clocks() {
     for event in &events {
         Rig::hear(&mut nav, event);
     }
-    // The jump by an hour looks like a silence and causes a restart. The return of the clock causes a second
-    // restart.
+    // The jump ahead by an hour looks like a silence and causes a restart. The jump back causes a second restart.
     assert_eq!(nav.restarts(), 2);
     assert_eq!(nav.consistency(source).unwrap().dropped, 1);
     assert!(nav.fix(at(60.0)).is_ok());
@@ -343,10 +344,10 @@ fn cruise_at<const KM: u32>(t: f64) -> Pose {
     Pose { position: Point3::new(at.x() + 1e3 * f64::from(KM), at.y(), at.z()), attitude }
 }
 
-/// The relative error between passes is equally certain at any chainage.
+/// The standard deviation of the relative error between passes is the same at any chainage.
 ///
-/// The chainage itself becomes less certain with distance because of the cable's scale, by 2 km at a distance of
-/// 1,000 km.
+/// The chainage itself becomes less certain with distance because of the cable's scale, by 2 km at a distance of 1,000
+/// km.
 #[test]
 fn chainage_sd_between_passes_is_the_same_at_any_chainage() {
     let ways: [(f64, Way); 3] = [(3e3, cruise_at::<3>), (7e3, cruise_at::<7>), (1e6, cruise_at::<1000>)];
@@ -393,7 +394,7 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the gyro bias is known, within the time that it stated at first. The advice
+/// The advice to stand still ends once the gyro bias is known, within the time that the advice first stated. The advice
 /// does not return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
@@ -415,7 +416,7 @@ fn stand_still_advice_ends_once_the_bias_is_known() {
     assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
 }
 
-/// Returns the largest relative increase of the sd between head passes after the tenth minute, sampled once per
+/// Returns the largest relative increase, after the tenth minute, of the sd between head passes, sampled once per
 /// round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };

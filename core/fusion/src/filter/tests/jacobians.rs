@@ -19,9 +19,9 @@ const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
 /// Step of the central differences.
 ///
-/// The truncation error is about the square of the step: 1e-8 for numbers near one. The rounding error is about 1e-12
-/// times the values, which is the rounding of a double divided by the step. The values reach some hundreds of metres,
-/// so the rounding error is 1e-10.
+/// The truncation error is about the square of the step: 1e-8 for numbers near one. The relative rounding error is
+/// about 1e-12: the rounding of a double divided by the step. Values reach some hundreds of metres, so the rounding
+/// error is 1e-10.
 const STEP: f64 = 1e-4;
 /// Tolerance that covers truncation and rounding error with a margin. A wrong sign or a missing term causes an error
 /// of at least 0.01.
@@ -101,7 +101,7 @@ fn moved(state: &State, error: usize, by: f64) -> State {
 
 /// Checks a measurement row against central differences of its residual.
 ///
-/// The expected value is the measured value minus the residual.
+/// The value that the model expects is the measured value minus the residual.
 fn check_row(
     what: &str,
     state: &State,
@@ -123,12 +123,13 @@ fn check_row(
 
 /// The walls of a rectangular tunnel are planes, as the measurement row assumes.
 ///
-/// A beam is skipped if the finite differences cross a corner, because the wall is no plane there.
+/// A beam is skipped if the finite differences cross a corner, where the wall is not a plane.
 #[test]
 fn beam_row_on_flat_walls_equals_finite_differences() {
     let profile = shapes::rectangle(7.0, 8.0).unwrap();
     let mut draws = Draws::new(1);
-    // An echosounder's beam, a head's cone, and a cone so wide that the nearest part of the wall echoes.
+    // The half angles of an echosounder's beam, of a head's cone, and of a cone so wide that the nearest part of the
+    // wall echoes.
     for first_rad in [0.0, 0.012, 0.4] {
         let checked =
             (0..STATES).filter(|_| check_beam(&mut draws, &profile, first_rad, |_| TOLERANCE)).count();
@@ -140,8 +141,8 @@ fn beam_row_on_flat_walls_equals_finite_differences() {
 /// the wider cone.
 #[test]
 fn expected_range_of_a_cone_equals_its_shortest_ray() {
-    // The rays lie on rings around the axis. Their shortest range is too long by at most the square of half the ray
-    // spacing, 5e-3 rad.
+    // The rays lie on rings around the axis. The shortest of their ranges is too long, relatively, by at most the
+    // square of half the ray spacing of 5e-3 rad.
     const RINGS: u32 = 200;
     let profile = shapes::rectangle(60.0, 60.0).unwrap();
     let mut draws = Draws::new(11);
@@ -176,9 +177,9 @@ fn expected_range_of_a_cone_equals_its_shortest_ray() {
 /// Without a cone, the measurement row of a beam on a round wall is exact. With a cone, the row's error is bounded as
 /// follows.
 ///
-/// The row assumes the tangent plane where the beam's axis meets the wall. This point moves by at most 1 m / cosine
-/// per metre, or by `range` / cosine per radian. The tangent plane then turns by 1 / radius per metre. The row
-/// neglects the effect of this turn on the range, which is range x sin(first) / cos^2 per radian.
+/// The row assumes the tangent plane where the beam's axis meets the wall. This point moves by at most 1 m / cosine per
+/// metre, or by `range` / cosine per radian. The tangent plane then turns by 1 / radius per metre. The row neglects
+/// this turn of the plane, whose effect on the range is range x sin(first) / cos^2 per radian.
 #[test]
 fn beam_row_on_round_walls_equals_finite_differences() {
     const RADIUS_M: f64 = 4.0;
@@ -197,7 +198,7 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
     let state = draws.state();
     let along = draws.mounted() * Vec3::new(1.0, 0.0, 0.0);
     let beam = Beam { offset: draws.vector(0.5), along, first_rad, unsure_rad: 0.0 };
-    // A measured range of zero makes the residual minus the expected range.
+    // With a measured range of zero, the residual is the negative of the expected range.
     let Some(row) = measure::range(&state, profile, &beam, 0.0, 0.1) else { return false };
     let origin = state.position + state.attitude * beam.offset;
     let looks = state.attitude * along;
@@ -232,8 +233,8 @@ fn height_and_chainage_rows_equal_finite_differences() {
 
 /// The measurement rows of an attitude are exact if measured and estimated attitude agree, as in a converged filter.
 ///
-/// If both attitudes differ by an angle, the rows are wrong by half of that angle. So the measured attitude,
-/// deviation included, is within 1e-7 of the estimate.
+/// If the two attitudes differ by an angle, the rows are wrong by half of this angle. So the test's measured attitude,
+/// deviation included, is within 1e-7 rad of the estimate.
 #[test]
 fn attitude_rows_equal_finite_differences() {
     let mut draws = Draws::new(4);
@@ -262,7 +263,7 @@ fn attitude_with_known_compass_deviation_has_no_residual() {
     }
 }
 
-/// The turn rate is an input, so the row does not depend on the gyro bias.
+/// The turn rate is an input of the model, so the measurement row does not depend on the gyro bias.
 #[test]
 fn velocity_and_rest_rows_equal_finite_differences() {
     let mut draws = Draws::new(6);
@@ -299,7 +300,8 @@ fn velocity_on_a_lever_arm_equals_finite_differences_of_position() {
     }
 }
 
-/// The reference predicts a measurement made 0.07 s before the estimate, at the position at that time.
+/// The reference predicts a measurement made 0.07 s before the estimate, from the position at the time of the
+/// measurement.
 ///
 /// The prediction is exact for constant velocity.
 #[test]
@@ -329,10 +331,11 @@ fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
 
 /// The transition uses the rotation in the middle of a sample for the whole sample.
 ///
-/// The difference affects only the bias terms, by up to a quarter of the angle turned in a sample (0.01 rad). The
-/// largest bias terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x 0.0025. In most blocks,
-/// a wrong factor or a missing term causes a larger error. The exception is the displacement by a gyro bias through
-/// tilting, 10 m/s^2 x 0.1^3 / 6. So each block of the matrix is compared relative to its own size.
+/// The difference from the true rotation affects only the bias terms, by up to a quarter of the angle turned in a
+/// sample (0.01 rad). The largest bias terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x
+/// 0.0025. In most blocks, a wrong factor or a missing term causes a larger error. The exception is the displacement
+/// that a gyro bias causes by tilting the force: 10 m/s^2 x 0.1^3 / 6. So each block of the matrix is compared relative
+/// to its own size.
 #[test]
 fn transition_matrix_equals_finite_differences_of_the_model() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
@@ -342,7 +345,7 @@ fn transition_matrix_equals_finite_differences_of_the_model() {
     for round in 0..STATES {
         let start = draws.state();
         let (rate, force) = (draws.vector(0.6), draws.vector(3.0) + Vec3::new(0.0, 0.0, 9.0));
-        // In some rounds, gyro or accelerometer data are missing for part or all of the epoch.
+        // In some rounds, gyro or accelerometer data are missing for a part of the epoch or for all of it.
         let blind = |k: u64, part: u64| round % 4 == part && k >= round % 3 * 4;
         let felt: Vec<_> = (0..10)
             .map(|k| InertialSample {

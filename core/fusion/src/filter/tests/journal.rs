@@ -41,7 +41,8 @@ fn dive_without_an_estimate_records_no_smoothing_steps() {
     assert_eq!(steps(&reader).len(), 0);
 }
 
-/// A clock set back by more than 10 s ends a piece of the track exactly once, even if no later reading follows.
+/// If the clock is set back by more than 10 s, a piece of the track ends exactly once, even if no later reading
+/// follows.
 #[test]
 fn filter_steps_before_a_clock_reset_are_recorded_completely() {
     let rig = Rig::new(cruise, 5);

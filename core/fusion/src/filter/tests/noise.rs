@@ -51,7 +51,7 @@ fn slack_noise_equals_numerical_integration_of_the_slack_process() {
                 rr - 2.0 * rr * step + density * dt_s,
             );
         }
-        // With fewer steps, the error of the first steps matters more.
+        // If fewer steps are integrated, the error of the first steps matters more.
         let share = 1e-4 + 3.0 * step / lags;
         near("slack", factors.variance(SLACK), ss, share);
         near("both", factors.covariance(SLACK, SLACK_RATE), sr, share);
@@ -65,7 +65,7 @@ fn slack_noise_equals_numerical_integration_of_the_slack_process() {
 fn slack_variance_converges_to_the_declared_value() {
     let settings = Settings { slack: GaussMarkov { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
     let mut factors = Factors::independent([0.0; ERRORS]);
-    // The epochs have different lengths, because the steady state must not depend on the epoch length.
+    // The epochs have various lengths, because the steady state must not depend on them.
     for k in 0..3000 {
         let (transition, noise) = leg(&settings, 0.03 + 0.02 * f64::from(k % 5), still());
         transition.carry(&mut factors);
@@ -93,9 +93,9 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
 /// The reference is 4000 random epochs of ten samples with white force and white turn rate, by `State::go_on`.
 ///
 /// A variance from n draws has a relative standard deviation of sqrt(2 / n) = 2.2 %, so the limit of 9 % is four
-/// standard deviations. Turn rate noise also tilts the force, which the process noise of an epoch neglects. So the
-/// simulated unit is level and only tilts about x, and the reference is its x axis: there, gravity has no first-order
-/// effect.
+/// standard deviations. Turn rate noise also tilts the force, but the process noise of an epoch neglects this tilt. So
+/// the simulated unit is level and only tilts about x, and the test compares its x axis, on which gravity has no
+/// first-order effect.
 #[test]
 fn white_process_noise_covariance_equals_monte_carlo() {
     const DRAWS: u32 = 4000;

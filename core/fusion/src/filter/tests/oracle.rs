@@ -1,8 +1,8 @@
 //! Comparison of factored covariances with 100-digit values, which `tests/oracles/fusion.py` computed with mpmath.
 //!
-//! The inputs in `fusion.csv` are doubles that count as exact, so each tolerance bounds the rounding of the
-//! computation only. Elements of a covariance are compared relative to sqrt(P_ii P_jj), which is the scale of the
-//! two errors.
+//! The inputs in `fusion.csv` are doubles that count as exact, so each tolerance bounds the rounding of the computation
+//! only. An element P_ij of a covariance P is compared relative to sqrt(P_ii P_jj), which is the scale of the two
+//! errors.
 
 use super::super::factors::{Factors, Gain};
 use headrace_geometry::math;
@@ -10,7 +10,7 @@ use headrace_support::hard_cases::found_at;
 
 const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
 
-/// A representation of a covariance that can execute the operations listed in the oracle file.
+/// A form of a covariance (factored or full) that can execute the operations listed in the oracle file.
 trait Covariance<const N: usize> {
     fn start(variances: [f64; N]) -> Self;
     fn element(&self, i: usize, j: usize) -> f64;
@@ -58,7 +58,7 @@ impl<const N: usize> Covariance<N> for Factors<N> {
     }
 }
 
-/// The full covariance, updated by the textbook form, or by the Joseph form if `JOSEPH`.
+/// The full covariance, updated by the Joseph form if `JOSEPH`, and otherwise by the textbook form.
 #[derive(Clone, Copy)]
 struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
 
@@ -130,7 +130,7 @@ struct Worst {
     covariance: f64,
     gain: f64,
     distance: f64,
-    /// Ratio of the largest to the smallest variance in the expected covariances.
+    /// Ratio of the largest variance to the smallest one in the expected covariances.
     spread: f64,
     is_sign_lost: bool,
 }
@@ -173,7 +173,8 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
             "scale" => p.scale(fields[3].parse().unwrap(), numbers[1]),
             "gain" => {
                 note(&mut worst.gain, (gain.variance / numbers[0] - 1.0).abs());
-                // The gain is compared relative to its largest element, because all elements act together.
+                // The gain is compared relative to its largest element, because all elements act on the estimate
+                // together.
                 let size = numbers[1..].iter().fold(0.0, |size: f64, k| size.max(k.abs()));
                 for (k, right) in gain.k.iter().zip(&numbers[1..]) {
                     note(&mut worst.gain, (k - right).abs() / size);
@@ -219,7 +220,8 @@ fn all(case: &str, n: usize) -> [Worst; 3] {
     if n == 4 { of::<4>(case) } else { of::<6>(case) }
 }
 
-/// Name of each oracle case, number of errors, and tolerance of the factored form: about ten times its error.
+/// Name of each oracle case, number of errors, and tolerance of the factored form: about ten times the error of this
+/// form.
 ///
 /// The rounding error is some units in the last place, times the ratio of the largest to the smallest standard
 /// deviation over all directions. This ratio is 1e12 after ten hours.

@@ -95,7 +95,7 @@ proptest! {
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// The echoes come from a known position. A fit that starts about half a metre away ends at this position.
+    /// The echoes come from a known position. A fit that starts about half a metre away from this position ends at it.
     ///
     /// With arbitrary ranges, the fit still ends inside the tunnel.
     #[test]
@@ -126,7 +126,7 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// Used readings are at least one period apart if a sensor sends too often. No other reading is skipped.
+    /// If a sensor sends too often, its used readings are at least one period apart. No other reading is skipped.
     #[test]
     fn readings_of_a_source_are_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
@@ -145,7 +145,7 @@ proptest! {
 
     /// The turn rate of a head is right in both directions and across the wrap of the angle.
     ///
-    /// Used pings have a range and are at least one angle step apart.
+    /// Used pings have a range and are at least one angular step apart.
     #[test]
     fn returns_of_a_head_are_used_once_per_angle_step(step_deg in 0.3_f64..5.0, clockwise in any::<bool>(), start in -10.0_f64..10.0) {
         let step_rad = step_deg.to_radians() * if clockwise { 1.0 } else { -1.0 };
@@ -250,8 +250,8 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the change in chainage error, at `arm`, until now. The change is counted from the clone
-    /// that is `back` clones before the newest.
+    /// Standard deviation of the change in chainage error, at `arm`, until now. The change is that since the clone
+    /// `back` places before the newest one.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];

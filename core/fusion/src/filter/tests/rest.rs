@@ -32,7 +32,7 @@ fn zero_velocity_update_is_skipped_for_motion_in_any_direction() {
         assert_eq!(moves.state, before, "{axis} {side}: a moving vehicle must not be corrected");
         let mut stands = moving(axis, side * 0.105);
         stands.rest(Some(turn));
-        // Estimated velocity and zero-velocity update have the same uncertainty, so the result is the mean of both.
+        // The estimated velocity and the zero-velocity update are equally uncertain, so the result is their mean.
         let half = stands.state.velocity_mps.scaled(2.0) + -before.velocity_mps.scaled(0.105 / 0.115);
         assert!(half.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.velocity_mps);
         let bias = stands.state.rate_bias_radps + -turn.scaled(0.5);

@@ -95,7 +95,7 @@ pub(super) fn rest(_: f64) -> Pose {
 
 impl Rig {
     pub(super) fn new(way: Way, seed: u64) -> Self {
-        // Settings for narrow beams, which equal rays, and for a cable whose slack changes slowly.
+        // The settings suit beams so narrow that they equal rays, and a cable whose slack changes slowly.
         let slack = GaussMarkov { reach: 0.06, time_s: 10.0 };
         let settings = Settings { slack, return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() };
         let site = Site { axis_yaw_rad: 0.7, ..Site::default() };
@@ -179,8 +179,8 @@ impl Rig {
         tally
     }
 
-    /// Checks that all numbers are finite, variances are not negative, and errors are within `MOST_SDS` if there is
-    /// a fix.
+    /// Checks that all numbers are finite and variances are not negative. If there is a fix, also checks that errors
+    /// are within `MOST_SDS`.
     ///
     /// The checks run once per epoch, because the estimate does not change within an epoch.
     pub(super) fn check(&self, nav: &FilterNavigation, now: MonoNs, tally: &mut Tally) {
@@ -228,7 +228,8 @@ impl Rig {
         for (k, axis) in axes.iter().enumerate() {
             let mut h = [0.0; ERRORS];
             (h[POSITION + k], h[VELOCITY + k]) = (1.0, since_s);
-            // An attitude error moves the body's origin by the cross product of rotation axis and lever arm.
+            // A small rotation about an axis moves the body's origin by the cross product of the axis and the lever
+            // arm.
             for (j, other) in axes.iter().enumerate() {
                 h[ATTITUDE + j] = other.cross(&arm).dot(axis);
             }
@@ -362,7 +363,7 @@ impl Rig {
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Tally {
     checked: Option<MonoNs>,
-    /// Number of epochs with a fix, and number of epochs without a fix.
+    /// Number of epochs with a fix (`fixes`), and number of epochs without a fix.
     pub(super) fixes: u32,
     pub(super) lacking: u32,
     /// Part of the fix that was missing in the last epoch without a fix.

@@ -8,9 +8,9 @@ use crate::math::{self, TAU};
 
 /// Distance below which two points count as equal, m.
 pub(super) const SAME_POINT_M: f64 = 1e-9;
-/// A polygon with more elements than this has a table of its extent by direction.
+/// A polygon with more elements than this gets a table of its extent in many directions, so that bounds need no search.
 const MANY: usize = 256;
-/// Number of equidistant wall places that [`Profile::places`] returns.
+/// Number of equidistant wall points that [`Profile::places`] returns.
 const PLACES: u32 = 64;
 
 /// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
@@ -22,7 +22,7 @@ pub struct Profile {
     support: Option<Support>,
     pub(super) perimeter_m: f64,
     pub(super) reference: Yz,
-    /// Equidistant places on the wall, starting at the floor's centre.
+    /// Equidistant points on the wall, starting at the floor's centre.
     places: Vec<Yz>,
 }
 
@@ -39,7 +39,7 @@ pub struct WallHit {
     pub normal: Yz,
 }
 
-/// Reason why a profile is rejected.
+/// Reason why the given points or pieces are rejected as a profile.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProfileError {
@@ -61,7 +61,7 @@ pub enum ProfileError {
         y = .reference[0], z = .reference[1]
     )]
     NotStarShaped {
-        /// Index of the input piece, or of the polygon point at which the offending edge begins.
+        /// Index of the offending input piece; for a polygon, index of the point where the offending edge begins.
         vertex: usize,
         /// The reference point of the profile.
         reference: Yz,
@@ -183,7 +183,7 @@ impl Profile {
 
     /// Returns the arc length of the wall in the direction of `point`, as seen from the reference point.
     ///
-    /// If the wall differs from the design, the spacing of samples is measured by this arc length. Zero for the
+    /// The spacing of samples uses this arc length even if the wall differs from the design. The result is zero for the
     /// reference point itself.
     pub fn arc_of(&self, point: Yz) -> f64 {
         let direction = sub(point, self.reference);
@@ -197,9 +197,9 @@ impl Profile {
         self.elements.get(index).map_or(self.reference, |element| element.point_at(arc - element.arc_m))
     }
 
-    /// Returns 64 equidistant places around the wall for frequent approximate checks.
+    /// Returns 64 equidistant points around the wall for frequent approximate checks.
     ///
-    /// The first place is the floor's centre.
+    /// The first point is the floor's centre.
     pub fn places(&self) -> &[Yz] {
         &self.places
     }
@@ -236,15 +236,16 @@ impl Profile {
 
     /// Returns the largest distance of the wall from a line through `origin`, m.
     ///
-    /// The line is perpendicular to the unit vector `direction`; the wall on both sides counts. For a polygon of many
-    /// points, the result is an upper bound. It exceeds the distance by up to 12 mm for each metre of the longest
-    /// edge of the points' hull.
+    /// The line is perpendicular to the unit vector `direction`. Wall on either side of the line is considered. For a
+    /// polygon of many points, the result may be too large, by up to 12 mm per metre of the longest edge of the points'
+    /// convex hull.
     pub fn farthest_along_m(&self, origin: Yz, direction: Yz) -> f64 {
         let farthest_m = |element: &Element| {
             let start_m = dot(sub(element.start, origin), direction).abs();
             let Shape::Arc { centre, radius_m, middle, cos_half, .. } = element.shape else { return start_m };
             let (centre_m, towards) = (dot(sub(centre, origin), direction), dot(middle, direction));
-            // Point where the arc's tangent is perpendicular to the direction, on either side of the line.
+            // The wall of an arc is farthest from the line where the arc's tangent is parallel to the line. There is
+            // one such point on each side.
             let ahead_m = if towards >= cos_half { (centre_m + radius_m).abs() } else { 0.0 };
             let astern_m = if -towards >= cos_half { (centre_m - radius_m).abs() } else { 0.0 };
             start_m.max(ahead_m).max(astern_m)
@@ -265,7 +266,7 @@ impl Profile {
         self.elements.iter().map(|element| (element.arc_m, element.length_m))
     }
 
-    /// Arc lengths of the boundaries between the profile's lines and arcs, m.
+    /// Arc lengths, m, at which one line or arc of the profile ends and the next begins.
     #[cfg(test)]
     pub(crate) fn corners_m(&self) -> Vec<f64> {
         self.elements.iter().map(|element| element.arc_m).collect()
@@ -279,7 +280,7 @@ impl Profile {
         let entry = |bounds: &Bounds| bounds.entry(origin, direction);
         self.tree.search(self.elements.len(), entry, |some| {
             for (index, element) in self.elements.iter().enumerate().take(some.end).skip(some.start) {
-                // Among equally near elements, the first one along the wall is the result, whatever the order of the
+                // If several elements are equally near, the first one along the wall wins, whatever the order of the
                 // search.
                 if let Some(t) = element.crossing(origin, direction)
                     && best.is_none_or(|nearest| (t, index) < nearest)
@@ -316,7 +317,7 @@ impl Profile {
     }
 }
 
-/// Checks that the profile is star-shaped; each element comes with the index of its piece.
+/// Checks that all of the wall is visible from the reference point. Each element is given with the index of its piece.
 fn check_star_shaped<'a>(
     elements: impl Iterator<Item = (&'a Element, usize)>,
     reference: Yz,

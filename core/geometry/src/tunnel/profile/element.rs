@@ -7,8 +7,8 @@ use crate::math::{self, TAU};
 pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
 /// Margin beyond which a ray's hit is clearly inside or outside the angle of an arc.
 ///
-/// The margin applies to the difference of two cosines: of the angle from the arc's middle to the hit, and of the angle
-/// from the middle to an end. It is far larger than `ARC_SLACK_RAD` plus rounding.
+/// The margin is a difference of two cosines: that of the angle between the arc's middle and the hit, and that of the
+/// angle between the arc's middle and its end. It is far larger than `ARC_SLACK_RAD` plus rounding.
 const CLEAR: f64 = 1e-9;
 
 /// An edge of the profile and a ray count as parallel if the sine of their angle is below this.
@@ -42,7 +42,8 @@ pub(super) struct Element {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shape {
     Line,
-    /// `middle` is the unit vector to the arc's middle, `cos_half` the cosine of half the sweep.
+    /// `middle` is the unit vector from the centre to the arc's middle. `cos_half` is the cosine of half the sweep
+    /// angle.
     Arc {
         centre: Yz,
         radius_m: f64,
@@ -69,8 +70,8 @@ impl Element {
                 let (along, apart) = (sub(self.end, self.start), left - right);
                 let t = cross(start, along) / apart;
                 let length2 = dot(direction, direction);
-                // For a ray along the edge, both products are rounding errors. The exit point is then limited to the
-                // edge.
+                // For a ray along the edge, both cross products are mere rounding errors. The exit point is then
+                // limited to the edge.
                 let t = if apart * apart < PARALLEL * PARALLEL * length2 * dot(along, along) {
                     let ends = [dot(start, direction) / length2, dot(end, direction) / length2];
                     t.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
@@ -112,7 +113,7 @@ impl Element {
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
                 let from_centre = sub(point, centre);
                 let turned = math::wrap(math::atan2(from_centre[1], from_centre[0]) - from_rad, TAU);
-                // A point just past the end counts as slightly before the start.
+                // A point outside the sweep counts as the start, at arc length zero.
                 let turned = if turned > sweep_rad + ARC_SLACK_RAD { 0.0 } else { turned };
                 radius_m * turned
             }

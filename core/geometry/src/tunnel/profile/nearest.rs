@@ -73,7 +73,8 @@ mod tests {
     use super::*;
     use crate::tunnel::shapes;
 
-    /// Smallest distance to a set of wall points 0.5 mm apart; it exceeds the true distance by less than 0.25 mm.
+    /// Smallest distance from `point` to wall points that are 0.5 mm apart. It exceeds the distance to the wall by less
+    /// than 0.25 mm.
     fn by_places(profile: &Profile, point: Yz) -> f64 {
         let places = math::round_to_i64(profile.perimeter_m() / 5e-4);
         (0..places).map(|k| norm(sub(point, profile.point_at(k as f64 * 5e-4)))).fold(f64::INFINITY, f64::min)

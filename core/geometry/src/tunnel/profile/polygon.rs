@@ -47,7 +47,7 @@ struct Vertex {
     point: Yz,
 }
 
-/// Removes points that repeat their predecessor; the predecessor of the first point is the last point.
+/// Removes points that repeat their predecessor; the first point's predecessor is the last point.
 fn distinct(points: &[Yz]) -> Vec<Vertex> {
     let mut ring: Vec<Vertex> = Vec::with_capacity(points.len());
     for (index, point) in points.iter().copied().enumerate() {

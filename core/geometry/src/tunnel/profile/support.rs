@@ -8,9 +8,9 @@ const DIRECTIONS: usize = 128;
 
 /// Extent of the profile's points in each direction of the table, m.
 ///
-/// Between two directions of the table, their two entries give an upper bound. The bound is too large by at most half
-/// the longest edge of the points' hull times tan(pi / [`DIRECTIONS`]) = 0.025. This is 12 mm for each metre of a
-/// flat wall.
+/// For a direction between two directions of the table, the entries of both give an upper bound. The bound is too large
+/// by at most half the longest edge of the points' convex hull times tan(pi / [`DIRECTIONS`]) = 0.025. For a flat wall,
+/// this is 12 mm per metre.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Support(Vec<(Yz, f64)>);
 
@@ -32,7 +32,7 @@ impl Support {
         reaches.fold(0.0, f64::max) / math::cos(TAU / 2.0 / DIRECTIONS as f64)
     }
 
-    /// Upper bound of (point - origin) . direction over all points, m.
+    /// Upper bound of the dot product (point - origin) . direction for all points of the profile, m.
     pub(super) fn reach_m(&self, origin: Yz, direction: Yz) -> f64 {
         let length = norm(direction);
         let turned = math::wrap(math::atan2(direction[1], direction[0]), TAU) / TAU * DIRECTIONS as f64;
@@ -41,7 +41,7 @@ impl Support {
             let index = usize::try_from(index.rem_euclid(DIRECTIONS as i64)).unwrap_or_default();
             self.0.get(index).map_or(0.0, |(_, reach_m)| *reach_m)
         };
-        // The direction is a weighted sum of the two neighbouring directions in the table.
+        // The given direction is a weighted sum of the two nearest directions in the table.
         let step = TAU / DIRECTIONS as f64;
         let beyond = (turned - before as f64) * step;
         let (share, other) = (math::sin(step - beyond), math::sin(beyond));

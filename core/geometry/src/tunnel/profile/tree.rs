@@ -6,9 +6,9 @@
 use super::element::{Element, Shape};
 use super::plane::{Yz, norm};
 
-/// Number of elements in a leaf of the tree, which are neighbours along the wall.
+/// Number of elements in a leaf of the tree; these elements are neighbours along the wall.
 const LEAF: usize = 8;
-/// Maximum number of elements without a tree; a full search of so few elements is as fast.
+/// Profiles with at most this many elements have no tree, because searching all of them is as fast.
 const FEW: usize = 24;
 /// Margin of the boxes around their elements, m, far larger than rounding errors and an arc's slack.
 const MARGIN_M: f64 = 1e-6;
@@ -35,7 +35,7 @@ pub(super) struct Tree {
 impl Bounds {
     const EMPTY: Self = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
 
-    /// The box of an arc contains the arc's whole circle; such a box is larger but simpler.
+    /// The box of an arc contains the arc's whole circle, because this larger box is simpler to compute.
     fn of(element: &Element) -> Self {
         let Element { start, end, .. } = *element;
         let of = |place: fn(f64, f64) -> f64, off: f64| {
@@ -99,10 +99,10 @@ impl Tree {
         Self { nodes, leaves }
     }
 
-    /// Visits ranges of elements, by index, that may contain a better result than the best so far.
+    /// Visits ranges of element indices that may contain a better result than the best one found so far.
     ///
-    /// `bound` returns the minimum cost of any element in a box. `look` returns the best cost found so far. Elements
-    /// of equal cost are all visited.
+    /// `bound` returns the minimum cost of any element in a box. `look` returns the best cost found so far. If several
+    /// elements have the lowest cost, all of them are visited.
     pub(super) fn search(
         &self,
         count: usize,

@@ -39,8 +39,8 @@ fn rays_that_start_1_mm_from_the_wall_agree_with_50_digit_values() {
     found("geometry.millimetre", range_m.max(arc_m), 1e-13);
 }
 
-/// If a ray meets the wall at 89.99 degrees to the normal, an error across the wall becomes 5,730 times as large
-/// along it.
+/// If a ray meets the wall at 89.99 degrees to the normal, a position error across the wall causes an error along the
+/// wall that is 5,730 times as large.
 #[test]
 fn rays_nearly_along_the_wall_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("grazing");

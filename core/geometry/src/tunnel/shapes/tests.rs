@@ -131,7 +131,8 @@ fn ray_tangent_to_the_vault_meets_it_at_the_springing() {
                 panic!("no wall {ulps} ulps beside the wall");
             };
             let above_m = math::sqrt((2.0 - half) * (2.0 + half));
-            // The circle's equation has cancellation, so the error under the root is an ulp of 4 m^2.
+            // The circle's equation subtracts nearly equal values of 4 m^2, so the value under its root may be wrong by
+            // one ulp of 4.
             let error_m = (hit.range_m - (1.0 + above_m)).abs();
             assert!(error_m < 4.3e-8, "{ulps} ulps, y {y}: {error_m}");
             assert!(profile.contains([hit.point[0] * 0.999, hit.point[1]]));

@@ -117,8 +117,8 @@ fn occluded_side_walls_get_half_of_the_passes() {
     for strip in hidden {
         assert!(strip.seen_by.len() == 2 && (strip.arc.length_m - 1.7).abs() < 0.1, "{strip:?}");
     }
-    // Neighbouring samples of a turn are close on the side walls, so the corners, which all heads see, limit the
-    // speed.
+    // Neighbouring samples of a turn are close on the side walls. So the corners limit the speed, and all heads see
+    // them.
     let t_m = planner.t_max_m(fast, 0.1).unwrap();
     assert!((0.41..0.43).contains(&t_m), "{t_m}");
 }
@@ -199,7 +199,7 @@ fn error_about_an_impossible_plan_names_the_cause() {
 
 /// One head in the centre loses no speed to margins.
 ///
-/// Four heads of a vehicle lose speed to hidden wall and phases.
+/// Four heads on one vehicle lose speed to hidden wall and to phases.
 #[test]
 fn margins_lower_the_speed_step_by_step_to_the_largest_planned_speed() {
     for (inspection, loses) in [(ideal(1), false), (vita_2(HeadLayout::PhaseShift), true)] {
@@ -294,7 +294,7 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
     sorted.sort_by(f64::total_cmp);
     assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] > 0.05), "{sorted:?}");
     assert!(places[0] > 0.0 && places[2] < 0.0, "heads in front must remain in front: {places:?}");
-    // A plan for heads in line gives the same speed as this prediction.
+    // A plan for heads mounted in line gives the same speed as the prediction of `in_line`.
     let mut there = vita_2(HeadLayout::PhaseShift);
     for ((spec, _), place) in there.heads.iter_mut().zip(&gain.positions_m) {
         spec.mount.position = Vec3::new(place[0], place[1], place[2]);
@@ -366,7 +366,7 @@ fn smallest_and_largest_sample_distances_are_over_all_heads() {
 
 /// At 0.2 rad/s, beams move 2.4 m along a wall 6 m away between two passes.
 ///
-/// The tolerated yaw limits this movement.
+/// The tolerated yaw limits this movement of the beams.
 #[test]
 fn swing_is_limited_by_the_tolerated_yaw() {
     let v_mps = |yaw_deg: f64, rate_radps: f64| {

@@ -47,10 +47,10 @@ proptest! {
 proptest! {
     /// Distances never exceed the bounds from the table of extents, and the bounds' excess is limited by geometry.
     ///
-    /// The direction of the farthest point is at most half an angular step away from a direction of the table. The
-    /// tangents in two neighbouring directions meet beyond the edge between their points. The tangents meet at a
-    /// distance from the edge of at most half its length times the tangent of half a step. The longest edge of the
-    /// hull in this test is a chord that passes 1.8 m from the centre, with its ends at 2.2 m.
+    /// The direction of the farthest point differs from a direction of the table by at most half an angular step. The
+    /// tangents in two neighbouring directions touch two points, and meet beyond the edge between these points. Their
+    /// intersection is at most half the edge's length times tan(half a step) away from the edge. The longest edge of
+    /// the hull in this test is a chord that passes 1.8 m from the centre, with its ends at 2.2 m.
     #[test]
     fn precomputed_distance_bounds_exceed_the_exact_values_by_a_limited_amount(
         radii in prop::collection::vec(prop_oneof![9 => 1.8..2.2_f64, 1 => Just(1.8)], 257..600),
@@ -58,8 +58,7 @@ proptest! {
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
     ) {
-        // A few of many points are much farther from the centre than the rest, so the edges of the convex hull are
-        // long.
+        // A few points are much farther from the centre than all others, so the edges of the convex hull are long.
         let radii: Vec<f64> = match level {
             Some(of_32) => radii.iter().enumerate().map(|(k, r)| if k % 32 == of_32 { *r } else { 1.8 }).collect(),
             None => radii,
@@ -132,7 +131,7 @@ fn error_of_a_rejected_polygon_names_the_input_point() {
         // With repeated points, the error still refers to the numbering of the input.
         let repeated: Vec<Yz> = turned.iter().flat_map(|point| [*point, *point]).collect();
         assert_eq!(refused(&repeated), 2, "from {first}");
-        // If the points run in the opposite sense, the offending edge begins at its other end.
+        // In the reversed list of points, the offending edge begins at its other end.
         turned.reverse();
         assert!([2, 3].contains(&refused(&turned)), "from {first}");
     }
