@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// Longest usual gap between the bytes of a line. It allows for a TCP retransmission, whose timer is at least
-/// 200 ms.
+/// Longest usual gap between the bytes of one text line. The gap allows for a TCP retransmission, whose timer is at
+/// least 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
 /// Minimum number of valid beams for a velocity, which has three components.

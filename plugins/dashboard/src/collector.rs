@@ -2,7 +2,7 @@
 //!
 //! While the queue is full, data stays in the collector and is sent with the next message. The collector keeps all
 //! section numbers, the latest state, and a limited number of samples and events. Data beyond these limits is dropped
-//! and counted. Dropped wall samples are read again from the loop's own store if it has them.
+//! and counted. Dropped wall samples are read again from the loop's own store if the store has them.
 
 use std::collections::BTreeSet;
 
@@ -32,13 +32,14 @@ pub(crate) const WAITING: usize = 64;
 const MOST_SAMPLES: usize = 20_000;
 /// Maximum length of wall whose samples are read from the loop's store for one message, m.
 const MENDED_AT_ONCE_M: f64 = 10.0;
-/// Shortest piece of wall whose samples are read from the store, m. If it has too many samples, some are left out.
+/// Shortest piece of wall for which samples are read from the loop's store, m. If so short a piece still has too many
+/// samples, some of them are left out.
 const SHORTEST_MENDED_M: f64 = 0.01;
 /// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
 /// Maximum number of sections in one message.
 const SECTIONS_AT_ONCE: usize = 4096;
-/// Maximum interval between two states sent to the page, even without an update.
+/// Longest interval between two live states sent to the page. After it a state is sent even without an update.
 const EVERY: DurNs = DurNs(200_000_000);
 /// Averaging window for the sensors' rates of readings.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
@@ -154,8 +155,8 @@ impl Collector {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call it before the
-    /// method for that event.
+    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call it before the method that
+    /// handles this notice, tick or end.
     pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let mut value =
@@ -239,7 +240,7 @@ impl Collector {
         self.hand(Fed::Playback(state));
     }
 
-    /// Handles a seek or pause of playback, which may have changed the loop's state.
+    /// Handles a seek or pause of playback. Either may have changed the loop's state.
     pub fn stopped(&mut self, dive: &Loop) {
         if self.played == Some(dive.now()) {
             self.send(dive);
@@ -515,7 +516,7 @@ impl Collector {
         let now = dive.now();
         let told = self.back_told.as_ref();
         let waits = told.is_some_and(|(told, ..)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
-        // Even without new stretches, the way changes with the vehicle's place.
+        // Even without new missed stretches, the way back changes as the vehicle moves.
         let has_legs = told.is_some_and(|(.., legs)| legs.as_array().is_some_and(|legs| !legs.is_empty()));
         if waits || !self.back_due && !has_legs {
             return None;

@@ -7,22 +7,22 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::run::Loop;
 use serde::Serialize;
 
-/// Interval between comparisons of all sections. A comparison is periodic because sections change without a notice
-/// while the vehicle passes them.
+/// Interval between comparisons of all sections. Sections are compared periodically, because they change without a
+/// notice while the vehicle passes them.
 const EVERY: DurNs = DurNs(1_000_000_000);
 
-/// Lengths by verdict for the second target. Only sections with a measured hole count.
+/// Length of the sections with each verdict for the second target. Only sections with a measured hole count.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct ComparedJson {
     /// Second target, m.
     pub target_m: f64,
-    /// Length with the verdict "pass", m.
+    /// Length of the sections with the verdict "pass", m.
     pub pass_m: f64,
-    /// Length with the verdict "fail", m.
+    /// Length of the sections with the verdict "fail", m.
     pub fail_m: f64,
-    /// Length with the verdict "can't say", m.
+    /// Length of the sections with the verdict "can't say", m.
     pub cannot_say_m: f64,
-    /// Length with the verdict "open", m.
+    /// Length of the sections with the verdict "open", m.
     pub open_m: f64,
 }
 

@@ -27,8 +27,8 @@ const MOST_SAMPLES: usize = 500_000;
 const MOST_STATES: usize = 7200;
 /// Attribute that marks the embedded dive in an exported page.
 pub const MARK: &str = "id=\"dive\"";
-/// Fields of a live state that an exported file omits, because it stores them only once or they have no
-/// meaning there.
+/// Fields of a live state that an exported file omits. The file stores them once elsewhere, or they have no meaning in
+/// a file.
 const LEFT_OUT: [&str; 8] =
     ["type", "seq", "alert_list", "playback", "ended", "page_dropped", "rates", "recording"];
 

@@ -100,7 +100,7 @@ pub struct EchoJson {
     pub age_s: f64,
     /// Position of the echosounder in the cross-section, m.
     pub from: [f64; 2],
-    /// Position of the echo, m.
+    /// Position of the echo in the cross-section, m; `None` without an echo.
     pub to: Option<[f64; 2]>,
 }
 
@@ -146,8 +146,8 @@ pub struct PlaybackState {
     pub speed: Option<f64>,
     /// Present position, seconds on the log's clock.
     pub at_s: f64,
-    /// Start of the log, seconds.
+    /// Start of the log, seconds on the log's clock.
     pub from_s: f64,
-    /// End of the log, seconds.
+    /// End of the log, seconds on the log's clock.
     pub to_s: f64,
 }

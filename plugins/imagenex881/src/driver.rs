@@ -169,7 +169,8 @@ impl HeadDriver {
         self.behind = self.timetable.first_at(now).saturating_sub(number);
     }
 
-    /// Continues the scan program at the head's position, or homes the head if that position is too far off.
+    /// Continues the scan program at the head's position, or homes the head if that position is too far off the
+    /// program.
     fn join(&mut self, position: u16, clockwise: bool, now: MonoNs) {
         let current = self.timetable.first_at(now);
         let most_behind = if self.joined { self.timetable.len() / BEHIND_SHARE } else { 1 };

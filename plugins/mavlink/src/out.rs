@@ -19,8 +19,8 @@ pub const COMPONENT_ID: u8 = 191;
 pub const TEXT_BYTES: usize = 50;
 /// Maximum length of a value's name. Source: MAVLink, NAMED_VALUE_FLOAT.
 pub const NAME_BYTES: usize = 10;
-/// Names of values that QGroundControl attributes to the autopilot, whoever sends them. Source: its ArduSub
-/// plugin, August 2026.
+/// Names of values that QGroundControl attributes to the autopilot, whoever sends them. Source: QGroundControl's
+/// ArduSub plugin, August 2026.
 pub const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 

@@ -18,7 +18,7 @@ const SILENCE: DurNs = DurNs::from_millis(50);
 /// Timeout of the device's answer to a setting or request. Source: Ping protocol, 50 ms, plus an allowance
 /// for a bridge.
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
-/// Time beyond the ping interval that the device has to answer a distance request.
+/// Time that the device has to answer a distance request, in addition to the ping interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
 /// Maximum number of times that a setting is sent. Without an acknowledgement, the next setting then follows.
 const TRIES: u32 = 4;

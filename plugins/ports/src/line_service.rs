@@ -527,7 +527,7 @@ impl AttachedState {
         let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
-            // The frame arrived with the latest bytes, which may be earlier than `now`.
+            // The frame arrived with the latest bytes, possibly before `now`.
             self.last_frame = self.last_bytes;
         }
         if let Some(complaint) = complaint {

@@ -41,7 +41,7 @@ pub enum Counting {
     Delta,
 }
 
-/// Health of a cable counter's tracking. The numbers only grow, and the flag stays set.
+/// Health of a cable counter's tracking. The numbers only grow, and the flag stays set once it is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TrackerHealth {
     /// Number of reports rejected because the change was faster than the winch.

@@ -83,13 +83,13 @@ impl LeftOut {
         self.excess() <= 1.0
     }
 
-    /// Returns the largest change within the confidence intervals, as a multiple of its limit.
+    /// Returns the largest change within the confidence intervals, as a multiple of the limit for that quantity.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
 }
 
-/// Measures the effects of a scene, which must be given once per seed.
+/// Measures the effects of a scene. `scenes` has this scene once per seed.
 ///
 /// `note` is called with the number of finished dives and the maximum number of dives.
 ///

@@ -32,7 +32,7 @@ pub struct Player {
     clock: Option<Clock>,
     /// Messages with timestamps of another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
-    /// The farthest position from which a jump started, as a message count, and the losses up to there.
+    /// The farthest position from which a jump started, as a message count, and the losses up to that position.
     farthest: (u64, Vec<String>),
 }
 
@@ -104,10 +104,10 @@ impl Player {
 
     /// Continues from a position of this player, or of another player of the same log and vehicle.
     ///
-    /// Losses are then counted as if the log had been played straight through. Losses found after the position stay
-    /// in the list until playback passes them again.
+    /// Losses are then counted as if the log had been played straight through. Losses found after the position stay in
+    /// the list until playback passes them again.
     ///
-    /// Errors: the log can't be read there.
+    /// Errors: the log can't be read at that position.
     pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {
         if self.order > self.farthest.0 {
             self.farthest = (self.order, self.losses_here());

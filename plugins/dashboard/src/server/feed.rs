@@ -19,7 +19,7 @@ use crate::site::May;
 
 /// Time from a viewer's pong to the next WebSocket ping, and timeout of a pong.
 ///
-/// Together they drop a stalled viewer within [`STALLED_AFTER`], even if the viewer's machine buffers the
+/// Ping and timeout together drop a stalled viewer within [`STALLED_AFTER`], even if the viewer's machine buffers the
 /// feed unread.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(8);

@@ -129,7 +129,8 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Let each new connection run. Otherwise so many others might arrive first that it would be closed for them.
+        // Let each new connection run. Otherwise many later connections might arrive first, and this one would be
+        // closed to make room for them.
         tokio::task::yield_now().await;
     }
 }

@@ -108,7 +108,7 @@ impl Desk {
             let why = format!("no voice note {} waits for its recording", voice.id);
             return Err((StatusCode::CONFLICT, why));
         }
-        // Keep the recording in memory before the loop notifies viewers, so that they can play it at once.
+        // Keep the recording in memory before the loop notifies the viewers, so that viewers can play it at once.
         let voice = Arc::new(voice);
         self.hold(Arc::clone(&voice));
         if let Err(why) = keep(&voice) {

@@ -7,8 +7,8 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use super::layout::{Bits, DATA_BYTES, Layout, Order};
 use crate::frame::CanId;
 
-/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. The parser
-/// takes up to 75 bytes of memory for each byte of text, for lists of one-letter names.
+/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. In the worst
+/// case, lists of one-letter names, the parser takes 75 bytes of memory for each byte of text.
 const MOST_BYTES: usize = 1 << 20;
 
 /// Maximum number of names that an error lists.
@@ -126,7 +126,8 @@ pub struct Signal {
 pub struct Place {
     /// Identifier of the frames that contain the signal.
     pub id: CanId,
-    /// Length of the frames' data.
+    /// Identifiers as written, by name of the message. They are kept because the parser truncates standard identifiers
+    /// to 16 bits.
     pub frame_bytes: u8,
     /// Position of the signal in the data.
     pub layout: Layout,
@@ -314,7 +315,7 @@ fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
         let at = words.split_once("--> ").and_then(|(_, at)| at.split(':').next());
         at.and_then(|line| line.trim().parse().ok()).unwrap_or(1)
     } else {
-        // The other errors name the offending text.
+        // All other parser errors name the offending text.
         let value = words.split('\'').nth(1).or_else(|| words.rsplit(' ').next());
         let holds = |line: &str| value.is_some_and(|value| !value.is_empty() && line.contains(value));
         text.lines().position(holds).map_or(1, |line| line + 1)

@@ -43,7 +43,7 @@ pub trait Line: Send {
         self.read(wait, into)
     }
 
-    /// Sends bytes. On a carrier of messages they form one message.
+    /// Sends bytes. On a carrier that transfers messages, the bytes form one message.
     ///
     /// Errors: the connection is lost.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;

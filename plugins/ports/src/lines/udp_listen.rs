@@ -74,7 +74,7 @@ impl UdpListen {
         match (self.from, senders.believed) {
             (From::Port(peer), _) => from == peer,
             (From::Host(host), _) => from.ip() == host,
-            // After the line was reopened, the previous sender's address stays fixed.
+            // After the line was reopened, the accepted sender's address stays fixed, but its port may change.
             (From::Anybody, Some(before)) => from.ip() == before.ip(),
             (From::Anybody, None) => true,
         }
@@ -115,8 +115,8 @@ impl UdpListen {
         Some((first, count))
     }
 
-    /// Adds bytes to those of a possible sender. If they now contain a valid message, returns their receive
-    /// time and length.
+    /// Adds bytes to the earlier bytes of a possible sender. If all of them together contain a valid message, returns
+    /// their receive time and length.
     fn hold(
         &mut self,
         received: MonoNs,

@@ -71,8 +71,8 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// Reads the number of elements in a sequence. Returns `None` if its elements, of at least `element_bytes` each,
-    /// can't fit.
+    /// Reads the number of elements in a sequence. Returns `None` if that many elements, of at least `element_bytes`
+    /// each, can't fit into the message.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);

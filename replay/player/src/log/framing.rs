@@ -24,7 +24,7 @@ use super::medium::Medium;
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Length of a record's opcode and length field, bytes.
 const RECORD_HEAD_BYTES: usize = 9;
-/// Maximum number of bytes read to identify a record. Fields of fixed length and names fit into them.
+/// Maximum number of bytes read to identify a record. They hold the fields of fixed length, and names of usual length.
 const GLANCE_BYTES: usize = 1024;
 /// Length of a chunk record before its data, without the name of the compression, bytes.
 const CHUNK_HEAD_BYTES: u64 = 40;

@@ -54,8 +54,8 @@ pub(super) struct State {
     pub(super) dropped_besides: AtomicU64,
     /// Recordings of voice notes. They don't pass through the loop.
     pub(super) voices: ArrayQueue<Vec<u8>>,
-    /// Whether the recorder has stopped accepting voice recordings. Set before it looks into `voices` for the last
-    /// time.
+    /// Whether the recorder has stopped accepting voice recordings. Set before the recorder looks into `voices` for the
+    /// last time.
     pub(super) voices_end: AtomicBool,
     pub(super) results_missing: AtomicU64,
 }

@@ -23,7 +23,7 @@ use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
 /// Unsynced bytes after which a sync is due.
 const SYNC_BYTES: usize = 4 << 20;
-/// Wait after the first failed retry. It doubles after each further failed retry. The first retry is immediate.
+/// Wait after the first failed retry. The wait doubles after each further failed retry. The first retry is immediate.
 const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
 /// Number of attempts to write the rest after the dive has ended.
@@ -296,7 +296,8 @@ impl Recording {
         self.open = Some(part);
         if let Err(error) = self.write_again(&path) {
             self.fail(&error);
-            // A voice recording is as large as several seconds of a dive. Without it the other messages may fit.
+            // A voice recording is as large as several seconds of a dive. Without voice recordings, the other messages
+            // may fit.
             for lost in self.backlog.drop_voices() {
                 self.lose(&lost);
             }

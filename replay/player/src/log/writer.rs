@@ -391,7 +391,7 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// Records a loss between `from` and `to` in the log; `None` if a time is unknown. Closes the chunk.
+    /// Records in the log a loss between the times `from` and `to`. An unknown time is `None`. Closes the chunk.
     ///
     /// Errors: an error of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {
