@@ -91,7 +91,7 @@ pub struct Collector {
     skips: bool,
     back_due: bool,
     notes_due: bool,
-    /// The last list of missed stretches that was sent, with its time and the length of the way.
+    /// The last list of missed stretches that was sent, with its time and the length of the way back.
     back_told: Option<(MonoNs, f64, Value)>,
     /// Depth by the last reading of the pressure sensor, m.
     depth_m: Option<f64>,

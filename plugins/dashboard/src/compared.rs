@@ -41,7 +41,8 @@ impl Compared {
         Self { target_m, verdicts: BTreeMap::new(), at: None, json }
     }
 
-    /// Compares all sections if a comparison is due. Calls `changed` with each section whose verdict has changed.
+    /// Judges all sections for the second target if this is due. Calls `changed` with each section whose verdict has
+    /// changed.
     pub(crate) fn refresh(&mut self, dive: &Loop, changed: impl FnMut(i64)) {
         let now = dive.now();
         if self.at.is_some_and(|at| (0..EVERY.0).contains(&now.since(at).0)) {

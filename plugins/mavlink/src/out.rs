@@ -93,7 +93,7 @@ impl Speaker {
         let text = ascii(text);
         let is_whole = text.len() <= TEXT_BYTES;
         let id = if is_whole { 0 } else { self.next_text() };
-        // A full part can't be marked as the last part, so an empty part follows it.
+        // A part of full length can't mark the end of the text. If the last part is full, an empty part follows.
         let parts = if is_whole { 1 } else { text.len() / TEXT_BYTES + 1 };
         let part = |part: usize| {
             let from = part * TEXT_BYTES;

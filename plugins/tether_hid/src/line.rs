@@ -11,8 +11,8 @@
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 use headrace_sensor::geometry::math;
 
-/// Templates of the two kinds of lines. 9 stands for a digit, # for a character of a number, and all other characters
-/// for themselves.
+/// Templates of the two kinds of text lines. 9 stands for a digit, # for a character of a number, and all other
+/// characters for themselves.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
 /// Maximum length of a line, bytes.

@@ -133,7 +133,7 @@ impl Player {
         self.played
     }
 
-    /// Returns losses and omissions so far, as text. Those found before a jump back are included.
+    /// Returns losses and omissions so far, as text, including those found before a jump back.
     pub fn losses(&self) -> Vec<String> {
         let (order, losses) = &self.farthest;
         if *order > self.order { losses.clone() } else { self.losses_here() }
@@ -172,7 +172,7 @@ impl Player {
         losses
     }
 
-    /// Returns anomalies found so far, and how they were handled, as text. They lose no data.
+    /// Returns anomalies found so far, and how they were handled, as text. These anomalies lose no data.
     pub fn notes(&self) -> Vec<String> {
         let note = |(topic, ids): (String, Vec<u16>)| {
             let ids: Vec<String> = ids.iter().map(u16::to_string).collect();

@@ -129,7 +129,7 @@ pub struct StateKeeper {
     consumed: Consumed,
     /// Time of the next state.
     due: Option<MonoNs>,
-    /// A state, and its time. It is written once all its packets are on the medium.
+    /// A state that is written once all its packets are on the medium, and the state's time.
     waiting: Option<(MonoNs, SavedState)>,
     states: Sender<SavedState>,
     ended: Arc<AtomicBool>,

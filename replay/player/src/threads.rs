@@ -54,7 +54,7 @@ impl Batch {
         }
         let tick = &mut self.ticks[self.len];
         tick.now = now;
-        // A loop may still hold the georeferenced pings of its latest tick. Those of all other ticks can be
+        // A loop may still hold the georeferenced pings of its latest tick. The pings of all other ticks can be
         // overwritten.
         if Arc::get_mut(&mut tick.placed).is_none() {
             tick.placed = Arc::default();

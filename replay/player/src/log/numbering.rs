@@ -148,7 +148,7 @@ fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
 }
 
 impl Break {
-    /// Whether breaks in two channels may be at the same position in the file.
+    /// Whether breaks in the message numbers of two channels may be at the same position in the file.
     fn meets(&self, other: &Self) -> bool {
         let (first, last) = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
         self.fault == other.fault && first <= last

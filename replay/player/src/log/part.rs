@@ -122,7 +122,7 @@ impl Progress {
         })
     }
 
-    /// Whether both totals are equal, apart from the sequence numbers of topics.
+    /// Whether these totals equal `other`, apart from the sequence numbers of topics.
     pub(super) fn meets(&self, other: &Self) -> bool {
         (self.messages, self.tick) == (other.messages, other.tick)
     }

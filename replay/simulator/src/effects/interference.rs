@@ -27,8 +27,9 @@ use pings::{Ping, Pings};
 /// Heads that share a frequency hear each other. A head takes the first sound after its own ping as its echo.
 ///
 /// Another head's ping arrives by reflection at the point where the other beam meets the wall, or directly if the other
-/// beam points at this head's body. The ping's apparent range is (c (t_other - t_own) + path) / 2. The head reports the
-/// apparent range if it is less than the range of the head's own echo, and not less than the head's least range.
+/// beam points at this head's body. The ping's apparent range is (c (t_other - t_own) + path) / 2, with the speed of
+/// sound c and the times t of both pings. The head reports the apparent range if it is less than the range of the
+/// head's own echo, and not less than the head's least range.
 ///
 /// The ping is always heard if it arrives within this head's beam. Otherwise it is heard through side lobes with the
 /// probability `share`. A wall point is within the beam if its angle from the axis is at most half the beam's width

@@ -22,8 +22,9 @@ use crate::stages::Stage;
 /// Some echoes arrive by way of two walls. The first wall reflects the beam specularly, and the second one returns it
 /// to the sonar.
 ///
-/// The range is half the length of this path, (r1 + r12 + r2) / 2. Such an echo replaces the direct echo more often
-/// towards grazing incidence, since the strength of the direct echo is proportional to the cosine of incidence.
+/// The range is half the length of the path from the sonar over both walls back to the sonar. Such an echo replaces the
+/// direct echo more often towards grazing incidence, since the strength of the direct echo is proportional to the
+/// cosine of incidence.
 ///
 /// Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
