@@ -72,7 +72,7 @@ impl Axis {
         Self { name_px, ..self }
     }
 
-    /// Removes name and numbers, for a chart whose neighbour shows them.
+    /// Removes the axis's name and numbers, for a chart whose neighbour shows the same ones.
     pub fn bare(self) -> Self {
         Self { name: String::new(), numbered: false, ..self }
     }

@@ -48,7 +48,7 @@ const WAY_STEP_M: f64 = 0.5;
 /// Minimum interval between two lists of missed stretches to go back to.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
 
-/// The last ping of an echosounder.
+/// The latest ping of an echosounder.
 #[derive(Debug, Clone, Copy)]
 struct Ping {
     at: MonoNs,
@@ -91,9 +91,9 @@ pub struct Collector {
     skips: bool,
     back_due: bool,
     notes_due: bool,
-    /// The last list of missed stretches that was sent, with its time and the length of the way back.
+    /// The latest list of missed stretches that was sent, with its time and the length of the way back.
     back_told: Option<(MonoNs, f64, Value)>,
-    /// Depth by the last reading of the pressure sensor, m.
+    /// Depth by the latest reading of the pressure sensor, m.
     depth_m: Option<f64>,
     recording: RecordingJson,
     playback: Option<PlaybackState>,
@@ -155,8 +155,8 @@ impl Collector {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call it before the method that
-    /// handles this notice, tick or end.
+    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call this method before the one
+    /// that handles the notice, tick or end.
     pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let mut value =
@@ -170,7 +170,7 @@ impl Collector {
         }
     }
 
-    /// Collects one notice of the last tick.
+    /// Collects one notice of the latest tick.
     pub fn notice(&mut self, notice: &Notice) {
         match notice {
             Notice::Section { section, .. } => {
@@ -182,7 +182,7 @@ impl Collector {
         }
     }
 
-    /// Collects the results of the last tick, and sends the data that are due.
+    /// Collects the results of the latest tick, and sends the data that are due.
     pub fn tick(&mut self, dive: &Loop) {
         self.gather(dive);
         let now = dive.now();
@@ -206,7 +206,7 @@ impl Collector {
         self.skips = false;
     }
 
-    /// Handles a dive's state that was rebuilt from its log. The wall of the dive so far is sent in pieces.
+    /// Handles a state of the dive that was rebuilt from the log. The wall of the dive so far is sent in pieces.
     pub fn rebuilt(&mut self, dive: &Loop) {
         self.begun = dive.view().span().map(|(first, _)| first);
         self.lacking_m = dive.view().coverage().frontier.way().map(|way| [way.from_m, way.to_m]);
@@ -300,7 +300,7 @@ impl Collector {
         self.aims_of(dive);
     }
 
-    /// Collects the samples and doubtful returns of the last tick.
+    /// Collects the samples and doubtful returns of the latest tick.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn samples_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();

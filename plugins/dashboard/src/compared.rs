@@ -26,7 +26,7 @@ pub struct ComparedJson {
     pub open_m: f64,
 }
 
-/// Verdicts for a second target, as of the last comparison.
+/// Verdicts for a second target, as of the latest comparison.
 #[derive(Debug)]
 pub(crate) struct Compared {
     target_m: f64,

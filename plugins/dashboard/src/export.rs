@@ -97,8 +97,8 @@ impl Export {
 
     /// Returns the page with the dive. All collectors must have been dropped.
     ///
-    /// `alerts` are all alerts of the dive, `voices` the recordings of its notes, and `end` is the last message of the
-    /// dive.
+    /// `alerts` are all alerts of the dive, `voices` the recordings of the dive's notes, and `end` is the last message
+    /// of the dive.
     ///
     /// Errors: see [`ExportError`].
     pub fn page(self, alerts: &Value, voices: &[Voice], end: &Value) -> Result<Vec<u8>, ExportError> {

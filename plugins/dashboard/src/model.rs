@@ -1,4 +1,4 @@
-//! The page's displayed data, as of the last message from the loop. The model uses neither sockets nor clocks.
+//! The page's displayed data, as of the latest message from the loop. The model uses neither sockets nor clocks.
 //!
 //! Each message has a number, and each section stores the number of the last message that contained it. A viewer that
 //! reconnects therefore gets only later changes, and a new viewer gets everything.
@@ -36,7 +36,7 @@ pub const MOST_IN_RANGE: usize = 200_000;
 pub enum Sort {
     /// A live state, which replaces the previous one.
     State,
-    /// Samples since the last message.
+    /// Samples since the previous message.
     Samples,
     /// Any other message.
     Other,
@@ -231,7 +231,7 @@ impl Model {
         if self.jumps == 0 { self.instance.clone() } else { format!("{}.{}", self.instance, self.jumps) }
     }
 
-    /// Returns the changes since the last call, as messages for all viewers.
+    /// Returns the changes since the previous call, as messages for all viewers.
     pub fn flush(&mut self) -> Vec<Message> {
         let mut messages = Vec::new();
         for value in core::mem::take(&mut self.told_new) {
@@ -435,7 +435,7 @@ impl Model {
         self.dropped
     }
 
-    /// Returns the number of the last message.
+    /// Returns the number of the latest message.
     pub fn seq(&self) -> u64 {
         self.seq
     }

@@ -38,7 +38,7 @@ pub enum Message {
 pub struct Imu {
     /// Type of the message.
     pub message: ImuMessage,
-    /// Time since the autopilot's boot, or since 1970. The SCALED_IMU messages have it in milliseconds.
+    /// Time since the autopilot's boot, or since 1970. The SCALED_IMU messages have this time in milliseconds.
     pub time_us: u64,
     /// Specific force, milli-g.
     pub force_mg: [i16; 3],

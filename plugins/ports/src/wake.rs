@@ -19,7 +19,7 @@ pub trait Threads {
     /// Sets a thread's token, which ends the thread's wait.
     fn unpark(thread: &Self::Thread);
 
-    /// Waits for this thread's token, at most this long, and takes it.
+    /// Waits for this thread's token, for at most `at_most`, and takes the token.
     fn park(at_most: Duration);
 }
 

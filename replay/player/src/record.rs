@@ -199,7 +199,7 @@ fn record_results(
     }
 }
 
-/// Writes the words of a stream into a message, without allocation. Returns `false` if they don't all fit.
+/// Writes the words of a stream into a message, without allocation. Returns `false` if the words don't all fit.
 fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) -> bool {
     message.clear();
     let room = message.capacity() / 8 - HEAD_WORDS;

@@ -245,8 +245,8 @@ impl Simulation {
         }
     }
 
-    /// Replaces device number `source` of the vehicle file by one that is switched on now. A cable counter keeps its
-    /// count.
+    /// Replaces device number `source` of the vehicle file by a device that is switched on now. A cable counter keeps
+    /// its count.
     pub fn restart(&mut self, scene: &Scene, source: usize) {
         let (facts, _) = programmed(scene);
         let parts = (self.entities.get(source), scene.vehicle.sensors.get(source), facts.sensors.get(source));

@@ -88,8 +88,8 @@ impl Budgets {
     }
 }
 
-/// Makes room in a full table. Removes all clients with a full budget. If the table is then still full, removes the client
-/// with the largest budget.
+/// Makes room in a full table. Removes all clients with a full budget. If the table is then still full, removes the
+/// client with the largest budget.
 fn forget_one(left: &mut BTreeMap<Client, Left>, rate: Rate, now: Instant) {
     left.retain(|_, left| left.now(rate, now) < rate.most);
     if left.len() >= MOST_CLIENTS {

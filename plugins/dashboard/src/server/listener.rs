@@ -96,7 +96,7 @@ impl Tls {
 
 /// Listens on an address. Must be called within the runtime.
 ///
-/// Errors: those of the system.
+/// Errors: system errors.
 pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
     // The option SO_REUSEADDR is set on Unix only, as in the standard library. On other systems the option

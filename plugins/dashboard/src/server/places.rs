@@ -31,7 +31,7 @@ struct Held {
     stream: Option<Client>,
 }
 
-/// A connection's place among the limited number of places. It is freed on drop.
+/// A connection's place among the limited number of places. The place is freed on drop.
 pub(super) struct Place {
     /// Notifies the connection to close, and identifies its place.
     key: Arc<Notify>,

@@ -126,8 +126,7 @@ pub struct Signal {
 pub struct Place {
     /// Identifier of the frames that contain the signal.
     pub id: CanId,
-    /// Identifiers as written, by name of the message. They are kept because the parser truncates standard identifiers
-    /// to 16 bits.
+    /// Length of the frames' data.
     pub frame_bytes: u8,
     /// Position of the signal in the data.
     pub layout: Layout,
@@ -166,7 +165,8 @@ impl Place {
 #[derive(Debug)]
 pub struct DbcFile {
     dbc: Dbc,
-    /// Identifiers as written, by message. They are kept because the parser truncates standard ones to 16 bits.
+    /// Identifiers as written, by name of the message. They are kept because the parser truncates standard identifiers
+    /// to 16 bits.
     wide_ids: BTreeMap<String, u64>,
 }
 
@@ -186,7 +186,7 @@ impl DbcFile {
 
     /// Looks up a signal by its name, or as `Message.Signal`.
     ///
-    /// Errors: no signal has this name, or several have it; the signal can't be extracted from a classic frame.
+    /// Errors: no signal has this name, or several signals have it; the signal can't be extracted from a classic frame.
     pub fn signal(&self, wanted: &str) -> Result<Signal, DbcError> {
         let all =
             || self.dbc.messages.iter().flat_map(|message| message.signals.iter().map(move |s| (message, s)));

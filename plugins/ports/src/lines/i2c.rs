@@ -31,7 +31,7 @@ pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
 }
 
 impl<B: I2c + Send> Line for Bus<B> {
-    /// A bus has only transactions, so there is nothing to read between them.
+    /// A bus has only transactions, so there is nothing to read between transactions.
     fn read(&mut self, wait: Duration, _: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         thread::sleep(wait);
         Ok(None)

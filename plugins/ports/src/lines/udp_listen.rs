@@ -17,8 +17,8 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// Maximum number of senders whose bytes are kept until one sends a valid message. Beyond it the oldest is
-/// forgotten.
+/// Maximum number of senders whose bytes are kept until one sends a valid message. If there are more, the oldest sender
+/// is forgotten.
 const MAX_CANDIDATES: usize = 8;
 
 struct UdpListen {
@@ -82,8 +82,8 @@ impl UdpListen {
 
     /// Handles a datagram of a sender that may be the device.
     ///
-    /// The sender is accepted once its bytes are valid, alone or together with its earlier bytes. The valid bytes are
-    /// then in `into`.
+    /// The sender is accepted once the datagram is valid, alone or together with the sender's earlier bytes. The valid
+    /// bytes are then in `into`.
     fn introduce(
         &mut self,
         (received, from, count): (MonoNs, SocketAddr, usize),

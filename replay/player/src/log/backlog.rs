@@ -22,7 +22,7 @@ pub(super) struct Head {
     tick: Option<u64>,
 }
 
-/// Messages in the order of their arrival, at most 16 MiB.
+/// Unsynced messages in the order of their arrival, at most 16 MiB.
 #[derive(Debug, Default)]
 pub(super) struct Backlog {
     heads: VecDeque<Head>,

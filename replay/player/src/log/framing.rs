@@ -337,8 +337,8 @@ fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool
     Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
 }
 
-/// Parses those fields of a record that framing and scanning need. Also returns the minimum record length that they
-/// imply.
+/// Parses those fields of a record that framing and scanning need. Also returns the minimum record length that these
+/// fields imply.
 fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {

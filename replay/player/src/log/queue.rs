@@ -101,7 +101,7 @@ pub(super) struct Dropped {
     pub(super) packets: u64,
 }
 
-/// Records traffic on the connections to devices that doesn't pass through the loop. Any thread may use it.
+/// Records messages to devices, and losses of packets, neither of which passes through the loop. Any thread may use it.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,

@@ -221,7 +221,7 @@ impl<R: Read + Seek> LogReader<R> {
         &self.info
     }
 
-    /// Moves the attachments out of the header, so that long ones aren't in memory twice.
+    /// Moves the attachments out of the header, so that long attachments aren't in memory twice.
     pub(super) fn take_attachments(&mut self) -> Vec<(String, Vec<u8>)> {
         core::mem::take(&mut self.info.attachments)
     }

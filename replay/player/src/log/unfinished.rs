@@ -155,7 +155,7 @@ impl Unfinished {
         Ok(has_head && unended(&files)?.is_some())
     }
 
-    /// Returns the same dive, to be continued at another path, where none of its parts can be continued.
+    /// Returns the same dive, to be continued at another path. None of the dive's parts at that path can be continued.
     #[must_use]
     pub fn at(&self, recording: &Path) -> Self {
         let present = in_the_way(recording).unwrap_or_default();

@@ -122,7 +122,7 @@ impl RecorderWorker {
         }
     }
 
-    /// Returns a port that records traffic with devices that doesn't pass through the loop.
+    /// Returns a port that records messages to devices, and losses of packets, which don't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }

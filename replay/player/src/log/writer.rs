@@ -56,7 +56,7 @@ pub struct LogHeader {
 }
 
 impl LogHeader {
-    /// Whether a log with this header has a channel for such a message.
+    /// Whether a log with this header has this channel.
     pub(super) fn has(&self, lane: Lane) -> bool {
         match lane {
             Lane::Raw(source) | Lane::Sent(source) => usize::from(source) < self.sources.len(),

@@ -207,7 +207,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Considers a ping that arrives directly, from a head whose beam points at this one.
+    /// Considers a ping that arrives directly, from a head whose beam points at this head.
     fn straight(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
         let way_m = (ping.origin - self.ray.origin).norm();
         let range_m = f64::midpoint(later_m, way_m);
