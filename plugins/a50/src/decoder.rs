@@ -22,8 +22,8 @@ const SILENCE: DurNs = DurNs::from_millis(1000);
 const LEAST_BEAMS: u8 = 3;
 /// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
-/// Largest plausible delay between the sound's reflection and the report. The two-way travel time is only 70
-/// ms.
+/// Largest plausible delay between the sound's reflection and the report. Reports with a larger delay are withheld. The
+/// two-way travel time is only 70 ms.
 const MOST_DELAY_US: i64 = 2_000_000;
 
 /// Decoding settings of an A50.

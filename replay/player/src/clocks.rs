@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 
 use crate::log::{DiveLog, LogError, MessageKind};
 
-/// Minimum offset between two clocks, far longer than any dive.
+/// Minimum offset between two clocks, far longer than any dive. Timestamps with smaller gaps come from one clock.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
 /// Maximum number of clocks that are distinguished. Messages of further clocks are assigned to no clock.
 const MAX_CLOCKS: usize = 100;

@@ -18,7 +18,8 @@ use crate::frame::{CanFrame, CanId, FRAME_BYTES, FrameKind};
 /// attitude, 4 states and a time.
 const MOST_FRAMES: usize = 15;
 
-/// Maximum time between the frames of one sample. A unit sends them back to back, and the next sample later.
+/// Maximum time between the frames of one sample. A unit sends these frames back to back, so a longer gap means another
+/// sample.
 const SAME_SAMPLE: DurNs = DurNs::from_millis(5);
 
 /// Identifiers and lengths of the mapping's frames.

@@ -17,7 +17,7 @@ use crate::input::{Input, Source as _};
 use crate::order::Order;
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// Upper bound on the length of a record's header, bytes.
+/// Upper bound on the length of a record's header, bytes. A greater length counts as damage.
 const MOST_HEADER: usize = 1 << 16;
 /// Maximum number of bytes read from the definitions at the end of a bag.
 const MOST_INDEX: u64 = 64 << 20;
