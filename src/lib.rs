@@ -45,6 +45,7 @@ mod recover;
 mod report_output;
 mod resume;
 mod screen;
+mod sensor_lines;
 mod simulate;
 mod smooth;
 mod summary;

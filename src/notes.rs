@@ -15,6 +15,8 @@ use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
 use crate::outputs::{self, Claims, Kind};
+use crate::page::utc_of_zero_s;
+use crate::report_output::utc_text;
 
 /// Runs `headrace notes`.
 pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
@@ -91,10 +93,12 @@ fn tell(
         let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
         let id = note.voice.as_ref().map(|voice| voice.id);
         let file = id.and_then(|id| named.get(&id)).map(|path| format!(": {}", path.display()));
+        let utc = utc_of_zero_s(&found.metadata).map(|zero_s| format!(" ({})", utc_text(zero_s + note.at_s)));
         let text = format!(
-            "{:>4}  {place}  {:.1} s  {}{by}{}",
+            "{:>4}  {place}  {:.1} s{}  {}{by}{}",
             note.number,
-            note.at_s,
+            note.at_s - found.begun.as_secs_f64(),
+            utc.unwrap_or_default(),
             note.words(),
             file.unwrap_or_default()
         );

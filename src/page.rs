@@ -300,9 +300,10 @@ fn act(console: Option<ConsolePort>, directed: &Arc<Directed>) -> Act {
     })
 }
 
-/// Creates the function that hands the audio of voice notes to all logs, or that finds it in a log.
+/// Returns how the page handles the audio of voice notes. In a dive, a function hands it to all logs. In a replay, a
+/// function finds it in the log.
 ///
-/// The loop is informed when at least one log has taken the audio.
+/// In a dive, the loop is informed when at least one log has taken the audio.
 fn voices(of: &Of<'_>) -> Voices {
     match (&of.voices, &of.console) {
         (VoicesOf::Log(files), _) => {

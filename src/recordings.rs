@@ -95,12 +95,13 @@ impl Recordings {
     /// other recordings still end.
     pub(crate) fn end(mut self, report: &Report) -> Option<LogReport> {
         self.all.iter_mut().for_each(|one| one.handle.begin_to_end(self.is_live));
+        let begun = MonoNs(0) + DurNs::from_secs_f64(report.dive.start_s);
         let (mut log, several): (Option<LogReport>, _) = (None, self.all.len() > 1);
         for One { path, handle, .. } in self.all {
             let written = handle.finish();
             let mut losses = match &written {
                 Err(error) => vec![format!("recording failed: {error}")],
-                Ok(written) => unrecorded(written),
+                Ok(written) => unrecorded(written, begun),
             };
             if several {
                 for loss in &mut losses {
@@ -146,9 +147,10 @@ impl One {
 }
 
 /// Texts about data missing in a recording, and about errors while it was recorded.
-fn unrecorded(written: &Summary) -> Vec<String> {
-    let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
-    losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
+fn unrecorded(written: &Summary, begun: MonoNs) -> Vec<String> {
+    let mut losses: Vec<String> = written.faults.iter().map(|one| fault(one, begun)).collect();
+    let left = Some(written.left_out).filter(|left| left.messages > 0);
+    losses.extend(left.map(|left| left_out(left, begun)));
     let counts = [
         (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
         (written.skipped, "packets not recorded: the recorder was behind"),
@@ -159,16 +161,16 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses
 }
 
-/// Text about an error of the recording, with times.
-fn fault(fault: &RecordingFault) -> String {
-    let from = fault.from.map(|from| format!(", after {}", seconds(from)));
-    let to = fault.to.map(|to| format!(", before {}", seconds(to)));
+/// Text about an error of the recording, with dive times.
+fn fault(fault: &RecordingFault, begun: MonoNs) -> String {
+    let from = fault.from.map(|from| format!(", after {}", seconds(from, begun)));
+    let to = fault.to.map(|to| format!(", before {}", seconds(to, begun)));
     [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
 }
 
-/// Text about data that the recorder has dropped, with times.
-fn left_out(left: LeftOut) -> String {
-    let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
+/// Text about data that the recorder has dropped, with dive times.
+fn left_out(left: LeftOut, begun: MonoNs) -> String {
+    let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from, begun), seconds(to, begun)));
     format!("{}{}", left.words(), span.unwrap_or_default())
 }
 

@@ -3,6 +3,7 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use headrace_geometry::time::MonoNs;
 use headrace_replay::atomic_file::AtomicFile;
 use headrace_replay::log::{DiveLog, Recovered, files_digest, files_of, recover as rewrite};
 use headrace_replay::record::result_channels;
@@ -56,10 +57,11 @@ fn tell(args: &Recover, recovered: &Recovered) -> Result<(), Failure> {
         });
         return deliver(&told.to_string());
     }
+    let begun = recovered.span.map_or(MonoNs(0), |(begun, _)| begun);
     for loss in &recovered.losses {
-        say(&format!("lost     {loss}"));
+        say(&format!("lost     {}", loss.in_dive_time(begun)));
     }
-    let span = seconds.map(|[from, to]| format!(", {from:.3} s to {to:.3} s")).unwrap_or_default();
+    let span = seconds.map(|[from, to]| format!(", {:.3} s", to - from)).unwrap_or_default();
     let nothing = if recovered.losses.is_empty() { "; nothing is missing" } else { "" };
     say(&format!("kept     {} messages{span}{nothing}", recovered.messages));
     say(&format!("log      {}", args.output.display()));

@@ -32,7 +32,7 @@ pub(crate) fn state_utc(report: &mut Report, utc_of_zero_s: Option<f64>) {
 }
 
 /// A UTC time in seconds since 1970 as text, to whole seconds.
-fn utc_text(utc_s: f64) -> String {
+pub(crate) fn utc_text(utc_s: f64) -> String {
     let seconds = headrace_geometry::math::floor_to_i64(utc_s);
     let (mut days, of_day) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
     let is_leap = |year: i64| year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);

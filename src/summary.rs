@@ -108,14 +108,16 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     text
 }
 
-/// Text for engineers: the confidence, the largest hole and the spacing of samples.
+/// Text for engineers: the confidence, the largest hole of the inspected sections and the spacing of samples.
 fn spacing(report: &Report) -> String {
     let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
     let sum = &report.summary;
+    let inspected = report.sections.iter().filter(|section| section.verdict != Verdict::Open);
+    let largest_m = inspected.filter_map(|section| section.hole_m).max_by(f64::total_cmp);
     format!(
         "  confidence {} sd   largest hole {} m   T_x mean {} m   T_y max {} m",
         report.confidence_sd,
-        metres(sum.hole.max_m),
+        metres(largest_m),
         metres(sum.t_x.mean_m),
         metres(sum.t_y.max_m)
     )
@@ -136,6 +138,9 @@ fn dropped(source: &SourceReport) -> Option<String> {
 /// If a dive has no position or no sonar, another line names the silent sensors.
 fn silence(source: &SourceReport) -> Option<String> {
     let id = &source.id;
+    if let Some(why) = &source.no_reading {
+        return Some(format!("  {id}: {why}"));
+    }
     match source.silent_at_end_s {
         None => Some(format!("  {id} sent nothing")),
         Some(end_s) if end_s > SILENT_S => Some(format!("  {id} silent for the last {end_s:.0} s")),

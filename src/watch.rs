@@ -17,6 +17,7 @@ use crate::follower::Follower;
 use crate::printer::Printer;
 use crate::recording_state::RecordingState;
 use crate::screen::Screen;
+use crate::sensor_lines::SensorLines;
 use crate::terminal;
 
 /// Interval between state lines if they can't be overwritten.
@@ -51,6 +52,9 @@ pub(crate) struct Watch {
     /// Time and condition of the last state shown.
     shown: Option<(MonoNs, Condition)>,
     recorded: RecordingState,
+    sensor_lines: SensorLines,
+    /// Time of the dive's first packet; dive times are counted from it.
+    begun: Option<MonoNs>,
 }
 
 impl Watch {
@@ -66,6 +70,8 @@ impl Watch {
             teller: LiveMessages::default(),
             shown: None,
             recorded: RecordingState::default(),
+            sensor_lines: SensorLines::default(),
+            begun: None,
         }
     }
 
@@ -129,6 +135,7 @@ impl Watch {
         if !self.has_readers() {
             return;
         }
+        self.begun = dive.view().span().map(|(begun, _)| begun);
         let state = dive.view().live_state();
         let mut told = Vec::new();
         self.teller.tick(state, dive, &mut |one| told.push(one));
@@ -168,6 +175,9 @@ impl Watch {
                 json!({"type": "sensor", "id": id, "phase": phase, "text": status.words}),
             ),
             Show::Lines => {
+                if !self.sensor_lines.is_new(status) {
+                    return;
+                }
                 let lamp = (status.phase != Phase::Running).then_some(Lamp::Amber);
                 let what = vec![format!("{id} {status}")];
                 self.line(&PilotLine { place: "SENSOR".to_owned(), what, lamp, ..PilotLine::default() });
@@ -356,7 +366,8 @@ impl Watch {
 
     fn json(&mut self, at: MonoNs, mut value: Value) {
         if let Some(object) = value.as_object_mut() {
-            object.insert("t_s".to_owned(), at.as_secs_f64().into());
+            let dive_time = self.begun.map_or(DurNs(0), |begun| at.since(begun));
+            object.insert("t_s".to_owned(), dive_time.as_secs_f64().into());
         }
         self.print(one_line(&value.to_string()).into_owned());
     }

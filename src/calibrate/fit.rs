@@ -68,7 +68,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) profile: &'a Profile,
     /// Measurement noise of the sonars.
     pub(crate) settings: &'a Settings,
-    /// Returns of each head. The number of heads is limited by the number of unknowns.
+    /// Sonar returns of each head. The number of heads is limited by the number of unknowns.
     pub(crate) heads: &'a [HeadScan],
     /// Ranges of each echosounder.
     pub(crate) echoes: &'a [EchoScan],

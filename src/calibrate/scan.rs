@@ -44,7 +44,7 @@ pub(crate) struct HeadScan {
     pub(crate) mount: Mount,
     /// Motion of the head, from all pings.
     pub(crate) sweep: Sweep,
-    /// Returns of the head.
+    /// Sonar returns of the head.
     pub(crate) returns: Vec<Return>,
 }
 

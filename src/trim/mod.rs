@@ -52,7 +52,8 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let mut said = what_is_done(args, &files, &spans)?;
     let trimmed = write(args, &files, &spans, vehicle.as_ref(), anonymous.as_ref(), &said)?;
     said.extend(anonymous.iter().flat_map(|anonymous| anonymous.left.clone()));
-    tell(args, &trimmed, &spans, &said)?;
+    let begun = log.times().map_or(MonoNs(0), |(begun, _)| begun);
+    tell(args, (&trimmed, begun), &spans, &said)?;
     Ok(if trimmed.losses > 0 { failure::DATA_LOST } else { failure::OK })
 }
 
@@ -233,7 +234,13 @@ fn nothing_kept(args: &Trim, files: &[PathBuf]) -> Result<Failure, Failure> {
     )))
 }
 
-fn tell(args: &Trim, trimmed: &Trimmed, spans: &[(MonoNs, MonoNs)], said: &[String]) -> Result<(), Failure> {
+/// Shows what was trimmed. `begun` is the beginning of the dive.
+fn tell(
+    args: &Trim,
+    (trimmed, begun): (&Trimmed, MonoNs),
+    spans: &[(MonoNs, MonoNs)],
+    said: &[String],
+) -> Result<(), Failure> {
     let Trimmed { messages, cut, results, changed, emptied, bytes_before, bytes_after, losses, span } =
         *trimmed;
     if args.json {
@@ -257,7 +264,9 @@ fn tell(args: &Trim, trimmed: &Trimmed, spans: &[(MonoNs, MonoNs)], said: &[Stri
     if losses > 0 {
         say(&format!("lost     {losses} losses of the source log are stated in the new one"));
     }
-    let span = span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to))).unwrap_or_default();
+    let span = span
+        .map(|(from, to)| format!(", {} to {}", seconds(from, begun), seconds(to, begun)))
+        .unwrap_or_default();
     let results = if results > 0 { format!(" and {results} of results") } else { String::new() };
     say(&format!("kept     {messages} messages{span}; left out {cut}{results}"));
     say(&format!("log      {}", args.output.display()));

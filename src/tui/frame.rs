@@ -56,7 +56,7 @@ pub(super) struct SensorRow {
     pub(super) state: SensorState,
     pub(super) age: Option<DurNs>,
     pub(super) rate_hz: Option<f64>,
-    /// Status of the sensor's port; empty while the port is running.
+    /// Withheld readings, or the status of the sensor's port; empty while both are well.
     pub(super) why: String,
 }
 
@@ -171,7 +171,7 @@ impl FrameBuilder {
             state: state.sensor(source),
             age: state.age_of(source),
             rate_hz: rate(source),
-            why: self.ports.get(&source).cloned().unwrap_or_default(),
+            why: state.withheld_text(source).or_else(|| self.ports.get(&source).cloned()).unwrap_or_default(),
         };
         let rows = dive.sources().iter().enumerate().map(row).collect();
         if is_due {

@@ -275,9 +275,11 @@ fn sensor_words(sensor: &SensorRow, long: bool) -> (String, Lamp) {
         SensorState::Ok if long => (format!("{id}{rate} {age}"), Lamp::Green),
         SensorState::Ok => (format!("{id}{rate}"), Lamp::Green),
         SensorState::Silent => (format!("{id} {} {age}", name.to_uppercase()), Lamp::Red),
-        SensorState::Never | SensorState::Stalled | SensorState::Hung | SensorState::Deaf => {
-            (format!("{id} {name}"), Lamp::Red)
-        }
+        SensorState::Never
+        | SensorState::Withheld
+        | SensorState::Stalled
+        | SensorState::Hung
+        | SensorState::Deaf => (format!("{id} {name}"), Lamp::Red),
         SensorState::Distrusted => (format!("{id} {name}"), Lamp::Amber),
     };
     let why = if long && !why.is_empty() { format!(": {why}") } else { String::new() };

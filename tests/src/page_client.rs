@@ -111,6 +111,19 @@ pub fn ask(
     (status, text)
 }
 
+/// Sends a GET request to a server that may close the connection; returns the status.
+///
+/// Errors: the server can't be reached, or has closed the connection without an answer.
+pub fn try_ask(address: &str, path: &str) -> std::io::Result<u16> {
+    let mut stream = TcpStream::connect(address)?;
+    stream.set_read_timeout(Some(WITHIN))?;
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n")?;
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer)?;
+    let status = answer.split(' ').nth(1).and_then(|status| status.parse().ok());
+    status.ok_or_else(|| std::io::ErrorKind::UnexpectedEof.into())
+}
+
 fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[u8]) -> Vec<u8> {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(WITHIN)).unwrap();
@@ -171,7 +184,7 @@ pub struct Viewer {
     schema: Value,
 }
 
-/// Violations, in a text message, of the schema for the message's type.
+/// Returns how a text message violates the schema of its type.
 fn faults(schema: &Value, text: &Value) -> Vec<String> {
     let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
         let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();

@@ -1,6 +1,7 @@
 //! Frontier: the stretch where samples may still land.
 //!
-//! The frontier decides when a section is open and when it is judged.
+//! The frontier decides when a section is open and when it is judged. The *reach of the heads* (in the code: zone)
+//! contains the sections on which samples of the awaited heads may land now, plus a margin.
 
 use core::ops::Range;
 
@@ -437,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn section_leaves_the_zone_when_the_rear_head_is_a_margin_past_the_section() {
+    fn section_leaves_the_reach_of_the_heads_when_the_rear_head_is_a_margin_past_it() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -448,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn sections_ahead_leave_the_zone_when_the_vehicle_moves_backwards() {
+    fn sections_ahead_leave_the_reach_of_the_heads_when_the_vehicle_moves_backwards() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 2.0, 0.25, 0.25);
         let moved = frontier.advance(0, MonoNs(1), 1.7, 0.25, 0.25);
@@ -471,7 +472,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_does_not_keep_sections_in_the_zone() {
+    fn silent_head_does_not_extend_the_reach_of_the_heads() {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
@@ -502,7 +503,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_motion_extends_the_coverage_extent_but_only_pings_of_live_heads_move_the_zone() {
+    fn vehicle_motion_without_pings_extends_only_the_coverage_extent() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 10, 3.5);
         frontier.ping(1, 10, 2.5);
@@ -523,7 +524,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_position_decides_which_sections_leave_the_zone_if_no_head_is_alive() {
+    fn silent_heads_are_assumed_to_move_with_the_vehicle_if_no_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);

@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn latest_missing_samples_of_a_head_get_the_new_cause() {
+    fn only_the_latest_missing_samples_of_a_head_get_the_new_cause() {
         let mut lacks = MissingSamples::default();
         let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
         for k in 0..ROOM + 100 {

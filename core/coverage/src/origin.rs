@@ -115,7 +115,7 @@ mod tests {
     /// Checks the probability that a run is wall in clear water. A boulder is as high as it is wide, and a side tunnel
     /// is wider than deep. Fish and second echoes are small and far from the wall.
     #[test]
-    fn wide_runs_near_the_wall_are_wall_and_small_runs_far_from_it_are_not() {
+    fn wide_runs_near_the_wall_are_wall_but_small_runs_far_from_it_are_not() {
         for (width_m, off_m, confirmed, least, most) in [
             (3.0, 0.5, 0.0, 0.999, 1.0),
             (3.0, 3.0, 0.0, 0.99, 1.0),
@@ -133,7 +133,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn odds_of_wall_are_higher_for_low_runs_for_confirmed_runs_and_in_clear_water(
+        fn odds_of_wall_grow_with_closeness_to_the_wall_confirmation_and_clear_water(
             width_m in 0.01f64..5.0,
             off_m in 0.05f64..5.0,
             confirmed in 0.0f64..3.0,
@@ -152,7 +152,7 @@ mod tests {
         /// even after a long dive: a slender run remains doubtful in the clearest water, and a run that two earlier
         /// passes have met is wall in the murkiest water.
         #[test]
-        fn experience_fades_and_never_decides_alone(runs in 0usize..100_000) {
+        fn experience_from_earlier_runs_never_decides_alone(runs in 0usize..100_000) {
             let slender = Extent { width_m: 0.2, off_m: 3.0, confirmed: 0.0, slopes: 0 };
             let boulder = Extent { width_m: 0.6, off_m: 0.4, confirmed: 0.0, slopes: 0 };
             let mut experience = Experience::default();

@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn movement_with_the_larger_distance_between_passes_counts_as_worse() {
+    fn worse_of_two_movements_is_that_with_the_larger_distance_between_passes() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));

@@ -216,7 +216,8 @@ impl Runs {
         }
     }
 
-    /// Whether a stretch is closed, or begins and ends with its own sections and is too far from others to be joined.
+    /// Whether a stretch is consistent. An open stretch must begin and end with its own sections, and must be too far
+    /// from other stretches to be joined. A closed stretch is always consistent.
     fn is_consistent(&self, id: RunId) -> bool {
         let is_own = |section: i64| self.of(section) == Some(id);
         let is_apart = |section: i64| self.of(section).is_none_or(|of| of == id);

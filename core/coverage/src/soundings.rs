@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_outside_the_grid_are_not_counted_and_counts_saturate() {
+    fn samples_outside_the_grid_are_not_counted() {
         let mut soundings = soundings(&[]);
         for (x_m, arc_m) in [(-3.3, 0.0), (20.1, 0.0), (f64::NAN, 0.0), (0.0, f64::NAN), (0.0, f64::INFINITY)]
         {

@@ -203,7 +203,7 @@ mod tests {
 
     /// A single section with a large error does not represent the stretch, however large its hole is.
     #[test]
-    fn figures_of_an_unsure_stretch_come_from_its_larger_group_of_sections() {
+    fn single_section_with_a_large_error_does_not_set_the_figures_of_its_stretch() {
         let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());
         let mut stretch = lost(0);
         assert!(stretch.is_mostly_error());

@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn state_is_restored_bit_for_bit_and_settings_are_unchanged() {
+    fn state_is_restored_bit_for_bit_without_changing_settings() {
         let bytes = saved(&machine("a", &[1, 2, 3]));
         let mut other = machine("b", &[]);
         (other.turned, other.places) = (0.0, [None; 40]);

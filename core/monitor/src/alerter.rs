@@ -14,6 +14,7 @@ use super::placer::Placed;
 use super::resources::Coverage;
 use super::result_stream::{RecordKind, ResultStream};
 use super::surveyor::Found;
+use crate::unread::UnreadPacket;
 use headrace_coverage::Metres;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful as _};
 use headrace_geometry::time::MonoNs;
@@ -83,7 +84,8 @@ impl Alerter {
     pub(super) fn tick(&mut self, placed: &Placed, found: &Found, advised: &Advised, now: MonoNs) {
         self.notices.clear();
         let (runs, commands) = (&found.runs[..], &placed.commands.0[..]);
-        let mut inputs = Inputs { runs, commands, events: &placed.events, taken: (0, 0, 0) };
+        let (events, unread) = (&placed.events[..], &placed.unread[..]);
+        let mut inputs = Inputs { runs, commands, events, unread, taken: Taken::default() };
         let mut results = advised.entries.iter().zip(&found.standings);
         for PlacedItem { event, placement } in &placed.items {
             let Placement::Update(update) = placement else { continue };
@@ -221,8 +223,24 @@ struct Inputs<'a> {
     runs: &'a [RunInput],
     commands: &'a [ReceivedCommand],
     events: &'a [Event],
-    /// Number of changed missed stretches, of commands and of events that have been applied so far.
-    taken: (usize, usize, usize),
+    unread: &'a [UnreadPacket],
+    taken: Taken,
+}
+
+/// Numbers of a tick's inputs that have been applied so far.
+#[derive(Debug, Clone, Copy, Default)]
+struct Taken {
+    runs: usize,
+    commands: usize,
+    events: usize,
+    unread: usize,
+}
+
+impl Inputs<'_> {
+    /// Number of packets without a reading that come before the event with this index.
+    fn unread_before(&self, event: usize) -> usize {
+        self.unread.partition_point(|packet| packet.before <= event)
+    }
 }
 
 impl Alerter {
@@ -230,7 +248,7 @@ impl Alerter {
     /// event after the update.
     fn take_before(&mut self, event: usize, inputs: &mut Inputs<'_>) {
         self.take_until(Some(event), inputs);
-        self.hear(inputs, event);
+        self.hear(inputs, event, inputs.unread_before(event));
     }
 
     /// Applies an advice update. All inputs before it must have been applied already.
@@ -242,7 +260,7 @@ impl Alerter {
     /// Applies the inputs that remain in the tick.
     fn take_rest(&mut self, inputs: &mut Inputs<'_>) {
         self.take_until(None, inputs);
-        self.hear(inputs, inputs.events.len());
+        self.hear(inputs, inputs.events.len(), inputs.unread.len());
     }
 
     /// Applies a changed missed stretch.
@@ -251,14 +269,21 @@ impl Alerter {
         self.list.take_run(run, &mut to);
     }
 
-    /// Records the times of the sensors' readings, up to the event with this index.
-    fn hear(&mut self, inputs: &mut Inputs<'_>, until: usize) {
-        for event in inputs.events.get(inputs.taken.2..until).unwrap_or_default() {
-            if let Some(slot) = self.state.heard.get_mut(event.source.index()) {
-                *slot = Some(event.received);
-            }
+    /// Records the sensors' readings and packets without a reading, up to the event and the packet with these
+    /// indexes.
+    fn hear(&mut self, inputs: &mut Inputs<'_>, until: usize, unread_until: usize) {
+        for (index, event) in inputs.events.iter().enumerate().take(until).skip(inputs.taken.events) {
+            self.hear_unread(inputs, inputs.unread_before(index).min(unread_until));
+            self.state.hear(event.source, event.received);
         }
-        inputs.taken.2 = until.max(inputs.taken.2);
+        inputs.taken.events = until.max(inputs.taken.events);
+        self.hear_unread(inputs, unread_until);
+    }
+
+    fn hear_unread(&mut self, inputs: &mut Inputs<'_>, until: usize) {
+        let packets = inputs.unread.get(inputs.taken.unread..until).unwrap_or_default();
+        packets.iter().for_each(|packet| self.state.hear_unread(packet));
+        inputs.taken.unread = until.max(inputs.taken.unread);
     }
 
     /// Applies changed missed stretches and commands: those before an advice update, or all if `beat` is `None`.
@@ -266,20 +291,20 @@ impl Alerter {
     /// A command comes before the results of the event that follows it.
     fn take_until(&mut self, beat: Option<usize>, inputs: &mut Inputs<'_>) {
         loop {
-            let run = inputs.runs.get(inputs.taken.0);
+            let run = inputs.runs.get(inputs.taken.runs);
             let run = run.filter(|run| {
                 beat.is_none_or(|event| run.event < event || run.event == event && run.at_beat)
             });
-            let command = inputs.commands.get(inputs.taken.1);
+            let command = inputs.commands.get(inputs.taken.commands);
             let command = command.filter(|command| beat.is_none_or(|event| command.before <= event));
             match (run, command) {
                 (Some(run), command) if command.is_none_or(|command| command.before > run.event) => {
-                    inputs.taken.0 += 1;
+                    inputs.taken.runs += 1;
                     self.take_run(run);
                 }
                 (_, Some(command)) => {
-                    inputs.taken.1 += 1;
-                    self.hear(inputs, command.before);
+                    inputs.taken.commands += 1;
+                    self.hear(inputs, command.before, command.before_unread);
                     self.take_command(command);
                 }
                 (_, None) => return,

@@ -107,6 +107,8 @@ pub struct SensorHealth {
     pub bytes: u64,
     /// Number of readings decoded.
     pub readings: u64,
+    /// Number of readings decoded but withheld.
+    pub withheld: u64,
     /// Receive times of the first and last packet.
     pub span: Option<(MonoNs, MonoNs)>,
     /// Longest time between two packets of the sensor.
@@ -174,7 +176,7 @@ pub struct HeadClassifier(pub(super) HeadWall);
 pub struct HeadSweep {
     /// Last valid sample in the present sweep of the head.
     pub(super) last: Option<LastSample>,
-    /// Returns that are classified only after the head's next returns.
+    /// Sonar returns that are classified only after the head's next returns.
     pub(super) waiting: WaitingReturns,
 }
 
@@ -188,7 +190,7 @@ pub(super) struct Waiting {
     pub(super) new_sweep: bool,
 }
 
-/// Returns of a head that wait for classification, in order.
+/// Sonar returns of a head that wait for classification, in order.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct WaitingReturns([Option<Waiting>; MOST_WAITING]);
 

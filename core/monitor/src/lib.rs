@@ -68,6 +68,7 @@ pub mod smoothing_changes;
 pub mod source;
 pub mod stage;
 pub mod surveyor;
+pub mod unread;
 pub mod unsure_stretch;
 pub mod view;
 pub mod voice;

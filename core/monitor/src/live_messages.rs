@@ -352,7 +352,7 @@ impl LiveMessages {
 
     /// Reports a missed stretch again if at least a metre of it fails for a cause not reported yet.
     ///
-    /// A pilot who follows only the earlier advice may miss that wall again.
+    /// A pilot who follows only the earlier advice may miss the same wall again.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let sections = &dive.view().coverage().sections;
         let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };

@@ -122,6 +122,11 @@ pub fn status_line(
     let mut parts = vec![what];
     // Failed metres come first, since a narrow screen leaves out the last parts.
     parts.extend(state.outstanding_text());
+    let ill_parts = |ill: SensorState| {
+        let sensors = state.sensors_that_are(ill);
+        sensors.map(move |source| format!("{} {}", name(source), sensor_words(ill)))
+    };
+    parts.extend(ill_parts(SensorState::Withheld));
     if !is_old {
         let silent: Vec<usize> = state.silent().collect();
         match silent.as_slice() {
@@ -134,10 +139,7 @@ pub fn status_line(
                 sensor_words(SensorState::Silent)
             )),
         }
-        for ill in [SensorState::Deaf, SensorState::Hung] {
-            let sensors = state.sensors_that_are(ill);
-            parts.extend(sensors.map(|source| format!("{} {}", name(source), sensor_words(ill))));
-        }
+        parts.extend([SensorState::Deaf, SensorState::Hung].into_iter().flat_map(ill_parts));
         let forecast = losses_text(state).or_else(|| forecast_text(state));
         let any_speed =
             matches!(condition, Condition::Passed | Condition::GoingBack(_) | Condition::Outside(_));
@@ -319,14 +321,16 @@ impl LiveMessage {
     pub fn adds_line(&self) -> bool {
         let Self::AlertChange { change, alert } = self else { return true };
         let is_left = matches!(alert.kind, "cable_left" | "time_left" | "battery_left");
-        let is_sensor =
-            matches!(alert.kind, "sensor_silent" | "sensor_stalled" | "sensor_deaf" | "sensor_hung");
+        let is_sensor = matches!(
+            alert.kind,
+            "sensor_silent" | "sensor_withheld" | "sensor_stalled" | "sensor_deaf" | "sensor_hung"
+        );
         let is_observed = alert.occurrences.is_some();
         let has_end_line =
             is_sensor || is_observed && !matches!(alert.kind, "outside_tunnel" | "profile_contradicted");
         match change {
             AlertChange::Acknowledged => true,
-            AlertChange::Raised => is_left || is_sensor || is_observed,
+            AlertChange::Raised => is_left || is_sensor || is_observed || alert.kind == "no_data",
             AlertChange::Changed => is_left || is_observed,
             // If nobody has acknowledged the alert, the line appears when the condition ends, not at the
             // acknowledgement.

@@ -59,7 +59,7 @@ impl Angles {
     }
 }
 
-/// Returns that one head loses by chance; part of the loop's state.
+/// Sonar returns that one head loses by chance; part of the loop's state.
 ///
 /// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
 /// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such missing returns

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn packets_exceeding_the_inbox_allowance_are_delayed_and_not_lost() {
+    fn packets_exceeding_the_inbox_allowance_are_delayed_but_not_lost() {
         let (mut to, mut readers) = ports(1);
         for i in 0..10 {
             to[0].send(MonoNs(i), &[i as u8; 10]).unwrap();

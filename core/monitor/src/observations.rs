@@ -153,7 +153,7 @@ impl Observations {
 
     /// Records a doubtful setting, found at a chainage, m.
     ///
-    /// If another setting becomes the one that is most likely wrong, counts an occurrence and returns true.
+    /// Counts an occurrence and returns true if a different setting is now the one that is most likely wrong.
     pub(crate) fn note_setting(&mut self, at: MonoNs, x_m: f64, doubt: &SettingDoubt) -> bool {
         let kind = ObservedKind::SettingDoubted;
         let known = self.get_mut(kind, None).and_then(|known| known.setting);

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn longer_range_uses_the_turn_period_of_the_mode_at_that_range() {
+    fn long_range_setting_uses_the_turn_period_of_the_mode_at_that_range() {
         let far = vec![mode("fast", 0.9, 10.0), mode("fastest", 2.4, 6.0)];
         assert!((of_head(&head(2.4, Some((12.0, far.clone()))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
         assert!((of_head(&head(0.9, Some((12.0, far))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);

@@ -41,9 +41,10 @@ const CONDITIONS: [Condition; 14] = [
     Condition::Good,
 ];
 const DOUBTS: [PositionDoubt; 2] = [PositionDoubt::Cable, PositionDoubt::Spread];
-const SENSOR_STATES: [SensorState; 7] = [
+const SENSOR_STATES: [SensorState; 8] = [
     SensorState::Never,
     SensorState::Silent,
+    SensorState::Withheld,
     SensorState::Stalled,
     SensorState::Deaf,
     SensorState::Hung,

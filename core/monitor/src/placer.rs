@@ -18,14 +18,15 @@ use super::entities::{
     LossCount, MeasuredMotion, Navigator, SensorDecoder, SensorHealth, VehicleEntities, VehicleState,
 };
 use super::error::PluginError;
-use super::merge::{Inbox, MAX_TICK_BYTES};
+use super::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
 use super::messages::{Event, PlacedItem, PlacedPing, Placement, Update};
 use super::part::Part;
 use super::result_stream::ResultStream;
 use super::ring::PortReader;
 use super::stage::{PlaceStage, Stage as _};
 use crate::console::packets::{Commands, Console, ConsoleCounts};
-use decode::Events;
+use crate::unread::UnreadPacket;
+use decode::{Events, UnreadPackets};
 use georeference::PlacedList;
 use headrace_fusion::Navigation;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
@@ -51,6 +52,8 @@ pub struct Placed {
     pub inbox: Inbox,
     /// Readings of the tick, in order.
     pub events: Vec<Event>,
+    /// Packets of the tick that gave no reading, in order.
+    pub(super) unread: Vec<UnreadPacket>,
     /// Georeferenced pings and advice updates of the tick, in order.
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
@@ -93,6 +96,14 @@ impl Placed {
         spans.reduce(|(first, last), (from, to)| (first.min(from), last.max(to)))
     }
 
+    /// Clears the lists of a tick, except its packets.
+    fn clear(&mut self) {
+        self.events.clear();
+        self.unread.clear();
+        self.items.clear();
+        self.commands.0.clear();
+    }
+
     /// Returns the placer's results for an empty tick that follows this tick.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut poses = self.poses.clone();
@@ -131,6 +142,7 @@ impl Placer {
         // During a tick, these lists are swapped with those of `Placed`.
         part.insert_resource(Inbox::default());
         part.insert_resource(Events::default());
+        part.insert_resource(UnreadPackets::default());
         part.insert_resource(PlacedList::default());
         part.insert_resource(Commands::default());
         part.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
@@ -155,9 +167,7 @@ impl Placer {
         part.world.resource_mut::<Inbox>().fill(readers, allowance_bytes);
         if part.world.resource::<Inbox>().is_empty() {
             self.swap_lists(into);
-            into.events.clear();
-            into.items.clear();
-            into.commands.0.clear();
+            into.clear();
         } else {
             for stage in PlaceStage::ALL {
                 part.run(*stage);
@@ -179,9 +189,7 @@ impl Placer {
     /// Takes waiting packets, at most `allowance_bytes` in total, without processing them. Allocates: never.
     pub(super) fn receive(&mut self, allowance_bytes: usize, into: &mut Placed) {
         into.inbox.fill(&mut self.readers, allowance_bytes);
-        into.events.clear();
-        into.items.clear();
-        into.commands.0.clear();
+        into.clear();
     }
 
     /// Returns the results so far, with room for a tick of any size. Allocates: all memory of the lists.
@@ -189,6 +197,7 @@ impl Placer {
         let mut placed = Placed {
             inbox: Inbox::with_room(),
             events: Vec::with_capacity(MAX_TICK_READINGS),
+            unread: Vec::with_capacity(MAX_TICK_PACKETS),
             items: Vec::with_capacity(2 * MAX_TICK_READINGS),
             ..Placed::default()
         };
@@ -201,6 +210,7 @@ impl Placer {
         let world = &mut self.part.world;
         core::mem::swap(&mut *world.resource_mut::<Inbox>(), &mut with.inbox);
         core::mem::swap(&mut world.resource_mut::<Events>().0, &mut with.events);
+        core::mem::swap(&mut world.resource_mut::<UnreadPackets>().0, &mut with.unread);
         core::mem::swap(&mut world.resource_mut::<PlacedList>().0, &mut with.items);
         core::mem::swap(&mut *world.resource_mut::<Commands>(), &mut with.commands);
     }
@@ -304,6 +314,7 @@ mod tests {
             TypeId::of::<VehicleEntities>(),
             TypeId::of::<Commands>(),
             TypeId::of::<Events>(),
+            TypeId::of::<UnreadPackets>(),
             TypeId::of::<Inbox>(),
             TypeId::of::<PlacedList>(),
             TypeId::of::<PositionedList>(),

@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn short_text_is_kept_and_long_text_is_cut_in_records() {
+    fn only_long_texts_are_cut_in_records() {
         for (text, back) in [("", ""), ("0.3 deg", "0.3 deg"), ("a mode's long name", "a mode's long na")] {
             let mut stream = ResultStream::default();
             stream.keep();

@@ -24,6 +24,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::device_clock::ClockReport;
+use headrace_sensor::withheld::WithheldReason;
 use headrace_vehicle::Mission;
 
 /// Number of sections judged per batch at the end of a dive. The notices of a batch are delivered before the
@@ -411,9 +412,11 @@ impl Loop {
         self.ahead().0.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.counts()).collect()
     }
 
-    /// Number of readings that each source's decoder understood but withheld, in the order of the sources.
-    pub fn decoder_withheld(&self) -> Vec<u64> {
-        self.ahead().0.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.withheld()).collect()
+    /// Number of readings that each source's decoder understood but withheld, and the reason for the last of
+    /// them, in the order of the sources.
+    pub fn decoder_withheld(&self) -> Vec<(u64, Option<WithheldReason>)> {
+        let decoders = self.ahead().0.of_sensors::<SensorDecoder>();
+        decoders.map(|decoder| (decoder.0.withheld(), decoder.0.withheld_reason())).collect()
     }
 
     /// Device clock statistics of each source, in the order of the sources.

@@ -1,4 +1,4 @@
-//! One section as the report, the page and the tables give it. All three encode this row.
+//! Row of one section for the report, the page and the tables. All three encode this row.
 
 use serde::{Serialize, Serializer};
 
@@ -88,7 +88,8 @@ pub struct DeviationReport {
     pub outmost_m: f64,
     /// Ratio of the cross-section area to the design's; `None` without sweeps.
     pub area_ratio: Option<f64>,
-    /// Whether most samples deviate by more than the contradiction limit, and no other head found that wall.
+    /// Whether most samples deviate from the design profile by more than the contradiction limit, and no other head
+    /// measured the wall at the same place.
     pub contradicts: bool,
 }
 

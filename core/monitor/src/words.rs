@@ -6,9 +6,11 @@
 use crate::alert_list::kind::Priority;
 use crate::live_state::condition::Condition;
 use crate::live_state::state::{PositionDoubt, SensorState};
+use crate::unread::WithheldReadings;
 use headrace_coverage::Verdict;
 use headrace_fusion::NoFix;
 use headrace_sampling::advice::Reason;
+use headrace_sensor::withheld::WithheldReason;
 
 /// Name of the condition after sensors have begun to deliver data and before the first advice update.
 pub const STARTING: &str = "STARTING";
@@ -49,7 +51,7 @@ impl ConditionWords {
 /// Words for a condition.
 pub fn condition_words(condition: Condition) -> ConditionWords {
     let [name, detail, action, speed] = match condition {
-        Condition::NoData => ["WAITING", "nothing from any sensor yet", "", ""],
+        Condition::NoData => ["WAITING", "no reading from any sensor yet", "", ""],
         Condition::Old(_) => ["OLD", "nothing from any sensor", "stop", ""],
         Condition::NoPosition(lacking) => ["NO POSITION", missing_words(lacking), "hold still", ""],
         Condition::Outside(_) => ["OUTSIDE", "no head is within the tunnel", "", ""],
@@ -111,11 +113,42 @@ pub fn sensor_words(state: SensorState) -> &'static str {
     match state {
         SensorState::Never => "no data yet",
         SensorState::Silent => "silent",
+        SensorState::Withheld => "readings withheld",
         SensorState::Stalled => "doesn't turn",
         SensorState::Deaf => "detects no wall",
         SensorState::Hung => "stuck",
         SensorState::Distrusted => "not trusted",
         SensorState::Ok => "ok",
+    }
+}
+
+/// Text of a sensor's withheld readings: their number, and the reason.
+pub fn withheld_text(readings: WithheldReadings) -> String {
+    let WithheldReadings { count, reason } = readings;
+    let reason = match reason {
+        WithheldReason::NoMessage => return format!("{count} packets without a message of this device"),
+        WithheldReason::OtherDevice => "they have the id of another device".to_owned(),
+        WithheldReason::OtherRange => "measured at another range than the vehicle file's".to_owned(),
+        WithheldReason::NoCalibration => "calibration unknown".to_owned(),
+        WithheldReason::MarkedInvalid => "marked invalid by the device".to_owned(),
+        WithheldReason::Fault => "the device reports a fault".to_owned(),
+        WithheldReason::Implausible => "values that cannot be".to_owned(),
+        WithheldReason::Repeated => "the device repeats one reading".to_owned(),
+        WithheldReason::Late { age_s, at_most_s } => format!("{age_s:.1} s late, at most {at_most_s} s"),
+    };
+    format!("{count} readings withheld: {reason}")
+}
+
+/// Action against withheld readings.
+pub fn withheld_action(reason: WithheldReason) -> &'static str {
+    match reason {
+        WithheldReason::NoMessage | WithheldReason::OtherDevice => {
+            "check its plugin, connection and ids in the vehicle file"
+        }
+        WithheldReason::OtherRange => "write the device's range in the vehicle file",
+        WithheldReason::NoCalibration => "write its calibration in the vehicle file",
+        WithheldReason::MarkedInvalid | WithheldReason::Implausible => "check its mounting and its view",
+        WithheldReason::Fault | WithheldReason::Repeated | WithheldReason::Late { .. } => "restart it",
     }
 }
 

@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn first_head_outside_its_own_sector_is_an_error() {
+    fn head_1_outside_its_own_sector_is_an_error() {
         let sector = Sector { number: 1, of: 4, behind_m: 0.5, reversed: false };
         let at = |angle_rad: f64| in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.1);
         assert!(at(0.0).is_ok() && at(TAU / 4.0).is_ok());

@@ -41,9 +41,9 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 /// Part of a target reserved for position errors, m.
 ///
 /// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
-/// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth
-/// of the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
-/// without margin. A larger margin would slow the vehicle by more than it is worth.
+/// distance between neighbouring samples of one turn. The margin is continuous in all inputs. It is at most a fifth of
+/// the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
+/// without margin. A larger margin would cost too much speed.
 pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
     let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
@@ -139,7 +139,7 @@ pub enum Margin {
     Swing,
     /// Uncertain position of the vehicle.
     Position,
-    /// Returns that the heads lose by chance.
+    /// Sonar returns that the heads lose by chance.
     Losses,
 }
 

@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn box_around_a_head_hides_nothing_and_tube_around_it_hides_all() {
+    fn box_around_a_head_hides_no_angle_but_tube_around_it_hides_all_angles() {
         let around = Obstacle::Box { least: Vec3::new(-1.0, -1.0, -1.0), most: Vec3::new(1.0, 1.0, 1.0) };
         assert!(hidden_angles(&head([0.0; 3], false).mount, &[around]).is_empty());
         let ring: Vec<Obstacle> = (0..4)

@@ -218,7 +218,7 @@ mod tests {
         /// Theorem 1: distances between samples on a flat wall grow with the distance from the foot of the
         /// perpendicular.
         #[test]
-        fn flat_wall_sample_distances_grow_with_distance_from_the_perpendicular(h in 0.01..100.0f64, step in 1e-4..0.3f64, share in 0.0..1.0f64) {
+        fn distances_between_samples_on_a_flat_wall_grow_away_from_its_nearest_point(h in 0.01..100.0f64, step in 1e-4..0.3f64, share in 0.0..1.0f64) {
             let last = headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1;
             prop_assume!(last >= 2);
             let m = 1 + headrace_geometry::math::floor_to_i64(share * (last - 1) as f64);

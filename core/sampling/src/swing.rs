@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn small_swing_is_attenuated_continuously_and_large_swing_counts_fully() {
+    fn small_swing_is_attenuated_but_large_swing_counts_fully() {
         let ramp = |rad: f64| {
             let (looks, now) = looks(40.0, move |t| [rad * math::sin(TAU * t / 4.0), 0.0]);
             looks.swing(now, 2.0, 0.0).rate_radps * 2.0
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn pitch_swing_counts_and_pass_intervals_beyond_the_history_use_its_oldest_direction() {
+    fn pass_interval_beyond_the_history_uses_its_oldest_direction() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
         // The largest rotation is from the oldest stored direction to the direction farthest from it.
@@ -292,7 +292,7 @@ mod tests {
 
     /// The vehicle has a yaw of 0.1 rad, then no position for a minute, then no yaw, and at the end a yaw of 0.01 rad.
     #[test]
-    fn recent_swing_begins_after_an_interruption_and_is_continued_backwards() {
+    fn recent_swing_uses_only_the_directions_after_an_interruption() {
         let mut looks = Looks::default();
         let mut keep = |seconds: f64, yaw: f64| {
             let look = Rot::from_roll_pitch_yaw(0.0, 0.0, yaw) * Vec3::<Body>::new(1.0, 0.0, 0.0);

@@ -178,7 +178,7 @@ mod tests {
     /// Without swing, the result is about a sixth below the bound, because speeds up to 20 % higher must also meet the
     /// target.
     #[test]
-    fn steady_vehicle_gets_a_speed_10_to_25_percent_below_the_bound() {
+    fn steady_vehicle_gets_a_speed_10_to_25_percent_below_the_theoretical_limit() {
         let (bound_mps, found_mps) = (TARGET_M / (TURN_S / 2.0), highest(0.0, 20.0, 0.0));
         assert!((0.75 * bound_mps..0.9 * bound_mps).contains(&found_mps), "{found_mps} m/s");
         assert!(highest(0.005, 20.0, 0.0) < found_mps);

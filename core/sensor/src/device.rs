@@ -11,6 +11,7 @@ use super::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
 use super::reading::{Decoded, Packet};
 use crate::codec::CodecCounts;
 use crate::device_clock::ClockReport;
+use crate::withheld::WithheldReason;
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::site::Site;
@@ -229,11 +230,13 @@ pub trait Decoder: Stateful + Send + Sync {
     fn counts(&self) -> CodecCounts;
 
     /// Number of readings that were decoded but withheld.
-    ///
-    /// Reasons: a bad status, a range setting other than the configured one, an unknown calibration, a jump, or an
-    /// orientation that the device marks as invalid.
     fn withheld(&self) -> u64 {
         0
+    }
+
+    /// Reason for which the last withheld reading was withheld; `None` if there is none.
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        None
     }
 
     /// Returns statistics of the device's clock against the host's; `None` if the device does not send its time.

@@ -15,7 +15,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Maximum number of stretches of time for which a stamp is kept.
 const PLACES: usize = 128;
 
-/// Initial length of a stretch of time, measured by the device's clock.
+/// Length of a stretch of time (one stamp is kept per stretch) before any stretches are merged, ns of the device's
+/// clock. Each merge doubles it.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
 /// Minimum number of stretches of time for a drift estimate. The scatter of fewer stamps is a poor measure of the

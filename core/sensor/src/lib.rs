@@ -40,6 +40,7 @@ pub mod driver;
 pub mod measurement;
 pub mod reading;
 pub mod sample_times;
+pub mod withheld;
 
 pub use device::SensorConfig;
 pub use headrace_config as config;

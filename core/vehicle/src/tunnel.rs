@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn polyline_vertices_keep_their_line_numbers_and_errors_name_the_line() {
+    fn errors_in_polyline_vertices_name_their_line() {
         let read = parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap();
         assert_eq!(read, (vec![[1.0, 2.0], [-1.0, 2.0]], vec![2, 4]));
         assert_eq!(parse_points(&"1,2\n".repeat(MOST_POINTS)).unwrap().0.len(), MOST_POINTS);

@@ -10,7 +10,7 @@ use headrace_cost::trades::survey;
 use headrace_devices::KINDS;
 
 #[test]
-fn survey_hours_add_up_and_true_holes_stay_within_the_planned_target() {
+fn true_holes_of_a_survey_stay_within_the_planned_target() {
     let text = file("vita1.toml").unwrap();
     let inputs = Inputs { effort: Effort::Quick, kinds: &KINDS, vehicle: Some(("VITA 1", text)) };
     let trade = survey::measure(&inputs, &mut |_| {}).unwrap();

@@ -39,7 +39,7 @@ fn is_whole(trade: &Trade) {
 }
 
 #[test]
-fn filter_is_more_accurate_than_the_cable_alone_and_each_setting_changes_its_result() {
+fn filter_is_more_accurate_than_the_cable_alone() {
     let trade = measured(navigation::measure);
     is_whole(&trade);
     let of = |scene: &str, value: &str, name: &str| figure(&trade, [scene, "method", value], name);
@@ -89,7 +89,7 @@ fn tick_length_changes_no_verdict_but_a_coarse_profile_changes_the_advice() {
 }
 
 #[test]
-fn omitting_an_effect_changes_the_result_and_more_rays_per_beam_reduce_the_error() {
+fn omitting_an_effect_changes_the_result() {
     let trade = measured(simulation::measure);
     is_whole(&trade);
     for scene in ["boulders", "small pipe"] {

@@ -10,6 +10,7 @@ use headrace_sensor::geometry::frames::{Sensor, Vec3};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{Decoded, Packet, Reading};
 use headrace_sensor::stateful;
+use headrace_sensor::withheld::WithheldReason;
 use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
@@ -83,9 +84,11 @@ struct State {
     meaning: DecoderSettings,
     last: Option<Velocity>,
     withheld: Withheld,
+    /// Reason for the last withheld report.
+    reason: Option<WithheldReason>,
 }
 
-stateful!(State { state: last, withheld; fixed: meaning; });
+stateful!(State { state: last, withheld, reason; fixed: meaning; });
 
 /// Converts a vector from device axes to headrace's, or back.
 pub fn to_ours([x, y, z]: [f64; 3]) -> Vec3<Sensor> {
@@ -95,7 +98,7 @@ pub fn to_ours([x, y, z]: [f64; 3]) -> Vec3<Sensor> {
 impl A50Decoder {
     /// Creates a decoder with these settings.
     pub fn new(meaning: DecoderSettings) -> Self {
-        let state = State { meaning, last: None, withheld: Withheld::default() };
+        let state = State { meaning, last: None, withheld: Withheld::default(), reason: None };
         Self { codec: LineCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
@@ -124,6 +127,10 @@ impl Decoder for A50Decoder {
     fn withheld(&self) -> u64 {
         self.state.withheld.total()
     }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        self.state.reason
+    }
 }
 
 impl State {
@@ -133,32 +140,41 @@ impl State {
         let delay_us =
             report.times_us.map_or(0, |[validity, transmission]| transmission.saturating_sub(validity));
         let why = &mut self.withheld;
-        let reason = if !report.is_valid {
-            &mut why.invalid
+        let (count, reason) = if !report.is_valid {
+            (&mut why.invalid, WithheldReason::MarkedInvalid)
         } else if report.status != 0 {
-            &mut why.status
+            (&mut why.status, WithheldReason::Fault)
         } else if report.against == Against::Water {
-            &mut why.water
+            (&mut why.water, WithheldReason::MarkedInvalid)
         } else if report.valid_beams < LEAST_BEAMS {
-            &mut why.beams
+            (&mut why.beams, WithheldReason::MarkedInvalid)
         } else if !ALTITUDES_M.contains(&report.altitude_m) {
-            &mut why.altitude
+            (&mut why.altitude, WithheldReason::Implausible)
         } else if !(0.0..=self.meaning.fom_max_mps).contains(&report.fom_mps) {
-            &mut why.fom
+            (&mut why.fom, WithheldReason::Implausible)
         } else if velocity.norm() > self.meaning.max_speed_mps {
-            &mut why.speed
-        } else if !(0..=MOST_DELAY_US).contains(&delay_us) {
-            &mut why.times
+            (&mut why.speed, WithheldReason::Implausible)
+        } else if delay_us < 0 {
+            (&mut why.times, WithheldReason::Implausible)
+        } else if delay_us > MOST_DELAY_US {
+            (&mut why.times, late(delay_us))
         } else if last.is_some_and(|last| repeats(report, &last)) {
-            &mut why.repeated
+            (&mut why.repeated, WithheldReason::Repeated)
         } else {
             let delay = DurNs(delay_us * 1000);
             let valid_at = received - (self.meaning.latency + delay);
             return Some(Decoded { valid_at, reading: Reading::VelocityOverGround(velocity) });
         };
-        *reason += 1;
+        *count += 1;
+        self.reason = Some(reason);
         None
     }
+}
+
+/// Reason for withholding a report that was sent this long after its measurement.
+fn late(delay_us: i64) -> WithheldReason {
+    let seconds = |us: i64| DurNs(us.saturating_mul(1000)).as_secs_f64();
+    WithheldReason::Late { age_s: seconds(delay_us), at_most_s: seconds(MOST_DELAY_US) }
 }
 
 /// Whether a report repeats the previous one: both have the same timestamp, or their values are bit-identical. Noise

@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn busy_status_is_accepted_and_zero_counts_are_refused() {
+    fn measurement_with_zero_counts_is_refused() {
         assert!(measured([0x60, 0x46, 0x46, 0x4F, 0xA0]).status.is_busy());
         assert!(matches!(
             Transaction::decode(&[MEASURE, 0x40, 0, 0, 0x4F, 0xA0]),

@@ -5,6 +5,7 @@ use headrace_sensor::device::Decoder;
 use headrace_sensor::geometry::time::DurNs;
 use headrace_sensor::reading::{Decoded, Packet, Reading, WaterPressure};
 use headrace_sensor::snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_sensor::withheld::WithheldReason;
 
 use crate::calibration::{Calibration, CalibrationCells, CalibrationError, Overrides};
 use crate::codec::{Bar100Codec, Measurement, Transaction};
@@ -31,17 +32,19 @@ pub struct Bar100Decoder {
     cells: CalibrationCells,
     calibration: Result<Option<Calibration>, CalibrationError>,
     withheld: u64,
+    /// Reason for the last withheld measurement.
+    reason: Option<WithheldReason>,
 }
 
 impl Stateful for Bar100Decoder {
     fn save(&self, to: &mut Saver) {
         self.codec.save(to);
-        to.value(&(self.cells, self.withheld));
+        to.value(&(self.cells, self.withheld, self.reason));
     }
 
     fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
         self.codec.restore(from)?;
-        (self.cells, self.withheld) = from.value()?;
+        (self.cells, self.withheld, self.reason) = from.value()?;
         self.calibration = self.cells.calibration(&self.meaning.overrides);
         Ok(())
     }
@@ -52,7 +55,7 @@ impl Bar100Decoder {
     pub fn new(meaning: DecoderSettings) -> Self {
         let cells = CalibrationCells::default();
         let calibration = cells.calibration(&meaning.overrides);
-        Self { codec: Bar100Codec::default(), meaning, cells, calibration, withheld: 0 }
+        Self { codec: Bar100Codec::default(), meaning, cells, calibration, withheld: 0, reason: None }
     }
 
     /// The calibration in use, if known.
@@ -74,20 +77,27 @@ fn water_pressure(measured: Measurement, calibration: &Calibration, ambient_bar:
 
 impl Decoder for Bar100Decoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
-        let Self { codec, meaning, cells, calibration, withheld } = self;
+        let Self { codec, meaning, cells, calibration, withheld, reason } = self;
         let valid_at = packet.received - meaning.latency;
         let mut take = |transaction: Transaction| match transaction {
             Transaction::Memory(word) => {
                 cells.note(&word);
                 *calibration = cells.calibration(&meaning.overrides);
             }
-            Transaction::Measurement(measured) => match calibration {
-                Ok(Some(known)) if !(meaning.reject_busy && measured.status.is_busy()) => {
-                    let pressure = water_pressure(measured, known, meaning.ambient_bar);
-                    sink(Decoded { valid_at, reading: Reading::Pressure(pressure) });
+            Transaction::Measurement(measured) => {
+                let known = calibration.ok().flatten();
+                match known.filter(|_| !(meaning.reject_busy && measured.status.is_busy())) {
+                    Some(known) => {
+                        let pressure = water_pressure(measured, &known, meaning.ambient_bar);
+                        sink(Decoded { valid_at, reading: Reading::Pressure(pressure) });
+                    }
+                    None => {
+                        *withheld += 1;
+                        let busy = known.map(|_| WithheldReason::Fault);
+                        *reason = Some(busy.unwrap_or(WithheldReason::NoCalibration));
+                    }
                 }
-                _ => *withheld += 1,
-            },
+            }
         };
         codec.push(packet.bytes, &mut take);
         codec.flush(&mut take);
@@ -100,5 +110,9 @@ impl Decoder for Bar100Decoder {
     /// Number of measurements withheld because the calibration was unknown or invalid, or the status was busy.
     fn withheld(&self) -> u64 {
         self.withheld
+    }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        self.reason
     }
 }

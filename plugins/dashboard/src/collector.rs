@@ -91,7 +91,7 @@ pub struct Collector {
     skips: bool,
     back_due: bool,
     notes_due: bool,
-    /// The latest list of missed stretches that was sent, with its time and the length of the way back.
+    /// The most recently sent list of missed stretches, with its time and the length of the way back, m.
     back_told: Option<(MonoNs, f64, Value)>,
     /// Depth by the latest reading of the pressure sensor, m.
     depth_m: Option<f64>,

@@ -22,8 +22,10 @@ pub struct ComparedJson {
     pub fail_m: f64,
     /// Length of the sections with the verdict "can't say", m.
     pub cannot_say_m: f64,
-    /// Length of the sections with the verdict "open", m.
+    /// Length of the sections with the verdict "open", without those not inspected, m.
     pub open_m: f64,
+    /// Length of the sections with the verdict "open" that are not inspected, m.
+    pub not_inspected_m: f64,
 }
 
 /// Verdicts for a second target, as of the latest comparison.
@@ -50,14 +52,20 @@ impl Compared {
         }
         self.at = Some(now);
         let verdicts: BTreeMap<_, _> = dive.verdicts_at(self.target_m).into_iter().collect();
-        let section_m = dive.view().coverage().sections.section_m();
-        let metres = |of: Verdict| section_m * verdicts.values().filter(|one| **one == of).count() as f64;
+        let sections = &dive.view().coverage().sections;
+        let is_not_inspected = |index: i64| sections.get(index).is_some_and(|section| section.not_inspected);
+        let metres =
+            |of: Verdict| sections.section_m() * verdicts.values().filter(|one| **one == of).count() as f64;
+        let not_inspected =
+            verdicts.iter().filter(|(index, one)| **one == Verdict::Open && is_not_inspected(**index));
+        let not_inspected_m = sections.section_m() * not_inspected.count() as f64;
         self.json = ComparedJson {
             target_m: self.target_m,
             pass_m: metres(Verdict::Pass),
             fail_m: metres(Verdict::Fail),
             cannot_say_m: metres(Verdict::CannotSay),
-            open_m: metres(Verdict::Open),
+            open_m: metres(Verdict::Open) - not_inspected_m,
+            not_inspected_m,
         };
         let differs = |(index, verdict): &(&i64, &Verdict)| self.verdicts.get(index) != Some(*verdict);
         verdicts.iter().filter(differs).map(|(index, _)| *index).for_each(changed);

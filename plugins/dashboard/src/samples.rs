@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn jump_back_hides_later_samples_and_stores_none_twice() {
+    fn playback_jump_back_hides_the_samples_after_the_new_time() {
         let mut samples = filled(1000);
         samples.jump(49);
         assert_eq!((samples.len(), samples.between(0.0, 9.0, 9999).0.len()), (500, 500));

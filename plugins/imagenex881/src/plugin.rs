@@ -11,6 +11,7 @@ use headrace_sensor::geometry::time::DurNs;
 use headrace_sensor::reading::{Decoded, Packet, Reading, SonarReturn};
 use headrace_sensor::sampling::head::{HeadMode, HeadSpec};
 use headrace_sensor::stateful;
+use headrace_sensor::withheld::WithheldReason;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{Header, Model, Return, ReturnCodec, Returns, SOUND_SPEED_MPS, Tag};
@@ -173,14 +174,16 @@ struct Reader {
     settings: Settings,
     latency: DurNs,
     rejected: Rejected,
+    /// Reason for the last rejected return.
+    reason: Option<WithheldReason>,
 }
 
-stateful!(Reader { state: rejected; fixed: settings, latency; });
+stateful!(Reader { state: rejected, reason; fixed: settings, latency; });
 
 impl HeadDecoder {
     /// Creates a decoder. A position past +180 degrees makes a frame bad, whatever the head id.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
-        let reader = Reader { settings, latency, rejected: Rejected::default() };
+        let reader = Reader { settings, latency, rejected: Rejected::default(), reason: None };
         let codec = ReturnCodec::new(Returns { model: Some(Model::Head881) });
         Self { codec, clock: LineClock::new(SILENCE), reader }
     }
@@ -209,6 +212,10 @@ impl Decoder for HeadDecoder {
     fn withheld(&self) -> u64 {
         self.rejected().total()
     }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        self.reader.reason
+    }
 }
 
 impl Reader {
@@ -218,20 +225,21 @@ impl Reader {
         let profile_mm = header.profile_mm(Model::Head881);
         let Rejected { status, head_id, tag, range_setting, beyond_range } = &mut self.rejected;
         let reason = if header.head_id != command.head_id {
-            Some(head_id)
+            Some((head_id, WithheldReason::OtherDevice))
         } else if header.tag.is_gs() {
-            Some(tag)
+            Some((tag, WithheldReason::NoMessage))
         } else if !header.status.accepted() || header.status.overrun() {
-            Some(status)
+            Some((status, WithheldReason::Fault))
         } else if header.range_m != command.range_m {
-            Some(range_setting)
+            Some((range_setting, WithheldReason::OtherRange))
         } else if profile_mm.is_some_and(|mm| mm > u32::from(header.range_m) * 1000) {
-            Some(beyond_range)
+            Some((beyond_range, WithheldReason::Implausible))
         } else {
             None
         };
-        if let Some(count) = reason {
+        if let Some((count, reason)) = reason {
             *count += 1;
+            self.reason = Some(reason);
             return None;
         }
         Some(SonarReturn {

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn probe_finds_heads_with_other_ids() {
+    fn probe_finds_a_head_with_id_0x13() {
         let mut probe = HeadProbe::default();
         for answer in answers("mode = \"slow\"\nhead_id = 0x13") {
             probe.heard(&answer);

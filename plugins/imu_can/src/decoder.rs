@@ -8,6 +8,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 use headrace_sensor::sample_times::SampleTimes;
 use headrace_sensor::stateful;
+use headrace_sensor::withheld::WithheldReason;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{ImuCodec, Message, MessageSet};
@@ -148,6 +149,10 @@ impl Decoder for ImuDecoder {
     /// Number of values withheld because the unit marked them invalid.
     fn withheld(&self) -> u64 {
         self.state.withheld
+    }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        (self.state.withheld > 0).then_some(WithheldReason::MarkedInvalid)
     }
 
     fn clock(&self) -> Option<ClockReport> {

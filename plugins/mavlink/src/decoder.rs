@@ -8,6 +8,7 @@ use headrace_sensor::geometry::math;
 use headrace_sensor::geometry::time::DurNs;
 use headrace_sensor::reading::{Decoded, EchoRange, Packet, Reading, WaterPressure};
 use headrace_sensor::stateful;
+use headrace_sensor::withheld::WithheldReason;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{Frame, Frames, MavlinkCodec, is_autopilots_heartbeat, system_of};
@@ -90,9 +91,11 @@ struct State {
     system_id: Option<u8>,
     passed_over: u64,
     withheld: u64,
+    /// Reason for the last withheld message.
+    reason: Option<WithheldReason>,
 }
 
-stateful!(State { state: boot, system_id, passed_over, withheld; fixed: meaning; });
+stateful!(State { state: boot, system_id, passed_over, withheld, reason; fixed: meaning; });
 
 /// The autopilot's 32-bit millisecond clock, without wraps.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -117,7 +120,8 @@ impl MavlinkDecoder {
     /// Creates a decoder with these settings.
     pub fn new(meaning: DecoderSettings) -> Self {
         let system_id = meaning.system_id;
-        let state = State { meaning, boot: BootClock::default(), system_id, passed_over: 0, withheld: 0 };
+        let boot = BootClock::default();
+        let state = State { meaning, boot, system_id, passed_over: 0, withheld: 0, reason: None };
         Self { codec: MavlinkCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
@@ -153,6 +157,10 @@ impl Decoder for MavlinkDecoder {
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        self.state.reason
+    }
 }
 
 impl State {
@@ -162,7 +170,7 @@ impl State {
         if is_ours {
             self.take_own(frame, sink);
         } else if self.is_of_part(frame) {
-            self.withheld += 1;
+            self.withhold(WithheldReason::OtherDevice);
         } else {
             self.passed_over += 1;
         }
@@ -216,8 +224,13 @@ impl State {
     fn tell(&mut self, reading: Option<Reading>, sink: &mut dyn FnMut(Reading)) {
         match reading.filter(Reading::is_finite) {
             Some(reading) => sink(reading),
-            None => self.withheld += 1,
+            None => self.withhold(WithheldReason::Implausible),
         }
+    }
+
+    fn withhold(&mut self, reason: WithheldReason) {
+        self.withheld += 1;
+        self.reason = Some(reason);
     }
 }
 
@@ -282,7 +295,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn autopilot_clock_unwraps_and_may_step_back() {
+    fn autopilot_clock_may_wrap_or_step_back() {
         let mut clock = BootClock::default();
         for (time_ms, since_boot_ms) in
             [(4_294_967_000, 4_294_967_000), (4_294_966_990, 4_294_966_990), (4, 4_294_967_300_i64)]

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn named_value_message_carries_its_name_and_refuses_reserved_names() {
+    fn named_value_message_refuses_reserved_names() {
         let mut speaker = Speaker::new(1);
         let (_, id, payload) = parts(&speaker.figure("HR_VMAX", 1234, 0.25).unwrap());
         assert_eq!(id, 251);

@@ -174,7 +174,7 @@ fn pressures_match_the_emulated_pressures_within_half_a_quantum() {
 }
 
 #[test]
-fn distances_match_the_emulated_distances_and_a_missing_echo_gives_no_distance() {
+fn decoded_distances_match_the_emulated_distances() {
     let own = "part = \"distance\"\norientation = 25\nsensor_id = 3\nsound_speed_mps = 1500\n";
     let device = configured(own).unwrap();
     assert_eq!(device.sense(), Sense::Echosounder);
@@ -312,7 +312,7 @@ fn wrong_keys_of_the_vehicle_file_are_named() {
 }
 
 #[test]
-fn anonymising_removes_positions_and_ids_and_keeps_readings() {
+fn anonymising_removes_positions_and_ids_but_keeps_readings() {
     // The removed messages are GLOBAL_POSITION_INT in both versions; the one in version 2 is signed.
     let first = [&[0xFE, 28, 0, 1, 1, 33][..], &[7; 28], &[0, 0]].concat();
     let second = [&[0xFD, 20, 1, 0, 0, 1, 1, 33, 0, 0][..], &[7; 20], &[0, 0], &[9; 13]].concat();
@@ -353,7 +353,7 @@ fn heartbeat_of(system_id: u32, mavtype: MavType, autopilot: MavAutopilot) -> Ve
 }
 
 #[test]
-fn first_autopilot_is_used_and_others_are_counted() {
+fn only_the_autopilot_received_first_is_used() {
     let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
     let station = heartbeat_of(255, MavType::MAV_TYPE_GCS, MavAutopilot::MAV_AUTOPILOT_INVALID);
     let other = heartbeat_of(3, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);

@@ -10,6 +10,7 @@ use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Probe};
 use headrace_sensor::geometry::time::DurNs;
 use headrace_sensor::reading::{Decoded, EchoRange, Packet, Reading};
 use headrace_sensor::stateful;
+use headrace_sensor::withheld::WithheldReason;
 
 use crate::codec::{Addressed, Distance, DistanceSimple, Frame, Frames, Message, PingCodec};
 use crate::driver::{CARRIERS, PingDriver};
@@ -110,27 +111,31 @@ pub struct PingDecoder {
     settings: Settings,
     latency: DurNs,
     withheld: u64,
+    reason: Option<WithheldReason>,
 }
 
-stateful!(PingDecoder { state: codec, clock, withheld; fixed: settings, latency; });
+stateful!(PingDecoder { state: codec, clock, withheld, reason; fixed: settings, latency; });
 
 impl PingDecoder {
     /// Creates a decoder with these settings.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
         let (codec, clock) = (PingCodec::default(), LineClock::new(SILENCE));
-        Self { codec, clock, settings, latency, withheld: 0 }
+        Self { codec, clock, settings, latency, withheld: 0, reason: None }
     }
 }
 
 impl Decoder for PingDecoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
-        let Self { codec, clock, settings, latency, withheld } = self;
+        let Self { codec, clock, settings, latency, withheld, reason } = self;
         clock.push(codec, packet.received, packet.bytes, |received, frame| {
             let Some(frame) = Frame::parse(frame) else { return };
             let Some((distance_mm, confidence_percent)) = distance(&frame) else { return };
             // Values above 100 per cent are undefined, so the distance is withheld.
-            if frame.source != settings.device_id || confidence_percent > 100 {
+            let is_other = frame.source != settings.device_id;
+            if is_other || confidence_percent > 100 {
                 *withheld += 1;
+                *reason =
+                    Some(if is_other { WithheldReason::OtherDevice } else { WithheldReason::Implausible });
                 return;
             }
             let heard = confidence_percent > 0 && distance_mm > 0;
@@ -151,6 +156,10 @@ impl Decoder for PingDecoder {
     /// confidence.
     fn withheld(&self) -> u64 {
         self.withheld
+    }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        self.reason
     }
 }
 

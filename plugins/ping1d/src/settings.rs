@@ -96,7 +96,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn empty_table_gives_the_defaults_and_every_key_is_read() {
+    fn every_key_is_read_and_has_a_default() {
         let usual = Settings {
             min_confidence: 0.5,
             interval: DurNs::from_millis(66),

@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn each_uhid_event_is_one_write_and_the_device_can_be_replugged() {
+    fn each_uhid_event_is_one_write() {
         let mut events = Events { taken: Vec::new(), most: usize::MAX };
         let mut device = VirtualDevice::plug(&mut events, &COUNTER).unwrap();
         device.report(&[1; 11]).unwrap();

@@ -6,6 +6,7 @@ use headrace_sensor::device_clock::{ClockReport, DeviceClock};
 use headrace_sensor::geometry::time::DurNs;
 use headrace_sensor::reading::{Decoded, Packet, Reading, TetherLength};
 use headrace_sensor::stateful;
+use headrace_sensor::withheld::WithheldReason;
 
 use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
@@ -122,6 +123,10 @@ impl Decoder for HidDecoder {
     /// Number of reports rejected because the change was faster than the winch.
     fn withheld(&self) -> u64 {
         self.health().rejected
+    }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        (self.health().rejected > 0).then_some(WithheldReason::Implausible)
     }
 
     fn clock(&self) -> Option<ClockReport> {

@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_checksum_and_wrong_number_are_refused() {
+    fn lines_with_a_wrong_checksum_or_number_are_refused() {
         for line in
             [&b"RD,00000125,000012.4,0152.304,1505\r\n"[..], b"RD,00000125,0000-2.4,0152.304,1501\r\n"]
         {

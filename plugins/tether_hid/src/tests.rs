@@ -105,7 +105,7 @@ fn length_of_the_emulated_reference_counter_matches_the_cable() {
 }
 
 #[test]
-fn length_of_an_emulated_narrow_falling_big_endian_counter_matches_the_cable() {
+fn length_of_an_emulated_16_bit_counter_matches_the_cable() {
     let layout = ReportLayout {
         report_id: None,
         report_bytes: 4,
@@ -190,7 +190,7 @@ fn wrong_keys_of_the_vehicle_file_are_named() {
 }
 
 #[test]
-fn presets_set_step_and_noise_and_keys_override_them() {
+fn keys_override_step_and_noise_of_a_preset() {
     for (own, resolution_m, sd_m) in [
         ("preset = \"encoder_wheel\"\n", 0.0005, Some(0.005)),
         ("preset = \"magnet_wheel\"\n", 0.01, Some(0.01)),

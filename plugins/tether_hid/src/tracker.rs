@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn replugged_device_continues_from_the_last_length() {
+    fn replugged_device_continues_from_the_length_before_unplugging() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let totals = take_all(&mut tracker, &[120_000, 0, 2, 4, 6, 8, 10]);
         assert_eq!(totals, [Some(120_000), None, None, None, None, Some(120_008), Some(120_010)]);
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn restart_after_a_long_silence_keeps_the_last_length() {
+    fn restart_after_a_long_silence_keeps_the_length_before_the_silence() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         tracker.take(at_ms(0), &counted(120_000));
         let totals = (0..5).map(|i| tracker.take(at_ms(60_000 + 20 * i), &counted(300 + i as i64)));
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_reports_of_a_replugged_device_keep_the_last_length() {
+    fn slow_reports_of_a_replugged_device_continue_from_the_length_before_unplugging() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let counts = [20_000, 0, 100, 200, 300, 400];
         let totals = counts.iter().zip(0..).map(|(count, s)| tracker.take(at_ms(1000 * s), &counted(*count)));
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn repeated_changes_are_added_once_and_lost_reports_are_counted() {
+    fn repeated_report_of_a_change_is_added_once() {
         let mut tracker = CountTracker::new(Counting::Delta, Width::Bits8, FASTEST);
         let mut take = |ms, sequence, count| {
             let report = Report { sequence: Some(sequence), ..counted(count) };

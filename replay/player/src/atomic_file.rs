@@ -300,7 +300,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_permissions_are_kept_and_devices_are_written_in_place() {
+    fn replaced_file_keeps_its_link_and_permissions() {
         use std::os::unix::fs::{PermissionsExt as _, symlink};
         let folder = folder("links");
         let (path, link) = (folder.join("real.json"), folder.join("link.json"));
@@ -317,7 +317,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn pipes_are_written_to_a_slow_reader_and_refused_without_a_reader() {
+    fn pipes_are_written_to_a_slow_reader_but_refused_without_a_reader() {
         use rustix::fs::{CWD, FileType, Mode, mknodat};
         let folder = folder("pipe");
         let pipe = folder.join("pipe");

@@ -26,6 +26,10 @@ pub struct LoggedNotes {
     pub wrong: Vec<String>,
     /// Losses of the log that was read, as text.
     pub losses: Vec<String>,
+    /// Time of the log's first message.
+    pub begun: MonoNs,
+    /// Metadata of the log.
+    pub metadata: BTreeMap<String, String>,
 }
 
 /// Reads the notes in a log.
@@ -52,7 +56,9 @@ pub fn notes_of(files: &[PathBuf]) -> Result<LoggedNotes, LogError> {
         note.chainage_m = places.get(&note.number).copied();
         note.station = note.chainage_m.map(station);
     }
-    found.losses = log.losses().iter().map(ToString::to_string).collect();
+    found.begun = log.times().map_or(MonoNs(0), |(begun, _)| begun);
+    found.losses = log.losses().iter().map(|loss| loss.in_dive_time(found.begun).to_string()).collect();
+    found.metadata.clone_from(&log.header().metadata);
     Ok(found)
 }
 

@@ -141,7 +141,7 @@ impl Player {
 
     /// Returns losses and omissions from the beginning of the log to the current position.
     fn losses_here(&self) -> Vec<String> {
-        let mut all: Vec<String> = self.reader.losses().iter().map(Loss::to_string).collect();
+        let mut all: Vec<String> = self.reader.losses().iter().map(|loss| self.loss_text(loss)).collect();
         for (id, count) in &self.unmatched {
             all.push(format!("{count} messages of source {id:?}, which the vehicle file doesn't have"));
         }
@@ -164,9 +164,15 @@ impl Player {
         all
     }
 
+    fn loss_text(&self, loss: &Loss) -> String {
+        let begun = self.reader.times().map_or(MonoNs(0), |(begun, _)| begun);
+        loss.in_dive_time(begun).to_string()
+    }
+
     /// Returns losses and omissions so far, as text. The cut-off end of the last file is left out.
     pub(crate) fn losses_before_cut(&self) -> Vec<String> {
-        let cut = self.reader.losses().iter().rfind(|loss| loss.is_open_end()).map(Loss::to_string);
+        let cut =
+            self.reader.losses().iter().rfind(|loss| loss.is_open_end()).map(|loss| self.loss_text(loss));
         let mut losses = self.losses_here();
         losses.retain(|loss| Some(loss) != cut.as_ref());
         losses
@@ -255,7 +261,7 @@ impl PacketSource for Player {
     }
 }
 
-/// Formats a time for texts: seconds on the log's clock.
-pub fn seconds(at: MonoNs) -> String {
-    format!("{:.3} s", at.as_secs_f64())
+/// Formats a time for messages: seconds of the dive, which begins at `begun`.
+pub fn seconds(at: MonoNs, begun: MonoNs) -> String {
+    format!("{:.3} s", at.since(begun).as_secs_f64())
 }

@@ -182,7 +182,7 @@ impl<'a> Builder<'a> {
         self.added.push(Added { effect, ..Added::default() });
     }
 
-    /// Ends the effects. Systems added from now on are base systems.
+    /// Makes all systems added from now on base systems, which belong to no effect.
     pub(crate) fn base(&mut self) {
         self.current = None;
     }

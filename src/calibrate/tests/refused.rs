@@ -34,7 +34,8 @@ fn calibration_refuses_a_moving_vehicle() {
     }
 }
 
-/// A fit to half a turn has small standard deviations, but can't tell the angle from errors that all ranges share.
+/// A fit to half a turn has small standard deviations. But an error that all ranges share looks like an error of the
+/// angle.
 #[test]
 fn calibration_from_part_of_a_turn_is_refused_and_states_the_missing_seconds() {
     for (sector_deg, swept_deg, missing_s) in [(95.0, 95, 34), (175.0, 174, 13), (350.0, 349, 1)] {
@@ -76,7 +77,7 @@ fn head_that_sees_one_side_only_is_refused() {
 /// Section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
 /// vehicle is in the centre.
 #[test]
-fn symmetric_section_hides_the_sense_of_rotation_without_echosounders_or_at_the_centre() {
+fn sense_of_rotation_in_a_symmetric_section_needs_echosounders_and_a_vehicle_off_the_centre() {
     let wrong = [Wrong::default(); 2];
     for (at, has_echoes, told) in
         [([0.6, 2.3], true, true), ([0.6, 2.3], false, false), ([0.0, 2.3], true, false)]

@@ -1,14 +1,16 @@
-//! A disk in memory that fails as planned, and the content that is left after a kill or a power cut.
+//! A disk in memory that fails and waits as planned, and the content that is left after a kill or a power cut.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crossbeam::queue::SegQueue;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_replay::log::{Storage, StoredFile};
 
 use super::cable::Clock;
-use super::plan::{DiskFault, Window};
+use super::plan::{DiskFault, Ending, Window};
 use super::sabotage::Sabotage;
 use crate::random::Random;
 
@@ -32,7 +34,12 @@ enum Done {
 pub struct SimulatedDisk {
     clock: Arc<Clock>,
     faults: Arc<[Window<DiskFault>]>,
-    done: Arc<SegQueue<Done>>,
+    /// Operations with the times at which they are complete.
+    done: Arc<SegQueue<(MonoNs, Done)>>,
+    /// Time at which all operations so far are complete, ns.
+    busy_until: Arc<AtomicU64>,
+    /// Number of syncs so far.
+    syncs: Arc<AtomicU64>,
     /// Fault of each disk operation that failed.
     failed: Arc<SegQueue<DiskFault>>,
     sabotage: Option<Sabotage>,
@@ -53,7 +60,37 @@ impl SimulatedDisk {
     /// Creates an empty disk with these planned faults.
     pub fn new(clock: Arc<Clock>, faults: &[Window<DiskFault>], sabotage: Option<Sabotage>) -> Self {
         let (done, failed) = (Arc::new(SegQueue::new()), Arc::new(SegQueue::new()));
-        Self { clock, faults: faults.into(), done, failed, sabotage }
+        let [busy_until, syncs] = [0; 2].map(|_| Arc::default());
+        Self { clock, faults: faults.into(), done, busy_until, syncs, failed, sabotage }
+    }
+
+    /// Time at which the last operation is complete; its caller waits until then.
+    pub fn busy_until(&self) -> MonoNs {
+        MonoNs(self.busy_until.load(Ordering::SeqCst))
+    }
+
+    /// Number of syncs so far.
+    pub fn syncs(&self) -> u64 {
+        self.syncs.load(Ordering::SeqCst)
+    }
+
+    /// Time at which an operation begins: after the earlier ones.
+    fn begins(&self) -> MonoNs {
+        self.clock.now().max(self.busy_until())
+    }
+
+    /// Performs an operation after the earlier ones; returns the time at which it is complete.
+    fn take_turn(&self, is_sync: bool) -> MonoNs {
+        let begins = self.begins();
+        let active = self.faults.iter().filter(|window| window.holds(begins));
+        let waits_ns = active.map(|window| match window.what {
+            DiskFault::OpsLimited { per_s } => 1_000_000_000 / i64::from(per_s),
+            DiskFault::SyncsSlow { ms } if is_sync => i64::from(ms) * 1_000_000,
+            _ => 0,
+        });
+        let complete = begins + DurNs(waits_ns.max().unwrap_or_default());
+        self.busy_until.store(complete.0, Ordering::SeqCst);
+        complete
     }
 
     /// Number of disk operations that have failed so far.
@@ -61,10 +98,14 @@ impl SimulatedDisk {
         self.failed.len()
     }
 
-    /// Returns the files that are left on the disk. After a power cut, unsynced data is cut off or has holes.
-    pub fn left(&self, power_cut: Option<&mut Random>) -> Vec<LeftFile> {
+    /// Returns the files that are left on the disk after the dive. A kill or a power cut stops operations that are not
+    /// complete. After a power cut, unsynced data is cut off or has holes.
+    pub fn left(&self, ending: Ending, random: &mut Random) -> Vec<LeftFile> {
         let mut files: Vec<LeftFile> = Vec::new();
-        while let Some(done) = self.done.pop() {
+        while let Some((complete, done)) = self.done.pop() {
+            if ending != Ending::Finished && complete > self.clock.now() {
+                break;
+            }
             match done {
                 Done::Created(path) => files.push(LeftFile { path, ..LeftFile::default() }),
                 Done::Removed(path) => files.retain(|file| file.path != path),
@@ -80,7 +121,7 @@ impl SimulatedDisk {
                 }
             }
         }
-        if let Some(random) = power_cut {
+        if ending == Ending::PowerCut {
             for file in &mut files {
                 tear(file, random);
             }
@@ -89,7 +130,7 @@ impl SimulatedDisk {
     }
 
     fn try_to(&self, faults: &[DiskFault]) -> io::Result<()> {
-        let now = self.clock.now();
+        let now = self.begins();
         match self.faults.iter().find(|window| faults.contains(&window.what) && window.holds(now)) {
             None => Ok(()),
             Some(Window { what, .. }) => {
@@ -120,12 +161,12 @@ fn tear(file: &mut LeftFile, random: &mut Random) {
 impl Storage for SimulatedDisk {
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>> {
         self.try_to(&[DiskFault::CreateFails, DiskFault::Full])?;
-        self.done.push(Done::Created(path.to_owned()));
+        self.done.push((self.take_turn(true), Done::Created(path.to_owned())));
         Ok(Box::new(OpenFile { disk: self.clone(), path: path.to_owned(), turn: 0 }))
     }
 
     fn remove(&mut self, path: &Path) -> io::Result<()> {
-        self.done.push(Done::Removed(path.to_owned()));
+        self.done.push((self.take_turn(false), Done::Removed(path.to_owned())));
         Ok(())
     }
 
@@ -143,7 +184,7 @@ struct OpenFile {
 impl StoredFile for OpenFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.disk.try_to(&[DiskFault::WriteFails, DiskFault::Full])?;
-        let now = self.disk.clock.now();
+        let now = self.disk.begins();
         let in_part =
             |window: &Window<DiskFault>| window.what == DiskFault::WritesInPart && window.holds(now);
         self.turn += 1;
@@ -155,10 +196,13 @@ impl StoredFile for OpenFile {
                 return Err(io::ErrorKind::Interrupted.into());
             }
             bytes.len().div_ceil(2)
+        } else if self.disk.sabotage == Some(Sabotage::WritesSectors) {
+            bytes.len().min(SECTOR_BYTES)
         } else {
             bytes.len()
         };
-        self.disk.done.push(Done::Wrote(self.path.clone(), bytes[..count].to_vec()));
+        let complete = self.disk.take_turn(false);
+        self.disk.done.push((complete, Done::Wrote(self.path.clone(), bytes[..count].to_vec())));
         Ok(count)
     }
 
@@ -168,7 +212,9 @@ impl StoredFile for OpenFile {
         }
         let synced = self.disk.try_to(&[DiskFault::SyncFails]);
         let path = self.path.clone();
-        self.disk.done.push(if synced.is_ok() { Done::Synced(path) } else { Done::Lost(path) });
+        let done = if synced.is_ok() { Done::Synced(path) } else { Done::Lost(path) };
+        self.disk.done.push((self.disk.take_turn(true), done));
+        self.disk.syncs.fetch_add(1, Ordering::SeqCst);
         synced
     }
 }

@@ -25,11 +25,14 @@ pub struct DiveResult {
     pub left: Vec<LeftFile>,
     /// Number of consumed packets that must be in the log, whichever way the dive ends.
     pub certain: usize,
+    /// Whether the recorder left packets out because its queue was full.
+    pub has_left_out: bool,
     /// Longest time for which packets waited to be taken although the loop ran.
     pub longest_wait: DurNs,
 }
 
 /// Result of a replay of the files that are left on the disk.
+#[derive(Default)]
 pub struct Replayed {
     /// Packets that the loop took.
     pub consumed: Vec<Consumed>,
@@ -37,6 +40,8 @@ pub struct Replayed {
     pub digest: u64,
     /// Losses that the replay reported.
     pub losses: Vec<String>,
+    /// Result of the replay after the plan's change of the files, or the reason why they can't be read as a log.
+    pub changed: Option<Result<Box<Self>, String>>,
 }
 
 /// Result of the line of one device.

@@ -1,7 +1,7 @@
 //! Invariants of every dive in a simulated world, whichever faults occur.
 
-use super::dive_result::{DiveResult, Line, Replayed};
-use super::plan::{Ending, MachineFault};
+use super::dive_result::{Consumed, DiveResult, Line, Replayed};
+use super::plan::{CableFault, DiskFault, Ending, LogChange, MachineFault};
 use crate::drops;
 
 /// Longest time for which packets may wait while the loop runs, with or without a recording.
@@ -13,12 +13,67 @@ pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<St
         lived.lines.iter().enumerate().filter_map(|(number, line)| of_line(lived, number, line)).collect();
     match replayed {
         Err(error) => broken.push(format!("the log can't be read: {error}")),
-        Ok(replayed) => broken.extend(of_log(lived, replayed)),
+        Ok(replayed) => {
+            broken.extend(of_log(lived, replayed));
+            broken.extend(of_changed(lived, replayed));
+        }
+    }
+    if lived.has_left_out && keeps_up(lived) {
+        broken.push("the recorder left packets out although its disk was only limited".to_owned());
     }
     if lived.longest_wait.0 > LONGEST_WAIT_NS {
         broken.push(format!("the loop took nothing for {} s", lived.longest_wait.as_secs_f64()));
     }
     broken
+}
+
+/// Whether the recorder must record everything: nothing stalls and no disk operation fails. A disk that performs only
+/// some operations per second is no reason to leave packets out.
+fn keeps_up(lived: &DiveResult) -> bool {
+    let plan = &lived.plan;
+    let is_limited = |what: DiskFault| matches!(what, DiskFault::OpsLimited { .. });
+    let is_stall = |what: MachineFault| what != MachineFault::TerminalStands;
+    let is_held = |what: CableFault| what == CableFault::Held;
+    plan.disk.iter().all(|window| is_limited(window.what))
+        && !plan.machine.iter().any(|window| is_stall(window.what))
+        && !plan.cables.iter().flatten().any(|window| is_held(window.what))
+}
+
+/// Number of packets that the loop never took, or took in another order.
+fn invented(ours: &[Consumed], theirs: &[Consumed]) -> usize {
+    let mut rest = ours.iter();
+    theirs.iter().filter(|packet| !rest.any(|other| other == *packet)).count()
+}
+
+/// Checks the replay of the recording whose files were changed after the dive.
+///
+/// The order of the parts doesn't matter. No packet is counted twice, and missing packets are reported. Otherwise the
+/// log is refused by an error that names a file.
+fn of_changed(lived: &DiveResult, replayed: &Replayed) -> Option<String> {
+    let (change, changed) = (lived.plan.log?, replayed.changed.as_ref()?);
+    let what = match changed {
+        Err(error) if change == LogChange::Reordered => format!("it can't be read: {error}"),
+        Err(error) if !error.contains(".mcap") => format!("its error names no file: {error}"),
+        Err(_) => return None,
+        Ok(changed) => {
+            let is_same = (&changed.consumed, &changed.losses, changed.digest)
+                == (&replayed.consumed, &replayed.losses, replayed.digest);
+            let is_told = changed.losses != replayed.losses && !changed.losses.is_empty();
+            let invented = invented(&lived.consumed, &changed.consumed);
+            if invented > 0 {
+                format!("{invented} packets are counted twice or in another order: {:?}", changed.losses)
+            } else if change == LogChange::Reordered && !is_same {
+                format!("its replay differs: {:?}", changed.losses)
+            } else if change == LogChange::Doubled && !is_told {
+                "the copy isn't reported".to_owned()
+            } else if changed.consumed.len() < replayed.consumed.len() && changed.losses.is_empty() {
+                "packets are missing and no loss is reported".to_owned()
+            } else {
+                return None;
+            }
+        }
+    };
+    Some(format!("the recording after its change ({change:?}): {what}"))
 }
 
 /// Checks one device: other devices' faults don't affect it, delays lose no frame, and it runs again after all
@@ -51,8 +106,7 @@ fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
 fn of_log(lived: &DiveResult, replayed: &Replayed) -> Vec<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let (ours, theirs) = (&lived.consumed, &replayed.consumed);
-    let mut rest = ours.iter();
-    let invented = theirs.iter().filter(|packet| !rest.any(|other| other == *packet)).count();
+    let invented = invented(ours, theirs);
     let missing = ours.len() - theirs.len().min(ours.len());
     let (dropped, losses) = drops::apart(&replayed.losses);
     let mut broken = Vec::new();

@@ -8,12 +8,14 @@ pub mod cable;
 pub mod device;
 pub mod disk;
 mod dive_result;
+pub mod fewest;
 pub mod invariants;
 pub mod plan;
 mod sabotage;
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -29,8 +31,8 @@ use headrace_monitor::run::Loop;
 use headrace_ports::{Attached, Common, LineHistory, LineRecord, LineService, StatusQueue, Waker};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{
-    Interrupted, LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Unfinished,
-    files_of, in_the_way,
+    Every, Interrupted, LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo,
+    Unfinished, files_of, in_the_way,
 };
 use headrace_replay::player::Player;
 use headrace_replay::record::{RecorderOutlet, result_channels};
@@ -43,9 +45,9 @@ use crate::folder::Folder;
 use crate::random::Random;
 use cable::{Cable, Clock, Machine};
 use device::Device;
-use disk::SimulatedDisk;
+use disk::{LeftFile, SimulatedDisk};
 pub use dive_result::{Consumed, DiveResult, Line, Replayed};
-use plan::{BEGIN, Ending, MachineFault, Plan};
+use plan::{BEGIN, Ending, Fault, LogChange, MachineFault, Plan};
 pub use sabotage::Sabotage;
 
 /// Longest time step of the simulated world, ns.
@@ -94,6 +96,13 @@ pub fn vehicle_text() -> String {
     text
 }
 
+/// Returns the seeds of `HEADRACE_WORLD_SEEDS`, such as `1000..2000`, or the default ones without that variable.
+pub fn seeds(default: Range<u64>) -> Range<u64> {
+    let Ok(text) = std::env::var("HEADRACE_WORLD_SEEDS") else { return default };
+    let (from, to) = text.split_once("..").unwrap();
+    from.parse().unwrap()..to.parse().unwrap()
+}
+
 /// A dive in a simulated world.
 pub struct World {
     sabotage: Option<Sabotage>,
@@ -110,6 +119,8 @@ pub struct World {
     /// Moments since the last disk failure at which the recorder's queue was empty, each with the number of packets
     /// consumed by then.
     taken: VecDeque<(MonoNs, usize)>,
+    /// Time at which a sync is complete, and number of packets that are then certain.
+    syncing: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
     is_behind: bool,
     /// Number of packets that the recorder skipped because its backlog was too large.
@@ -126,11 +137,11 @@ pub struct World {
 impl World {
     /// Creates the world of a seed; the dive hasn't begun.
     pub fn new(seed: u64) -> Self {
-        Self::sabotaged(seed, None)
+        Self::with(seed, None, None)
     }
 
-    /// As [`World::new`], but with a sabotage that breaks an invariant.
-    pub fn sabotaged(seed: u64, sabotage: Option<Sabotage>) -> Self {
+    /// As [`World::new`], but with a sabotage that breaks an invariant, and with only these of the seed's faults.
+    pub fn with(seed: u64, sabotage: Option<Sabotage>, faults: Option<&[Fault]>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
         let vehicle = vehicle(&text);
@@ -142,8 +153,9 @@ impl World {
         let streams: Vec<bool> =
             cables.iter().map(|cable| !matches!(cable.connect, Connect::Udp { .. })).collect();
         let plan = Plan::draw(&mut random, &streams);
+        let plan = faults.map_or(plan.clone(), |faults| plan.with_only(faults));
         let disk = SimulatedDisk::new(Arc::clone(&clock), &plan.disk, sabotage);
-        let (mut dive, recorder, notices) = assemble(&vehicle, &text, &disk);
+        let (mut dive, recorder, notices) = assemble(&vehicle, &text, &disk, plan.every);
         let board = StatusQueue::new(1 << 16);
         let common = Common {
             host: Arc::new(Machine { clock: Arc::clone(&clock), cables: cables.clone() }),
@@ -170,7 +182,7 @@ impl World {
             let loses = sabotage == Some(Sabotage::CableLoses) && faults.is_empty();
             devices.push(Device::new(sensor.emulator(&setup), cable, faults, loses, Random(random.bits())));
         }
-        let (consumed, taken, certain) = (Vec::new(), VecDeque::new(), 0);
+        let (consumed, taken, syncing, certain) = (Vec::new(), VecDeque::new(), VecDeque::new(), 0);
         let (is_failing, is_behind) = (false, false);
         Self {
             sabotage,
@@ -185,6 +197,7 @@ impl World {
             disk,
             recorder,
             taken,
+            syncing,
             is_failing,
             is_behind,
             skipped: 0,
@@ -214,6 +227,7 @@ impl World {
             }
         }
         let (certain, longest_wait) = (self.certain, self.longest_wait);
+        let has_left_out = self.skipped > 0 || self.is_behind;
         let since_begin = self.since_begin();
         let Self { services, mut dive, devices, plan, mut consumed, disk, recorder, mut random, .. } = self;
         let histories: Vec<LineHistory> =
@@ -240,14 +254,14 @@ impl World {
             good,
             history,
         });
-        let power_cut = (plan.ending == Ending::PowerCut).then_some(&mut random);
         DiveResult {
             lines: lines.collect(),
             digest: dive.view().digest(),
             summary,
             disk_failures: disk.failures(),
-            left: disk.left(power_cut),
+            left: disk.left(plan.ending, &mut random),
             certain,
+            has_left_out,
             longest_wait,
             plan,
             consumed,
@@ -258,12 +272,17 @@ impl World {
         Duration::from_nanos(u64::try_from(self.clock.now().since(BEGIN).0).unwrap())
     }
 
-    /// Lets the recorder write. Without a disk failure, packets count as certainly recorded half a second and
-    /// one step after the recorder took them.
+    /// Lets the recorder write until its queue is empty or the disk has an operation to complete.
+    ///
+    /// Without a disk failure, packets are synced by a sync that begins half a second and one step after the recorder
+    /// took them, or earlier. They count as certainly recorded when that sync is complete.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
-        let failures = self.disk.failures();
-        while self.recorder.step(since_begin) {}
+        let (failures, syncs) = (self.disk.failures(), self.disk.syncs());
+        let mut is_empty = false;
+        while !is_empty && self.disk.busy_until() <= now {
+            is_empty = !self.recorder.step(since_begin);
+        }
         while let Some(event) = self.recorder.next_event() {
             match event {
                 RecordingEvent::Failed { .. } => self.is_failing = true,
@@ -280,12 +299,23 @@ impl World {
             self.taken.clear();
             return;
         }
-        self.taken.push_back((now, self.consumed.len() - self.skipped));
-        while let Some((at, count)) = self.taken.front().copied()
-            && now.since(at) > SYNC_PERIOD
-        {
+        // The recorder syncs at the end of a step only if it has emptied its queue.
+        if is_empty || self.disk.syncs() > syncs {
+            self.taken.push_back((now, self.consumed.len() - self.skipped));
+            while let Some((at, count)) = self.taken.front().copied()
+                && now.since(at) > SYNC_PERIOD
+            {
+                self.syncing.push_back((self.disk.busy_until().max(now), count));
+                self.taken.pop_front();
+            }
+        }
+        self.take_syncs(now);
+    }
+
+    /// Takes the syncs that are complete.
+    fn take_syncs(&mut self, now: MonoNs) {
+        while let Some((_, count)) = self.syncing.pop_front_if(|(complete, _)| *complete <= now) {
             self.certain = count;
-            self.taken.pop_front();
         }
     }
 
@@ -317,7 +347,9 @@ impl World {
                 self.longest_wait = self.longest_wait.max(now.since(since));
             }
         }
-        if !self.plan.has(MachineFault::RecorderStalls, now) {
+        self.take_syncs(now);
+        // The recorder's thread waits for the disk.
+        if !self.plan.has(MachineFault::RecorderStalls, now) && self.disk.busy_until() <= now {
             self.record(now);
         }
         if !self.plan.has(MachineFault::TerminalStands, now) {
@@ -328,11 +360,11 @@ impl World {
 }
 
 impl DiveResult {
-    /// Writes the files that are left on the disk to `folder` and replays them. Then checks that a recording without an
-    /// orderly end can be continued.
+    /// Writes the files that are left on the disk to `folder` and replays them. Then replays a recording without an orderly
+    /// end after it was continued, and the files after a change.
     ///
     /// Errors: the files can't be read as a log, or the recording can't be continued.
-    pub fn replay(&self, folder: &Folder) -> Result<Replayed, String> {
+    pub fn replay(&self, folder: &Folder, sabotage: Option<Sabotage>) -> Result<Replayed, String> {
         let name = |path: &Path| folder.path(path.file_name().unwrap().to_str().unwrap());
         let files: Vec<PathBuf> = self.left.iter().map(|file| name(&file.path)).collect();
         for (path, file) in files.iter().zip(&self.left) {
@@ -348,8 +380,64 @@ impl DiveResult {
         for path in in_the_way(&recording).unwrap() {
             std::fs::remove_file(path).unwrap();
         }
+        if let Ok(so_far) = &mut played {
+            so_far.changed = self.plan.log.map(|change| self.replay_changed(change, folder, sabotage));
+        }
         played
     }
+
+    /// Replays the recording after a change of its files.
+    fn replay_changed(
+        &self,
+        change: LogChange,
+        folder: &Folder,
+        sabotage: Option<Sabotage>,
+    ) -> Result<Box<Replayed>, String> {
+        let (number, mut left) = (self.certain % self.left.len(), self.left.clone());
+        let own = &mut left[number].bytes;
+        // Before a part is doubled or joined, it may have been cut.
+        if change == LogChange::Cut || change != LogChange::Reordered && self.certain.is_multiple_of(2) {
+            own.truncate(self.certain * 257 % own.len().max(1));
+        }
+        let appended = match change {
+            LogChange::Doubled => own.clone(),
+            LogChange::Joined if number + 1 < left.len() => left.remove(number + 1).bytes,
+            LogChange::Joined | LogChange::Cut => Vec::new(),
+            LogChange::Reordered => {
+                left.reverse();
+                Vec::new()
+            }
+        };
+        let is_apart = sabotage == Some(Sabotage::PartsReadApart);
+        if is_apart && !appended.is_empty() {
+            let mut other = LeftFile::default();
+            (other.path, other.bytes) = (PathBuf::from("other.mcap"), appended);
+            left.insert(number + 1, other);
+        } else {
+            left[number].bytes.extend(appended);
+        }
+        let paths: Vec<PathBuf> =
+            left.iter().map(|file| folder.path(file.path.file_name().unwrap().to_str().unwrap())).collect();
+        for (path, file) in paths.iter().zip(&left) {
+            std::fs::write(path, &file.bytes).unwrap();
+        }
+        let played = if is_apart { replayed_apart(&paths) } else { replayed(&paths) };
+        for path in paths {
+            std::fs::remove_file(path).unwrap();
+        }
+        played.map(Box::new)
+    }
+}
+
+/// Replays each file on its own, in the given order. Returns the packets of all files.
+fn replayed_apart(files: &[PathBuf]) -> Result<Replayed, String> {
+    let mut all = Replayed::default();
+    for file in files {
+        let one = replayed(std::slice::from_ref(file))?;
+        all.consumed.extend(one.consumed);
+        all.digest = one.digest;
+    }
+    Ok(all)
 }
 
 /// If a recording has no orderly end, continues it for some ticks and replays the whole recording.
@@ -395,7 +483,7 @@ fn replayed(files: &[PathBuf]) -> Result<Replayed, String> {
     let driven = drive(&mut dive, &mut player, Pace::default(), &mut |dive| note(dive, &mut consumed));
     driven.map_err(|error| error.to_string())?;
     dive.finish(&mut |_, _| ());
-    Ok(Replayed { consumed, digest: dive.view().digest(), losses: player.losses() })
+    Ok(Replayed { consumed, digest: dive.view().digest(), losses: player.losses(), changed: None })
 }
 
 fn vehicle(text: &str) -> VehicleConfig {
@@ -431,10 +519,11 @@ fn assemble(
     vehicle: &VehicleConfig,
     text: &str,
     disk: &SimulatedDisk,
+    every: Option<DurNs>,
 ) -> (Loop, RecorderWorker, NoticeReceiver) {
     let header = header(vehicle, text);
     let (storage, path) = (Box::new(disk.clone()), Path::new("dive.mcap"));
-    let rotation = Rotation::default();
+    let rotation = Rotation { every: every.map(Every::Span), ..Rotation::default() };
     let (port, worker) = Recorder::unthreaded(storage, path, &header, &rotation, QUEUE_BYTES, None).unwrap();
     let mut app = app(vehicle);
     app.add_plugin(&RecorderOutlet::new([port]).of_ports()).unwrap();

@@ -117,7 +117,22 @@ pub enum DiskFault {
     Full,
     /// No file can be created.
     CreateFails,
+    /// The disk performs only so many operations per second: each write and each sync takes its turn.
+    OpsLimited {
+        /// Number of operations that the disk performs per second.
+        per_s: u16,
+    },
+    /// Each sync takes a long time.
+    SyncsSlow {
+        /// Duration of a sync, ms.
+        ms: u16,
+    },
 }
+
+/// Operations per second of a limited disk: from an SD card in poor condition to a hard disk.
+const OPS_PER_S: [u16; 5] = [3, 10, 30, 100, 300];
+/// Durations of slow syncs, ms.
+const SYNCS_MS: [u16; 6] = [10, 100, 250, 700, 2000, 5000];
 
 const OF_DISKS: [DiskFault; 5] = [
     DiskFault::WriteFails,
@@ -126,6 +141,51 @@ const OF_DISKS: [DiskFault; 5] = [
     DiskFault::Full,
     DiskFault::CreateFails,
 ];
+
+/// A change of the recording's files after the dive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LogChange {
+    /// The parts are named in another order.
+    Reordered,
+    /// A part, possibly cut, is appended to itself.
+    Doubled,
+    /// The next part is appended to a part, which may be cut.
+    Joined,
+    /// A part is cut.
+    Cut,
+}
+
+const OF_LOGS: [LogChange; 4] = [LogChange::Reordered, LogChange::Doubled, LogChange::Joined, LogChange::Cut];
+
+/// A fault of a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// A fault of the cable with this number.
+    Cable(usize, Window<CableFault>),
+    /// A fault of the machine.
+    Machine(Window<MachineFault>),
+    /// A fault of the disk.
+    Disk(Window<DiskFault>),
+    /// A change of the recording's files.
+    Log(LogChange),
+    /// An end of the dive that isn't regular, and its time.
+    Ending(Ending, MonoNs),
+}
+
+impl Fault {
+    /// Returns the kind of the fault as text, the same for all faults of a kind.
+    pub fn kind(&self) -> String {
+        match self {
+            Self::Cable(_, window) => format!("cable: {:?}", window.what),
+            Self::Machine(window) => format!("machine: {:?}", window.what),
+            Self::Disk(Window { what: DiskFault::OpsLimited { .. }, .. }) => "disk: OpsLimited".to_owned(),
+            Self::Disk(Window { what: DiskFault::SyncsSlow { .. }, .. }) => "disk: SyncsSlow".to_owned(),
+            Self::Disk(window) => format!("disk: {:?}", window.what),
+            Self::Log(change) => format!("log: {change:?}"),
+            Self::Ending(ending, _) => format!("end: {ending:?}"),
+        }
+    }
+}
 
 /// The way in which a dive ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -147,6 +207,10 @@ pub struct Plan {
     pub machine: Vec<Window<MachineFault>>,
     /// Faults of the disk.
     pub disk: Vec<Window<DiskFault>>,
+    /// Duration of the recording's parts; `None` for a single file.
+    pub every: Option<DurNs>,
+    /// Change of the recording's files after the dive, if any.
+    pub log: Option<LogChange>,
     /// The way in which the dive ends.
     pub ending: Ending,
     /// Time at which the dive ends.
@@ -173,14 +237,42 @@ impl Plan {
             window(random, what, if long { LONGEST_STALL_NS } else { LONGEST_NS })
         });
         let machine = machine.collect();
-        let disk = (0..random.below(3)).map(|_| {
-            let what = pick(random, &OF_DISKS);
-            window(random, what, LONGEST_NS)
-        });
+        let disk = (0..random.below(3)).map(|_| disk_fault(random));
         let disk = disk.collect();
+        let every = random.one_in(2).then(|| DurNs::from_millis(1000 + random.below(4000) as i64));
+        let log = random.one_in(2).then(|| pick(random, &OF_LOGS));
         let ending = pick(random, &[Ending::Finished, Ending::Finished, Ending::Killed, Ending::PowerCut]);
         let early = if ending == Ending::Finished { 0 } else { random.below(END_WITHIN_NS) };
-        Self { cables, machine, disk, ending, end: BEGIN + LENGTH - DurNs(early as i64) }
+        Self { cables, machine, disk, every, log, ending, end: BEGIN + LENGTH - DurNs(early as i64) }
+    }
+
+    /// Returns all faults of the plan.
+    pub fn faults(&self) -> Vec<Fault> {
+        let cables = self.cables.iter().enumerate();
+        let cables = cables.flat_map(|(number, all)| all.iter().map(move |one| Fault::Cable(number, *one)));
+        let machine = self.machine.iter().map(|window| Fault::Machine(*window));
+        let disk = self.disk.iter().map(|window| Fault::Disk(*window));
+        let ending = (self.ending != Ending::Finished).then_some(Fault::Ending(self.ending, self.end));
+        cables.chain(machine).chain(disk).chain(self.log.map(Fault::Log)).chain(ending).collect()
+    }
+
+    /// The same plan with these faults only.
+    #[must_use]
+    pub fn with_only(&self, faults: &[Fault]) -> Self {
+        let cables = vec![Vec::new(); self.cables.len()];
+        let (machine, disk) = (Vec::new(), Vec::new());
+        let (ending, end) = (Ending::Finished, BEGIN + LENGTH);
+        let mut plan = Self { cables, machine, disk, every: self.every, log: None, ending, end };
+        for fault in faults {
+            match *fault {
+                Fault::Cable(number, window) => plan.cables[number].push(window),
+                Fault::Machine(window) => plan.machine.push(window),
+                Fault::Disk(window) => plan.disk.push(window),
+                Fault::Log(change) => plan.log = Some(change),
+                Fault::Ending(ending, end) => (plan.ending, plan.end) = (ending, end),
+            }
+        }
+        plan
     }
 
     /// The same plan with a terminal that accepts everything or nothing.
@@ -212,12 +304,27 @@ impl fmt::Debug for Plan {
         for Window { what, from, to } in &self.disk {
             writeln!(f, "  disk: {what:?} from {:.3} to {:.3} s", s(*from), s(*to))?;
         }
+        if let Some(every) = self.every {
+            writeln!(f, "  recording: a part every {:.3} s", every.as_secs_f64())?;
+        }
+        if let Some(change) = self.log {
+            writeln!(f, "  recording after the dive: {change:?}")?;
+        }
         write!(f, "  {:?} at {:.3} s", self.ending, s(self.end))
     }
 }
 
 fn pick<T: Copy>(random: &mut Random, of: &[T]) -> T {
     of[random.below(of.len())]
+}
+
+fn disk_fault(random: &mut Random) -> Window<DiskFault> {
+    let (what, longest) = match random.below(3) {
+        0 => (DiskFault::OpsLimited { per_s: pick(random, &OPS_PER_S) }, LONGEST_STALL_NS),
+        1 => (DiskFault::SyncsSlow { ms: pick(random, &SYNCS_MS) }, LONGEST_STALL_NS),
+        _ => (pick(random, &OF_DISKS), LONGEST_NS),
+    };
+    window(random, what, longest)
 }
 
 fn window<T>(random: &mut Random, what: T, longest_ns: usize) -> Window<T> {

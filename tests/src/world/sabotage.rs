@@ -13,10 +13,21 @@ pub enum Sabotage {
     SyncLies,
     /// The log doesn't state the packets that a line dropped.
     DropsUntold,
+    /// The recorder writes single sectors, so each of them takes its turn on a limited disk.
+    WritesSectors,
+    /// Parts and copies of a log are replayed one after the other in the given order, without a check.
+    PartsReadApart,
 }
 
 impl Sabotage {
     /// All kinds of sabotage.
-    pub const ALL: [Self; 5] =
-        [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies, Self::DropsUntold];
+    pub const ALL: [Self; 7] = [
+        Self::CableLoses,
+        Self::NeighbourBreaks,
+        Self::DiskForgets,
+        Self::SyncLies,
+        Self::DropsUntold,
+        Self::WritesSectors,
+        Self::PartsReadApart,
+    ];
 }

@@ -259,7 +259,7 @@ fn losses(report: &Value) -> Vec<&str> {
     report["log"]["losses"].as_array().unwrap().iter().map(|loss| loss.as_str().unwrap()).collect()
 }
 
-/// The number after `word` in a loss such as "after 9.800 s".
+/// The dive time after `word` in a loss such as "after 9.800 s".
 fn seconds(loss: &str, word: &str) -> f64 {
     let (_, rest) = loss.split_once(word).unwrap_or_else(|| panic!("no {word:?} in {loss:?}"));
     rest.split_whitespace().next().unwrap().parse().unwrap()
@@ -297,7 +297,7 @@ fn truncated_log_is_used_up_to_the_cut_and_the_rest_reported_lost() {
             if read == 0 {
                 continue;
             }
-            let last_s = messages[read - 1].log_time as f64 * 1e-9;
+            let last_s = (messages[read - 1].log_time - messages[0].log_time) as f64 * 1e-9;
             assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
 
             // The readable part gives the same results as an undamaged log that has only the readable messages.
@@ -339,7 +339,7 @@ fn corrupt_log_loses_only_the_broken_chunk() {
         assert!(read < count && read > count * 8 / 10, "{read} of {count}");
         // The loss extends from the last message before the broken chunk to the first message after it.
         let [loss] = losses(&report)[..] else { panic!("{:?}", losses(&report)) };
-        let close = |word, at_ns: u64| (seconds(loss, word) - at_ns as f64 * 1e-9).abs() < 0.02;
+        let close = |word, at_ns: u64| (seconds(loss, word) - (at_ns - first_ns) as f64 * 1e-9).abs() < 0.02;
         assert_eq!(chunk.message_start_time > first_ns, loss.contains("after"), "{loss}");
         assert!(!loss.contains("after") || close("after", chunk.message_start_time), "{loss}");
         assert_eq!(chunk.message_end_time < last_ns, loss.contains("before"), "{loss}");

@@ -132,7 +132,7 @@ fn report_is_complete_on_a_non_blocking_pipe() {
 }
 
 #[test]
-fn report_to_a_named_pipe_is_complete_with_a_reader_and_fails_without() {
+fn report_to_a_named_pipe_is_complete_but_fails_without_a_reader() {
     use rustix::fs::{CWD, FileType, Mode, mknodat};
     let folder = Folder::with_dive();
     mknodat(CWD, folder.path("pipe"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();

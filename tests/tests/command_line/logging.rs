@@ -25,7 +25,7 @@ const SENSOR_EVENT: &str = "DEBUG headrace::vehicle_file: sensor ";
 const PROBE_EVENT: &str = "headrace_ports::probe: probing";
 
 #[test]
-fn verbose_shows_events_of_every_crate_and_the_default_shows_none() {
+fn events_of_all_crates_are_shown_with_verbose_but_not_by_default() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let quiet = probe(&folder, None, &[]);

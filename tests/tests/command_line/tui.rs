@@ -153,7 +153,7 @@ fn log_messages_are_held_until_the_terminal_is_restored() {
 }
 
 #[test]
-fn keys_acknowledge_alerts_and_take_notes_and_both_are_logged() {
+fn acknowledgements_and_notes_by_key_are_logged() {
     let folder = Folder::new();
     let mut screen =
         Screen::sized(&folder, &["demo", "--tui", "--speed", "20x", "--out", "demo"], (100, 30), &[UNICODE]);

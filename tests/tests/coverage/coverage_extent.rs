@@ -214,7 +214,7 @@ fn verdict_lengths_add_up_in_random_dives() {
 
 /// Short dives out and back that reach beyond a short tunnel and end at any place in a section.
 #[test]
-fn verdict_lengths_add_up_wherever_a_dive_begins_turns_and_ends() {
+fn lengths_of_all_verdicts_add_up_in_dives_out_and_back() {
     let vehicle = SHORT.replace("length_m = 100", "length_m = 8");
     let (mut outside, mut not_inspected_m) = (0, 0.0);
     for seed in 0..60 {
@@ -290,7 +290,7 @@ fn stretch_without_a_position_fails_once_the_vehicle_has_left_it() {
 }
 
 #[test]
-fn dive_without_a_position_has_no_verdicts_and_says_so_first() {
+fn dive_without_a_position_reports_first_that_it_has_no_verdicts() {
     for (sensor, lacking, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")]
     {
         let folder = Folder::new();

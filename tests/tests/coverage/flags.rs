@@ -33,8 +33,8 @@ static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     DIVES.iter().map(judge).collect()
 });
 
-/// Checks every section with `wrong`. This function gets the section's due flags by both definitions, and may return an
-/// error.
+/// Calls `wrong` for every section with two flags: due if the hole exceeds the target, and due if it does so by two
+/// standard deviations. `wrong` returns the fault, if any.
 #[track_caller]
 fn every_flag(
     dives: impl Fn(&Judged) -> bool,
@@ -167,7 +167,7 @@ fn filled_hole_has_no_flag() {
 }
 
 #[test]
-fn flags_of_the_way_out_do_not_depend_on_a_later_way_back() {
+fn flags_of_the_way_out_do_not_depend_on_the_way_back() {
     every_flag(
         |judged| judged.seeded.kind == Kind::Reversing && direct(judged),
         |judged, due, _| {

@@ -41,7 +41,7 @@ fn wider_wall() -> String {
 }
 
 #[test]
-fn wider_wall_seen_by_two_heads_passes_and_is_reported() {
+fn wall_wider_than_the_design_passes_and_is_reported_if_two_heads_see_it() {
     let (report, summary) = dive(VEHICLE, &wider_wall());
     let within = sections(&report, 13.0, 18.0);
     assert!(within.iter().all(|section| section["verdict"] == "pass"), "{within:#?}");

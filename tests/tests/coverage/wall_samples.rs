@@ -194,7 +194,7 @@ fn head_with_random_ranges_passes_no_section_and_is_reported() {
 }
 
 #[test]
-fn heads_without_faults_are_accepted_in_a_wider_pipe_and_on_a_swaying_vehicle() {
+fn heads_without_faults_are_accepted_in_a_pipe_wider_than_the_design() {
     let wider = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 1.06\n";
     for scene in [format!("{CREEP}{DRIFT}"), format!("{CREEP}{wider}")] {
         let dive = instrumented::dive(&pipe(2), &scene);

@@ -44,7 +44,7 @@ fn losses(ran: &Ran) -> Vec<&str> {
 }
 
 #[test]
-fn messages_with_impossible_times_are_reported_and_skipped() {
+fn messages_with_impossible_times_are_skipped_and_reported() {
     let folder = Folder::with_dive();
     for last in [u64::MAX, u64::MAX - 1, i64::MAX as u64 + 1] {
         odd(&folder, |number, at| if number == 4000 { last } else { at });

@@ -1,4 +1,5 @@
-//! Checks that `docs/why/hard-cases.csv` has every row of its list, and that the named tests exist.
+//! Checks that `docs/why/hard-cases.csv` has a row for each case in `tests/hard_cases/list`, and that the named tests
+//! exist.
 
 use headrace_support::hard_cases::cells;
 

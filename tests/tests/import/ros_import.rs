@@ -333,7 +333,7 @@ fn damage_of_a_recording_is_reported() {
 }
 
 #[test]
-fn other_file_kinds_are_refused() {
+fn files_without_a_ros_recording_are_refused() {
     let folder = folder("");
     folder.write("old.bag", b"#ROSBAG V1.2\nmuch more");
     folder.write("text.bag", b"hello");

@@ -343,3 +343,108 @@ fn recorded_acknowledgements_are_equal_in_replay_and_verify() {
     let last = states.last().unwrap();
     assert_eq!((&last["left"]["battery_pct"], &last["alerts_hidden"]), (&19.5.into(), &0.into()));
 }
+
+/// A dive of 20 s with a velocity log, whose reports are sent 15 s after their measurements, and an inertial unit on
+/// a CAN bus.
+fn withheld_dive(change: fn(&str, &mut Vec<u8>)) -> (Scene, Vec<Packet>) {
+    let log = "\n[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\nconnect = \"tcp:127.0.0.1:9\"\n";
+    let load = |name: &str| {
+        let mut file = scenes::vehicle_file(name)?;
+        file.extend_from_slice(log.as_bytes());
+        Ok(file)
+    };
+    let text =
+        "vehicle = \"vita2-4.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.2\n";
+    let scene = scenes::scene_from(text, &load);
+    let mut packets = sent(&scene);
+    for packet in &mut packets {
+        change(&scene.vehicle.sensor_configs[packet.source].id, &mut packet.bytes);
+    }
+    (scene, packets)
+}
+
+/// Adds 15 s to the transmission time of a velocity report.
+fn make_late(id: &str, bytes: &mut Vec<u8>) {
+    if id == "dvl" {
+        let mut report: Value = serde_json::from_slice(bytes).unwrap();
+        report["time_of_transmission"] = (report["time_of_validity"].as_i64().unwrap() + 15_000_000).into();
+        *bytes = format!("{report}\r\n").into_bytes();
+    }
+}
+
+/// Gives a CAN frame an id that no message of the inertial unit has.
+fn make_foreign(id: &str, bytes: &mut Vec<u8>) {
+    if id == "imu" {
+        bytes[..4].copy_from_slice(&0x7e_u32.to_le_bytes());
+    }
+}
+
+/// Text and action of each alert about withheld readings.
+fn withheld(dive: &Loop) -> Vec<(String, String)> {
+    let around = dive.view().surroundings();
+    let alerts = dive.view().alert_list().iter().filter(|alert| alert.kind == ListKind::SensorWithheld);
+    alerts.map(|alert| (alert.text(&around), alert.advice(&around))).collect()
+}
+
+#[test]
+fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
+    let (scene, packets) = withheld_dive(make_late);
+    let (late, told) = dive(&scene, &packets, 20);
+    let sent =
+        packets.iter().filter(|packet| scene.vehicle.sensor_configs[packet.source].id == "dvl").count();
+    let [(text, action)] = &withheld(&late)[..] else { panic!("{:?}", withheld(&late)) };
+    let count: usize =
+        text.strip_prefix("dvl: ").and_then(|text| text.split(' ').next()).unwrap().parse().unwrap();
+    assert_eq!(
+        text.split_once(' ').unwrap().1,
+        format!("{count} readings withheld: 15.0 s late, at most 2 s")
+    );
+    assert!((sent - 3..=sent).contains(&count), "{count} of {sent}");
+    assert_eq!(action, "restart it");
+    // Other alerts about a sensor would contradict this one.
+    let of_sensors = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+    assert_eq!(of_sensors, 0);
+    let state = late.view().live_state_json();
+    let dvl = state.sensors.iter().find(|sensor| sensor.id == "dvl").unwrap();
+    // The live state also counts reports since the last update of the alerts.
+    let after = dvl.withheld.as_ref().unwrap().split_once(' ').unwrap().1;
+    assert_eq!((dvl.state.as_str(), after), ("withheld", text.splitn(3, ' ').nth(2).unwrap()));
+    let report = json(&late);
+    let of =
+        |id: &str| report["sources"].as_array().unwrap().iter().find(|source| source["id"] == id).unwrap();
+    assert_eq!(of("dvl")["no_reading"], format!("{sent} readings withheld: 15.0 s late, at most 2 s"));
+    assert_eq!(of("imu").get("no_reading"), None);
+    for tick_ms in [1, 333, 5000] {
+        let (other, also_told) = dive(&scene, &packets, tick_ms);
+        assert_eq!((streams(&other), also_told), (streams(&late), told.clone()), "ticks of {tick_ms} ms");
+    }
+}
+
+/// Without any reading, only the commands that state the time let alerts be raised.
+#[test]
+fn can_frames_without_a_known_id_are_alerted_although_no_sensor_has_a_reading() {
+    let (scene, mut packets) = withheld_dive(make_foreign);
+    packets.retain(|packet| scene.vehicle.sensor_configs[packet.source].id == "imu");
+    let (from, to) = (packets[0].at, packets.last().unwrap().at);
+    let source = scene.vehicle.sensors.len();
+    let halves = to.since(from).0 / 500_000_000;
+    packets.extend((1..=halves).map(|half| Packet {
+        source,
+        at: from + DurNs::from_millis(500 * half),
+        bytes: Command::Time.to_json().into_bytes(),
+    }));
+    packets.sort_by_key(|packet| (packet.at, packet.source));
+    let (foreign, told) = dive(&scene, &packets, 20);
+    let [(text, action)] = &withheld(&foreign)[..] else { panic!("{:?}", withheld(&foreign)) };
+    assert!(
+        text.starts_with("imu: ") && text.ends_with(" packets without a message of this device"),
+        "{text}"
+    );
+    assert_eq!(action, "check its plugin, connection and ids in the vehicle file");
+    let (at, ..) = told.iter().find(|(.., alert)| alert.kind == ListKind::SensorWithheld).unwrap();
+    assert!((2.0..4.0).contains(&at.since(from).as_secs_f64()), "{:?}", at.since(from));
+    for tick_ms in [1, 333] {
+        let (other, also_told) = dive(&scene, &packets, tick_ms);
+        assert_eq!((streams(&other), also_told), (streams(&foreign), told.clone()), "ticks of {tick_ms} ms");
+    }
+}

@@ -257,7 +257,7 @@ fn signal(name: &str, dive: &Child) {
 }
 
 #[test]
-fn live_dive_goes_on_without_its_terminal_and_ends_on_a_signal() {
+fn live_dive_without_its_terminal_goes_on_until_a_signal() {
     let folder = Folder::with_dive();
     for (end, arguments) in [("TERM", ["--json-lines"]), ("INT", ["--json"])] {
         let mut dive = headrace_tests::program();

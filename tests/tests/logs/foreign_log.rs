@@ -68,7 +68,7 @@ fn unordered_messages_are_read_in_order_of_time() {
 }
 
 #[test]
-fn sequence_publish_time_and_channel_ids_are_ignored() {
+fn sequence_numbers_publish_times_and_channel_ids_do_not_change_the_digest() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");

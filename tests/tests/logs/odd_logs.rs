@@ -98,7 +98,7 @@ fn attached_vehicle_file_with_an_unknown_plugin_is_refused() {
 }
 
 #[test]
-fn log_of_a_later_format_is_refused() {
+fn replay_refuses_a_log_format_newer_than_this_program() {
     let folder = Folder::with_dive();
     let mut writer = mcap::Writer::new(File::create(folder.path("later.mcap")).unwrap()).unwrap();
     // Digest of the words "headrace", "format" and "2", with each word's length before it.

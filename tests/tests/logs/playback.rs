@@ -66,7 +66,7 @@ impl Outcome {
 /// A headrace log replays its packets in the order in which the live loop consumed them. This order can differ from
 /// that of the receive times. A log without ticks replays in time order.
 #[test]
-fn headrace_log_replays_in_order_of_consumption_and_other_logs_by_time() {
+fn headrace_logs_replay_in_recorded_order_but_other_logs_in_order_of_time() {
     let folder = Folder::new();
     // Source and receive time of each packet, in the order in which the packets are recorded.
     let recorded = [(2, 3_000), (0, 1_000), (1, 2_000), (1, 2_500), (0, 2_200)];

@@ -118,7 +118,7 @@ fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)>
 }
 
 #[test]
-fn nearly_full_disk_drops_echoes_and_full_disk_ends_the_recording() {
+fn recording_drops_echoes_on_a_nearly_full_disk_and_ends_on_a_full_disk() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
     // The first disk is nearly full, with room for all small messages. The second one has room for a few seconds.

@@ -175,7 +175,7 @@ fn failing_feed_ends_the_dive_at_the_same_tick_on_any_number_of_threads() {
 }
 
 #[test]
-fn panicking_thread_is_an_error_and_never_blocks() {
+fn panicking_thread_gives_an_error_and_does_not_block_the_loop() {
     let scene = scene();
     let packets = packets(&scene);
     for (threads, at) in [(2, 0), (2, 5000), (3, 5000)] {
@@ -236,7 +236,7 @@ fn see(inbox: Res<'_, Inbox>, mut seen: ResMut<'_, Seen>) {
 }
 
 #[test]
-fn plugins_see_every_packet_and_slow_outlets_change_no_result() {
+fn slow_output_plugin_changes_no_result() {
     let scene = scene();
     let packets = packets(&scene);
     let expected = dived(0, &scene, 20, &packets, End::Last).report;

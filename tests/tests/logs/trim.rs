@@ -162,7 +162,7 @@ fn anonymous_log_has_no_name_address_comment_or_time_of_day() {
 }
 
 #[test]
-fn times_outside_the_dive_are_refused_and_keep_existing_files() {
+fn times_outside_the_dive_are_refused_without_changing_files() {
     let folder = recorded(SCENE, VEHICLE);
     trim(&folder, "part.mcap", &["--to", "5s"]);
     let before = folder.read("part.mcap");

@@ -41,7 +41,7 @@ fn failed(report: &Value) -> Vec<&Value> {
 }
 
 #[test]
-fn sections_fail_with_cause_position_lost_after_tether_loss_without_a_filter() {
+fn silent_tether_in_direct_navigation_fails_sections_as_position_lost() {
     let report = without("direct", "tether", 25.0, 31.0);
     assert!(report["dive"]["samples_rejected"]["no_fix"].as_u64().unwrap() > 500);
     let failed = failed(&report);

@@ -11,7 +11,7 @@ use crate::address::ANY;
 const TOKENS: &str = "operator = operator-0123456789abcdef\nviewer = viewer-0123456789abcdef\n";
 
 #[test]
-fn other_hosts_and_origins_are_refused() {
+fn requests_to_undeclared_hosts_or_from_undeclared_origins_are_refused() {
     let folder = Folder::with_dive();
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY]);
     let status = |method, path, headers: &[&str]| serving.ask(method, path, headers, "").0;
@@ -30,7 +30,7 @@ fn other_hosts_and_origins_are_refused() {
 }
 
 #[test]
-fn client_without_a_token_gets_nothing_and_a_viewer_token_is_read_only() {
+fn client_without_a_token_gets_nothing_of_the_dive() {
     let folder = Folder::with_dive();
     folder.write("tokens", TOKENS);
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY, "--page-token-file", "tokens"]);

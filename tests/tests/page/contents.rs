@@ -156,12 +156,15 @@ fn dive_is_compared_with_a_second_target() {
     let section_m = viewer.hello["section_m"].as_f64().unwrap();
     let mut apart_m = 0.0;
     for (other, key) in [(0, "open_m"), (1, "pass_m"), (2, "fail_m"), (3, "cannot_say_m")] {
-        let of = |key: &str| report["other_targets"][1][key].as_f64().unwrap();
-        // The page shows sections that aren't inspected as open.
-        let reported_m = of(key) + if key == "open_m" { of("not_inspected_m") } else { 0.0 };
+        // The wall shows sections of the second target that aren't inspected as open.
+        let with_not_inspected = |all: &Value| {
+            let of = |key: &str| all[key].as_f64().unwrap();
+            of(key) + if key == "open_m" { of("not_inspected_m") } else { 0.0 }
+        };
+        let reported_m = with_not_inspected(&report["other_targets"][1]);
         let sections = viewer.sections.values().filter(|section| section.compared == Some(other)).count();
         let shown_m = sections as f64 * section_m;
-        let summed_m = viewer.state["compared"][key].as_f64().unwrap();
+        let summed_m = with_not_inspected(&viewer.state["compared"]);
         assert!((shown_m - summed_m).abs() < 1e-6, "{key}: {shown_m}, {summed_m}");
         apart_m += (shown_m - reported_m).abs() / 2.0;
     }
@@ -175,10 +178,12 @@ fn dive_is_compared_with_a_second_target() {
         report["other_targets"]
     );
     assert!(report["other_targets"][1]["fail_m"].as_f64() > report["other_targets"][0]["fail_m"].as_f64());
+    let not_inspected_m = viewer.state["compared"]["not_inspected_m"].as_f64().unwrap();
+    assert!(not_inspected_m > 0.0, "{}", viewer.state["compared"]);
 }
 
 #[test]
-fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
+fn resumed_viewer_shows_the_same_as_a_new_viewer() {
     let folder = Folder::with_dive();
     let (serving, mut lost) = replayed(&folder);
     // A seek back restarts the dive with fewer sections. Afterwards the connection is lost, while the dive goes on.
@@ -220,7 +225,7 @@ fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
 }
 
 #[test]
-fn samples_are_sent_for_a_range_of_chainages_and_follow_seeks() {
+fn sent_samples_are_those_before_the_time_of_a_seek() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let count = || {

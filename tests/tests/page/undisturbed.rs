@@ -30,7 +30,7 @@ fn stalled_and_flooding_viewers_do_not_change_results() {
 }
 
 #[test]
-fn stalled_viewer_is_dropped_and_counted_and_others_are_served() {
+fn stalled_viewer_is_dropped_while_others_are_served() {
     let folder = Folder::with_dive();
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY]);
     // This viewer is connected, but never reads.

@@ -116,7 +116,7 @@ fn network_device_that_returns_is_used_again() {
 }
 
 #[test]
-fn device_plugged_in_later_is_used() {
+fn device_plugged_in_during_the_dive_is_used() {
     let folder = Folder::new();
     let serial = End::serial(&folder.path(""), "usb-head-port0").absent();
     let sensors = vec![sensor(HEAD, serial, Healthy), sensor(PING, End::tcp().absent(), Healthy), healthy()];
@@ -362,7 +362,7 @@ impl Fault for Babbling {
 }
 
 #[test]
-fn babbling_device_disturbs_no_other_and_is_used_afterwards() {
+fn babbling_device_does_not_disturb_other_devices() {
     let folder = Folder::new();
     let sensors = vec![sensor(HEAD, End::tcp(), Babbling(Random(5))), healthy()];
     let mut rig = Rig::recorded(sensors, Some(&folder.path("babble.mcap")));

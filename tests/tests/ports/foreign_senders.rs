@@ -105,7 +105,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
 }
 
 #[test]
-fn open_port_accepts_only_the_first_autopilot() {
+fn open_port_accepts_only_the_autopilot_received_first() {
     for (option, keys) in [("", ""), ("?from=<device>", ""), ("?from=<device>", "system_id = 1\n")] {
         let (report, of_device, of_strangers) = dive_among_strangers(option, keys);
         let source = &report["sources"][0];

@@ -108,7 +108,7 @@ fn delayed_data_arrive_later_by_the_delay() {
 }
 
 #[test]
-fn keys_cause_and_end_faults_and_leave_the_terminal_in_order() {
+fn keys_cause_and_end_faults() {
     let folder = Folder::new();
     folder.write("scene.toml", scene(30.0));
     let emulate = || Screen::run(&folder, &["emulate", "--out", "rehearsal", "scene.toml"], 120, &[]);

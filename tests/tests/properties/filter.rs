@@ -89,7 +89,7 @@ fn steps(case: &mut Case) -> Result<(), String> {
 }
 
 #[test]
-fn covariance_stays_valid_and_measurements_follow_the_scalar_formula() {
+fn measurements_keep_the_covariance_valid_and_equal_to_the_scalar_formula() {
     few("filter", &steps);
 }
 

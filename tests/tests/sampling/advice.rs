@@ -204,7 +204,7 @@ fn row(case: &Case, followed: &Followed) {
 }
 
 #[test]
-fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
+fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
     let mut broken = Vec::new();
     let (mut near, mut within) = (0, 0);
     for case in &STEADY {
@@ -269,7 +269,7 @@ fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
 }
 
 #[test]
-fn advised_speed_is_lower_for_a_swinging_vehicle_and_meets_the_target() {
+fn advised_speed_of_a_swinging_vehicle_is_lower_than_that_of_a_steady_one() {
     let mut broken = Vec::new();
     for case in &SWINGING {
         let followed = case.followed();

@@ -384,7 +384,7 @@ proptest! {
 }
 
 #[test]
-fn sector_of_12_5_steps_ends_with_a_half_step_and_pings_each_end_once() {
+fn sector_of_12_5_steps_ends_with_a_half_step() {
     let rig = Rig { steps: 50, ..Rig::new(&[0.0; 4], |_| false, 5.0) };
     let schedule = Schedule::new(&rig.specs(), SectorOffset, 0.2).unwrap();
     assert!((schedule.sweep_s().unwrap() - 2.6).abs() < 1e-9, "{:?}", schedule.sweep_s());

@@ -10,8 +10,7 @@ use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 use headrace_sampling::losses::MOST_PASSES;
 
-/// The removal of a factor is worthwhile only if it shrinks the spacing of samples below this share of the
-/// actual spacing.
+/// Removing a factor helps only if the spacing of samples then falls below this share of the actual spacing.
 pub(super) const HELPS: f64 = 0.93;
 /// Largest hole size for which the surroundings are searched for missing samples, in multiples of the target.
 pub(super) const WIDEST: f64 = 8.0;

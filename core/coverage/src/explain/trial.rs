@@ -154,10 +154,10 @@ impl<'a> Trial<'a> {
         self.present.has(Cause::HeadSilent) || self.present.has(Cause::HeadStalled)
     }
 
-    /// Whether the only evidence against the position is the error between passes.
+    /// Whether an uncertain displacement between passes is the only doubt about the position.
     ///
-    /// A fail already allows for this error, and the error would explain any hole. Every other explanation therefore
-    /// comes first.
+    /// A fail already allows for this uncertainty, and the uncertainty would explain any hole. Every other explanation
+    /// therefore comes first.
     fn is_only_adrift(&self) -> bool {
         self.seen.adrift && !self.seen.unseen && !self.case.is_torn
     }

@@ -8,7 +8,7 @@ use crate::store::SampleStore;
 /// Resolution of the search, m. A circle that exceeds the required radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
-/// Required radius of an empty circle, as a function of the arc length of its centre.
+/// Radius that an empty circle must have for an early fail, as a function of the arc length of its centre.
 pub struct Needed<'a> {
     /// Required radius at an arc length, m.
     pub radius_m: &'a dyn Fn(f64) -> f64,

@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_and_its_mirror_image_exclude_the_gap_between_them() {
+    fn stretch_joins_its_mirror_image_only_if_they_touch_or_overlap() {
         let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
             assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
         };

@@ -5,8 +5,8 @@ use crate::deviation::Deviation;
 use crate::frontier::Reach;
 use headrace_geometry::math;
 
-/// Least mean deviation of a stretch as a share of the equivalent radius. A wall that is 5 % wider, with its floor at
-/// the design's height, deviates by 4.5 %.
+/// Least mean deviation of a stretch as a share of the equivalent radius. A tunnel that is 5 % wider than its design,
+/// with its floor at the design's height, deviates by 4.5 %.
 const LEAST_SHARE: f64 = 0.04;
 
 /// A stretch of wall whose mean deviation from the design is at least 4 % of the equivalent radius.

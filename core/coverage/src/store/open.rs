@@ -103,7 +103,7 @@ impl OpenBricks {
         self.most_nodes - self.used
     }
 
-    /// Number of samples in the open bricks.
+    /// Number of samples in the open bricks (stretches of wall whose samples are unpacked).
     pub(super) fn used(&self) -> usize {
         self.used
     }

@@ -19,7 +19,7 @@ struct Turning {
 struct Count {
     wall: usize,
     doubtful: usize,
-    /// Returns at wall that another head has found, too.
+    /// Sonar returns at wall that another head has found, too.
     confirming: usize,
     named: Vec<Distrust>,
 }
@@ -122,7 +122,7 @@ fn boulders_and_niches_are_wall_once_a_second_pass_has_met_them() {
 ///
 /// A pole at the same place is met again in later turns, and is wall from the fourth turn on at the latest.
 #[test]
-fn object_seen_in_one_turn_is_doubtful_and_object_seen_again_is_wall() {
+fn object_is_doubtful_in_its_first_turn_but_wall_if_met_again() {
     let near = |angle: f64| (angle - 3.0).abs() < 2.6 * TAU / f64::from(STEPS);
     for radius_m in [1.0, 6.0] {
         let cloud = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
@@ -243,7 +243,7 @@ fn cave_seen_by_all_heads_is_wall() {
 }
 
 #[test]
-fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_the_centre() {
+fn constant_range_counts_as_wall_only_in_the_centre_of_a_pipe() {
     for (out_m, named) in [(0.0, 0), (0.02, 0), (0.2, 1)] {
         let mut turning = Turning::new(1.0, 1);
         let limits = turning.limits;

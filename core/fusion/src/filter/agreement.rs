@@ -86,7 +86,7 @@ impl Agreement {
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);
-            // The scale of ranges may be wrong, because the tunnel may be wider from this chainage on.
+            // The scale of ranges may be wrong, because the tunnel may be wider here than before.
             add(variances, RANGES..RANGES + 1, LOST_SCALE);
         }
         if tilt {

@@ -112,11 +112,11 @@ pub enum Use {
 /// State of the comparison between cable counter and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Cable {
-    /// The last cable reading.
+    /// The latest cable reading.
     last: Option<CableReading>,
-    /// The last reading whose count differs from the previous one.
+    /// The latest reading whose count differs from the count before it.
     changed: Option<CableReading>,
-    /// The first of the present series of readings beyond the gate.
+    /// First reading in the present series of readings beyond the gate.
     left: Option<CableReading>,
     /// Recent corrections of the estimate by the counter's readings.
     pub corrections: CounterCorrections,

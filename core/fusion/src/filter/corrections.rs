@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn cable_disagreement_at_a_changing_count_reverts_the_last_second_of_corrections() {
+    fn cable_disagreement_while_the_cable_moves_reverts_the_last_second_of_corrections() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn sd_of_a_stuck_wheel_loss_is_0_3_of_the_corrections_beyond_chance() {
+    fn sd_of_the_length_lost_by_a_stuck_wheel_is_0_3_of_the_corrections_beyond_chance() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
         // The predicted standard deviation makes half of the corrections count as chance.
@@ -193,9 +193,9 @@ mod tests {
         );
     }
 
-    /// After the first 20 s, corrections have the opposite sign, as for a hovering vehicle.
+    /// After the first 20 s of the stop, corrections have the opposite sign, as for a hovering vehicle.
     #[test]
-    fn corrections_after_20_s_of_a_stop_add_no_stuck_wheel_loss() {
+    fn corrections_after_20_s_of_a_stop_do_not_increase_the_possibly_lost_length() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");
@@ -210,7 +210,7 @@ mod tests {
     /// to the position error permanently. Short stops do not count, because a slow vehicle with coarse counter steps
     /// makes many of them.
     #[test]
-    fn stuck_wheel_loss_in_a_long_stop_remains_after_the_count_changes_again() {
+    fn position_error_keeps_the_length_that_a_stuck_wheel_lost_in_a_long_stop() {
         for (readings, slips) in [(15, false), (50, true)] {
             let mut corrections = stood(readings, 0.0, [0.0; 2]);
             let before_m = corrections.lost_m();

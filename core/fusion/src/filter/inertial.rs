@@ -182,7 +182,7 @@ impl Leg {
         Some(leg)
     }
 
-    /// Returns the leg with these noise factors and this slack model.
+    /// Returns this inertial motion of an epoch (leg) with these noise factors and this slack model.
     ///
     /// `unrest` contains the factors by which the process noise of gyro and accelerometer biases is multiplied.
     #[must_use]

@@ -198,7 +198,7 @@ mod tests {
     /// A head that has become noisy gets less weight than declared. A quiet source other than a head is not
     /// affected.
     #[test]
-    fn noisy_head_loses_weight_and_quiet_other_sources_keep_theirs() {
+    fn noisy_head_loses_weight_but_quiet_other_sources_do_not() {
         let noisy = level(4000, alternating(2.0), true);
         assert!((3.0..9.1).contains(&noisy.factor(HEAD, 0)), "{}", noisy.factor(HEAD, 0));
         let quiet = level(2000, |k| 0.5 * math::sin(f64::from(k)), true);

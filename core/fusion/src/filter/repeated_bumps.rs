@@ -12,7 +12,7 @@ use headrace_geometry::math;
 const MOST_BUMPS: f64 = 0.9;
 /// Maximum number of passes over the same bumps that is counted.
 ///
-/// Returns from repeated bumps must keep some weight, because on gyros alone the estimate would drift.
+/// Sonar returns from repeated bumps must keep some weight, because on gyros alone the estimate would drift.
 const MOST_PASSES: f64 = 10.0;
 
 /// Counts how often the heads have passed over the bumps that they see now.
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn repeated_passes_count_fully_on_a_smooth_wall_and_hardly_on_a_rough_one() {
+    fn repeated_passes_count_fully_on_a_smooth_wall_but_hardly_on_a_rough_one() {
         assert!((noise_m2(9.0, 1.0, 0.0) - DECLARED_M2).abs() < 1e-15);
         assert!(noise_m2(9.0, 1.0, 1.0) > 100.0 * DECLARED_M2);
         // Even after an hour at rest, returns from repeated bumps keep this small weight.

@@ -55,7 +55,8 @@ pub struct State {
     pub rate_bias_radps: Vec3<Body>,
     /// Slack of the cable, m; positive if the cable shows too much chainage.
     pub slack_m: f64,
-    /// Driving rate of the slack, m/s. It decays with the same time constant as the slack.
+    /// Rate at which the slack grows, apart from its decay, m/s. The rate decays with the same time constant as the
+    /// slack.
     pub slack_rate_mps: f64,
     /// Creep of the cable, m: the excess of shown chainage from all scale errors and slips so far.
     pub creep_m: f64,

@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn vehicle_on_deck_is_at_rest_and_floating_vehicle_is_not() {
+    fn vehicle_on_deck_is_at_rest_but_floating_vehicle_is_not() {
         assert!(still(|_| 0.003, |_| Some(0.0)), "biases and noise are no motion");
         assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| Some(0.0)), "the vehicle turns to and fro");
         assert!(!still(|_| 0.0, |t| Some(0.05 * t)), "the cable runs");

@@ -6,6 +6,7 @@ use super::kind::{ListKind, Priority};
 use crate::console::command::Who;
 use crate::observations::Occurrences;
 use crate::pilot_text::{AdviceFigures, CauseFigures};
+use crate::unread::WithheldReadings;
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::setting_check::SettingDoubt;
@@ -89,6 +90,8 @@ pub enum Figures {
     Setting(SettingDoubt, Occurrences),
     /// Time for which the computer stalled, seconds.
     Stalled(u32),
+    /// Withheld readings of a sensor.
+    Withheld(WithheldReadings),
     /// Remaining cable (m), time (seconds) or battery charge (percent).
     Left(f64),
 }

@@ -237,8 +237,16 @@ impl AlertList {
                 (None, _) => is_late && !all_silent,
                 (Some(_), None) => false,
             };
+            let withheld = state.withheld(source.into());
+            let is_withheld = state.sensor(source.into()) == SensorState::Withheld;
+            // A device that has just been switched on may need some time, as long as other sensors deliver data.
+            let is_due = heard(source).is_some() || is_late || newest.is_none();
             let (kind, source) = (ListKind::SensorSilent, Some(SourceId(source)));
+            let holds = holds && !is_withheld;
             self.observe(at, &Seen { kind, source, holds, figures: Figures::None }, to);
+            let (kind, holds) = (ListKind::SensorWithheld, is_withheld && is_due);
+            let figures = withheld.map_or(Figures::None, Figures::Withheld);
+            self.observe(at, &Seen { kind, source, holds, figures }, to);
         }
         let is_head = |source: &u16| state.heads.checked_shr((*source).into()).unwrap_or(0) & 1 == 1;
         for number in sources().filter(is_head) {

@@ -86,11 +86,13 @@ pub enum ListKind {
     MountsUnverified,
     /// The program got no computing time, so data arrived late or were lost.
     ComputerStalled,
+    /// A sensor sends packets, but all its readings are withheld.
+    SensorWithheld,
 }
 
 impl ListKind {
     /// All kinds of alerts.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 27] = [
         Self::Missed,
         Self::CannotSay,
         Self::TooFast,
@@ -117,6 +119,7 @@ impl ListKind {
         Self::SensorHung,
         Self::MountsUnverified,
         Self::ComputerStalled,
+        Self::SensorWithheld,
     ];
 
     /// Word used for the alert kind in JSON.
@@ -148,6 +151,7 @@ impl ListKind {
             Self::SensorHung => "sensor_hung",
             Self::MountsUnverified => "mounts_unverified",
             Self::ComputerStalled => "computer_stalled",
+            Self::SensorWithheld => "sensor_withheld",
         }
     }
 
@@ -163,6 +167,7 @@ impl ListKind {
             | Self::SensorStalled
             | Self::SensorDeaf
             | Self::SensorHung
+            | Self::SensorWithheld
             | Self::HeadScattered
             | Self::HeadConstant
             | Self::HeadOutvoted
@@ -189,6 +194,7 @@ impl ListKind {
             | Self::SensorStalled
             | Self::SensorDeaf
             | Self::SensorHung
+            | Self::SensorWithheld
             | Self::HeadScattered
             | Self::HeadConstant
             | Self::HeadOutvoted
@@ -228,6 +234,7 @@ impl ListKind {
                 | Self::SensorStalled
                 | Self::SensorDeaf
                 | Self::SensorHung
+                | Self::SensorWithheld
                 | Self::HeadScattered
                 | Self::HeadConstant
                 | Self::HeadOutvoted

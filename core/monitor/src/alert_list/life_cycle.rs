@@ -6,6 +6,7 @@ use super::list::{AlertList, MOST_LISTED, SILENCE};
 use crate::console::command::Who;
 use crate::messages::Notice;
 use crate::result_stream::{RecordKind, ResultStream};
+use crate::unread::WithheldReadings;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::SourceId;
 
@@ -58,7 +59,7 @@ impl Figures {
             Self::Advice(figures) => figures.speed_mps,
             Self::MissingRequirement(lacking) => f64::from(lacking as u8),
             Self::Error(figure, _) | Self::Left(figure) => figure,
-            Self::Stalled(seconds) => f64::from(seconds),
+            Self::Stalled(count) | Self::Withheld(WithheldReadings { count, .. }) => f64::from(count),
             Self::Deviation(occurrences) => occurrences.worst_m,
             Self::Setting(doubt, _) => doubt.setting.figure(),
         }

@@ -289,7 +289,7 @@ fn stall_of_the_computer_is_listed_for_a_while() {
 
 /// The dive's time begins with its data, however long the program waits for them.
 #[test]
-fn silence_of_all_sensors_raises_one_alert_and_does_not_begin_the_dive_time() {
+fn silence_of_all_sensors_raises_only_one_alert() {
     let mut bench = Bench::new(0.0, 0.0);
     let heard = [None; headrace_sensor::reading::MAX_SOURCES];
     for minutes in 0..90 {
@@ -303,7 +303,7 @@ fn silence_of_all_sensors_raises_one_alert_and_does_not_begin_the_dive_time() {
 }
 
 #[test]
-fn higher_priority_needs_a_new_acknowledgement() {
+fn alert_with_increased_priority_needs_a_new_acknowledgement() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
     let mut beat = |bench: &mut Bench, at_s: u64, pct: f64| {
@@ -413,7 +413,7 @@ fn alert_spans_only_wall_that_is_still_missed() {
 }
 
 #[test]
-fn merged_stretches_keep_the_lower_alert_number_and_need_acknowledgement() {
+fn merged_stretches_keep_the_lower_of_their_alert_numbers() {
     let mut bench = Bench::new(0.0, 0.0);
     bench.run(0, RunChange::Raised, (10, 11), None);
     bench.run(1, RunChange::Raised, (14, 15), None);

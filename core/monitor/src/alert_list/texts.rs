@@ -11,6 +11,7 @@ use crate::pilot_text::{
 };
 use crate::source::SourceInfo;
 use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
+use crate::words::{withheld_action, withheld_text};
 use headrace_coverage::{Sections, Stretch};
 use headrace_geometry::tunnel::Profile;
 
@@ -111,6 +112,7 @@ impl ListedAlert {
                     seconds.div_ceil(60)
                 )
             }
+            (_, Figures::Withheld(readings)) => format!("{name}: {}", withheld_text(*readings)),
             (_, Figures::Left(left_pct)) => format!("battery at {left_pct:.0} %"),
             (kind, Figures::None) => plain_text(kind, &name, &place),
         }
@@ -135,11 +137,13 @@ impl ListedAlert {
             (ListKind::PositionDoubtful, _) => {
                 "go slower, or pass it again with a more certain position".to_owned()
             }
-            (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
+            (ListKind::NoSonar, _) => "stop".to_owned(),
+            (ListKind::NoData, _) => "stop; check power, connections and ports".to_owned(),
             (ListKind::MountsUnverified, _) => "drive slowly and swing 5 degrees left and right".to_owned(),
             (ListKind::ComputerStalled, _) => {
                 "hold a steady speed; close other programs on the computer".to_owned()
             }
+            (_, Figures::Withheld(readings)) => withheld_action(readings.reason).to_owned(),
             (ListKind::NotRecorded, _) => "free disk space, or change the medium".to_owned(),
             (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
             _ => String::new(),

@@ -122,7 +122,7 @@ impl Bench {
         Self {
             alerter: Alerter::new(list, &LiveState::new(Target::new(0.5), 0, 3), Vec::new(), 1, false),
             run,
-            command: ReceivedCommand { before: command_before, at: NOW, command },
+            command: ReceivedCommand { before: command_before, before_unread: 0, at: NOW, command },
             events: (0..10).map(event).collect(),
         }
     }
@@ -134,7 +134,7 @@ impl Bench {
     fn until(&mut self, beat: Option<usize>) -> (u32, usize, u64, Option<u64>) {
         let Self { alerter, run, command, events } = self;
         let (runs, commands) = (core::slice::from_ref(run), core::slice::from_ref(command));
-        let mut inputs = Inputs { runs, commands, events, taken: (0, 0, 0) };
+        let mut inputs = Inputs { runs, commands, events, unread: &[], taken: Taken::default() };
         match beat {
             Some(event) => alerter.take_before(event, &mut inputs),
             None => alerter.take_rest(&mut inputs),

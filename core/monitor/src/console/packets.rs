@@ -36,6 +36,8 @@ stateful!(Console { state: counts; fixed: source; });
 pub(crate) struct ReceivedCommand {
     /// Index of the first event of this tick that comes after the command.
     pub(crate) before: usize,
+    /// Index of the first packet without a reading that comes after the command.
+    pub(crate) before_unread: usize,
     pub(crate) at: MonoNs,
     pub(crate) command: Command,
 }
@@ -56,12 +58,18 @@ impl Console {
         Self { source, counts: ConsoleCounts::default() }
     }
 
-    /// Adds a console packet that comes before the event with this index.
-    pub(crate) fn take(&mut self, packet: Packet<'_>, before: usize, commands: &mut Commands) {
+    /// Adds a console packet that comes before the event, and the packet without a reading, with these
+    /// indexes.
+    pub(crate) fn take(
+        &mut self,
+        packet: Packet<'_>,
+        [before, before_unread]: [usize; 2],
+        commands: &mut Commands,
+    ) {
         self.counts.packets += 1;
         match Command::parse(packet.bytes) {
             Ok(command) if commands.0.len() < commands.0.capacity() => {
-                commands.0.push(ReceivedCommand { before, at: packet.received, command });
+                commands.0.push(ReceivedCommand { before, before_unread, at: packet.received, command });
             }
             _ => self.counts.invalid += 1,
         }

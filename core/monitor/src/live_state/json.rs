@@ -139,6 +139,8 @@ pub struct SensorJson {
     pub age_s: Option<f64>,
     /// Whether the sensor is a profiling head.
     pub is_head: bool,
+    /// Number of withheld readings, with the reason; `None` unless the state is `withheld`.
+    pub withheld: Option<String>,
 }
 
 /// Metres of the coverage extent by verdict, and their sum.
@@ -147,7 +149,7 @@ pub struct MetresJson {
     /// Metres by verdict.
     #[serde(flatten)]
     pub by_state: Metres,
-    /// Sum of the metres by verdict.
+    /// Length of the whole coverage extent, m: the sum over all verdicts.
     pub way_m: f64,
 }
 
@@ -210,6 +212,7 @@ impl LiveState {
                     state: self.sensor(source),
                     age_s: self.age_of(source).map(DurNs::as_secs_f64),
                     is_head: self.heads >> source & 1 == 1,
+                    withheld: self.withheld_text(source),
                 })
                 .collect(),
             metres: MetresJson { by_state: self.metres, way_m: self.metres.way_m() },

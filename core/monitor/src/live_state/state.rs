@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::speed_band::SpeedBand;
 use crate::observations::{MOST_OBSERVATIONS, ObservedKind, Occurrences};
+use crate::unread::{UnreadPacket, UnreadSpan, WithheldReadings};
 use headrace_coverage::{Metres, Stretch};
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::pose_sd::PoseSd;
@@ -14,9 +15,10 @@ use headrace_sampling::Target;
 use headrace_sampling::advice::{Advice, Reason};
 use headrace_sampling::head::HeadSet;
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
+use headrace_sensor::withheld::WithheldReason;
 
 /// Version of the live state and of its JSON.
-pub const LIVE_STATE_VERSION: u32 = 2;
+pub const LIVE_STATE_VERSION: u32 = 3;
 /// Age above which data is shown as stale. It equals the maximum time between readings of a head that isn't
 /// silent.
 pub const OLD_AFTER: DurNs = DurNs(2_000_000_000);
@@ -72,7 +74,7 @@ impl PositionState {
     }
 }
 
-/// An observation that holds now.
+/// An observation that applies at present.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ActiveObservation {
     pub(crate) kind: ObservedKind,
@@ -81,7 +83,7 @@ pub(crate) struct ActiveObservation {
     pub(crate) occurrences: Occurrences,
 }
 
-/// List of all observations that hold now.
+/// List of all observations that apply at present.
 pub(crate) type ActiveObservations = [Option<ActiveObservation>; MOST_OBSERVATIONS];
 
 /// Slowest practical speed, m/s. A lower advised speed counts as no speed.
@@ -98,6 +100,8 @@ pub enum SensorState {
     Never,
     /// No reading has arrived for longer than [`OLD_AFTER`].
     Silent,
+    /// Packets arrive, but all readings in them have been withheld for longer than [`OLD_AFTER`].
+    Withheld,
     /// The sensor is a head whose readings all come from one angle.
     Stalled,
     /// The sensor is a head that turns and pings without detecting the wall.
@@ -116,6 +120,7 @@ impl SensorState {
         match self {
             Self::Never => "never",
             Self::Silent => "silent",
+            Self::Withheld => "withheld",
             Self::Stalled => "stalled",
             Self::Deaf => "deaf",
             Self::Hung => "hung",
@@ -170,7 +175,7 @@ pub struct LiveState {
     /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
     /// way there.
     pub back_to_m: Option<f64>,
-    /// Observations about the dive that hold now.
+    /// Observations about the dive that apply at present.
     pub(crate) observations: ActiveObservations,
     /// Bitmask of the sources that are profiling heads.
     pub heads: u64,
@@ -184,11 +189,13 @@ pub struct LiveState {
     pub sources: u16,
     /// Receive time of each source's last reading.
     pub heard: [Option<MonoNs>; MAX_SOURCES],
+    /// Packets of each source since its last reading.
+    pub(crate) unread: [Option<UnreadSpan>; MAX_SOURCES],
 }
 
 stateful!(LiveState {
     state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, last_band, advice, sure_v_max_mps, metres, missed_from_m, unsure, passed, back_to_m, observations, turning, deaf, hung;
-    slots: heard;
+    slots: heard, unread;
     fixed: target, length_m, heads_reach_m, heads, sources;
 });
 
@@ -222,6 +229,7 @@ impl LiveState {
             hung: 0,
             sources,
             heard: [None; MAX_SOURCES],
+            unread: [None; MAX_SOURCES],
         }
     }
 
@@ -248,15 +256,45 @@ impl LiveState {
         self.heard.get(source).copied().flatten().map(|heard| DurNs(self.now.since(heard).0.max(0)))
     }
 
+    /// Records that a source delivered a reading at this time.
+    pub(crate) fn hear(&mut self, source: SourceId, at: MonoNs) {
+        if let Some(slot) = self.heard.get_mut(source.index()) {
+            *slot = Some(at);
+        }
+        if let Some(slot) = self.unread.get_mut(source.index()) {
+            *slot = None;
+        }
+    }
+
+    /// Records that a packet gave no reading.
+    pub(crate) fn hear_unread(&mut self, packet: &UnreadPacket) {
+        let Some(slot) = self.unread.get_mut(packet.source.index()) else { return };
+        let before = slot.filter(|span| (0..=OLD_AFTER.0).contains(&packet.received.since(span.to).0));
+        *slot = Some(UnreadSpan::after(before, packet));
+    }
+
+    /// Withheld readings of a source whose packets have given no reading for longer than [`OLD_AFTER`].
+    ///
+    /// Once a sensor has delivered readings, messages of other devices on its line don't count.
+    pub fn withheld(&self, source: usize) -> Option<WithheldReadings> {
+        let UnreadSpan { from, to, readings } = self.unread.get(source).copied().flatten()?;
+        let is_long = to.since(from).0 > OLD_AFTER.0 && self.now.since(to).0 <= OLD_AFTER.0;
+        let may_be_others =
+            matches!(readings.reason, WithheldReason::NoMessage | WithheldReason::OtherDevice);
+        (is_long && !(may_be_others && self.age_of(source).is_some())).then_some(readings)
+    }
+
     /// State of the sensor with this source.
     pub fn sensor(&self, source: usize) -> SensorState {
         let bit = |set: u64| {
             u32::try_from(source).is_ok_and(|source| set.checked_shr(source).unwrap_or(0) & 1 == 1)
         };
         let distrusted = |known: &ActiveObservation| known.source.is_some_and(|of| of.index() == source);
+        let has_reading = self.age_of(source).is_some_and(|age| age.0 <= OLD_AFTER.0);
         match self.age_of(source) {
+            _ if !has_reading && self.withheld(source).is_some() => SensorState::Withheld,
             None => SensorState::Never,
-            Some(age) if age.0 > OLD_AFTER.0 => SensorState::Silent,
+            Some(_) if !has_reading => SensorState::Silent,
             Some(_) if self.observations.iter().flatten().any(distrusted) => SensorState::Distrusted,
             Some(_) if bit(self.deaf) => SensorState::Deaf,
             Some(_) if bit(self.hung) => SensorState::Hung,
@@ -315,7 +353,7 @@ impl LiveState {
         (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
     }
 
-    /// Bitmask of the kinds of observations that hold now.
+    /// Bitmask of the kinds of observations that apply at present.
     pub(crate) fn observation_bits(&self) -> u64 {
         self.observations.iter().flatten().fold(0, |bits, known| bits | 1 << known.kind as u64)
     }

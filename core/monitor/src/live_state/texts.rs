@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::condition::Condition;
 use super::speed_band::SpeedBand;
-use super::state::LiveState;
+use super::state::{LiveState, SensorState};
 use crate::pilot_text::{limit_steps, speed_steps, station};
-use crate::words::verdict_words;
+use crate::words::{verdict_words, withheld_text};
 use headrace_coverage::Verdict;
 
 /// Texts of the speed and its limit, each without its unit.
@@ -66,6 +66,12 @@ impl LiveState {
         SpeedTexts { speed: speed.map(text), limit: limit.map(text), margin }
     }
 
+    /// Number of a sensor's withheld readings, with the reason; `None` unless they make it useless.
+    pub fn withheld_text(&self, source: usize) -> Option<String> {
+        let is_useless = self.sensor(source) == SensorState::Withheld;
+        self.withheld(source).filter(|_| is_useless).map(withheld_text)
+    }
+
     /// Text about missed stretches: their length, and where the first one begins; `None` if there are none.
     pub fn outstanding_text(&self) -> Option<String> {
         let missed = verdict_words(Verdict::Fail);
@@ -91,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_of_speed_limit_and_margin_agree_with_each_other_and_with_the_condition() {
+    fn speed_limit_and_margin_agree_with_the_condition() {
         let texts = [(0.0904, 0.0939), (0.0939, 0.0939), (0.0945, 0.0939), (0.0965, 0.0939), (0.1, 0.0939)]
             .map(|(speed_mps, v_max_mps)| shown(speed_mps, v_max_mps));
         insta::assert_snapshot!(texts.join("\n"), @r"

@@ -6,12 +6,18 @@ use bevy_ecs::system::SystemParam;
 use super::sound_speed::SoundSpeed;
 use crate::console::packets::{Commands, Console};
 use crate::entities::{SensorDecoder, SensorHealth, VehicleEntities};
-use crate::merge::Inbox;
+use crate::merge::{Inbox, MAX_TICK_PACKETS};
 use crate::messages::Event;
+use crate::unread::UnreadPacket;
+use headrace_sensor::withheld::WithheldReason;
 
 /// Readings of this tick, in order.
 #[derive(Debug, Default, Resource)]
 pub(super) struct Events(pub(super) Vec<Event>);
+
+/// Packets of this tick that gave no reading, in order.
+#[derive(Debug, Default, Resource)]
+pub(super) struct UnreadPackets(pub(super) Vec<UnreadPacket>);
 
 /// The operator's input, as a source of commands.
 #[derive(SystemParam)]
@@ -26,15 +32,17 @@ pub(super) fn decode(
     mut sensors: Query<'_, '_, (&mut SensorDecoder, &mut SensorHealth)>,
     mut sound_speed: ResMut<'_, SoundSpeed>,
     mut events: ResMut<'_, Events>,
+    mut unread: ResMut<'_, UnreadPackets>,
     mut operator: Operator<'_>,
 ) {
     events.0.clear();
+    unread.0.clear();
     operator.commands.0.clear();
     for (source, packet) in inbox.iter() {
         // The console isn't a sensor, so it doesn't contribute to the dive's times and counts.
         let Operator { console, commands } = &mut operator;
         if source == console.source {
-            console.take(packet, events.0.len(), commands);
+            console.take(packet, [events.0.len(), unread.0.len()], commands);
             continue;
         }
         let before = events.0.len();
@@ -51,5 +59,17 @@ pub(super) fn decode(
             });
         });
         health.count(packet.received, packet.bytes.len(), events.0.len() - before);
+        let withheld = decoder.0.withheld().saturating_sub(health.withheld);
+        health.withheld += withheld;
+        if events.0.len() == before && unread.0.len() < MAX_TICK_PACKETS {
+            let reason = decoder.0.withheld_reason().filter(|_| withheld > 0);
+            unread.0.push(UnreadPacket {
+                before,
+                source,
+                received: packet.received,
+                withheld: u32::try_from(withheld).unwrap_or(u32::MAX),
+                reason: reason.unwrap_or(WithheldReason::NoMessage),
+            });
+        }
     }
 }

@@ -141,7 +141,7 @@ mod tests {
 
     /// Updates come five times a second, from the first packet on.
     #[test]
-    fn each_update_is_due_once_and_only_the_latest_is_due_after_a_gap() {
+    fn each_update_is_due_at_most_once() {
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
         let mut next = None;
         for (now_s, beat_s) in [

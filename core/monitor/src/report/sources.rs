@@ -4,7 +4,10 @@ use headrace_geometry::time::MonoNs;
 use serde::Serialize;
 
 use crate::run::Loop;
+use crate::unread::WithheldReadings;
+use crate::words::withheld_text;
 use headrace_sensor::device_clock::ClockReport;
+use headrace_sensor::withheld::WithheldReason;
 
 /// Traffic statistics of a source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -24,9 +27,10 @@ pub struct SourceReport {
     /// Number of readings decoded from the frames.
     pub readings: u64,
     /// Number of readings decoded but not used.
-    ///
-    /// The reason is a bad status, another range setting, a missing calibration or a jump.
     pub withheld: u64,
+    /// Number of withheld readings, with the reason; `None` if the source gave a reading, or sent nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_reading: Option<String>,
     /// Longest silence between two packets, seconds.
     pub longest_gap_s: f64,
     /// Time from the source's last packet to the dive's last reading, seconds; `None` without packets.
@@ -104,6 +108,11 @@ pub struct NavigationReport {
     pub nis: Option<f64>,
 }
 
+fn no_reading_text(packets: u64, withheld: u64, reason: Option<WithheldReason>) -> String {
+    let (count, reason) = reason.map_or((packets, WithheldReason::NoMessage), |reason| (withheld, reason));
+    withheld_text(WithheldReadings { count: u32::try_from(count).unwrap_or(u32::MAX), reason })
+}
+
 pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
     let end = dive.view().span().map_or(MonoNs(0), |(_, last)| last);
     let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld()).zip(dive.decoder_clocks());
@@ -112,7 +121,7 @@ pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
         .zip(dive.view().health())
         .zip(decoders)
         .enumerate()
-        .map(|(number, ((source, tally), ((counts, withheld), clock)))| {
+        .map(|(number, ((source, tally), ((counts, (withheld, reason)), clock)))| {
             let span_s = tally.span.map_or(0.0, |(first, last)| last.since(first).as_secs_f64());
             let intervals = tally.packets.saturating_sub(1) as f64;
             SourceReport {
@@ -124,6 +133,8 @@ pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
                 skipped_bytes: counts.skipped_bytes,
                 readings: tally.readings,
                 withheld,
+                no_reading: (tally.packets > 0 && tally.readings == 0)
+                    .then(|| no_reading_text(tally.packets, withheld, reason)),
                 longest_gap_s: tally.longest_gap.as_secs_f64(),
                 silent_at_end_s: tally.span.map(|(_, last)| end.since(last).as_secs_f64().max(0.0)),
                 rate_hz: if span_s > 0.0 { intervals / span_s } else { 0.0 },

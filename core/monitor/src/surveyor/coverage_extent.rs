@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_head_is_assumed_to_move_with_the_vehicle_and_marks_its_sections() {
+    fn silent_head_is_assumed_to_move_with_the_vehicle() {
         // The second head is silent from 1 s on. The first one keeps pinging.
         let mut bench = Bench::new([Some(9), Some(1)]);
         assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn sections_left_by_silent_heads_are_judged_at_the_next_update() {
+    fn sections_left_by_silent_heads_are_judged_at_the_next_advice_update() {
         let mut bench = Bench::new([Some(1), Some(1)]);
         bench.beat(10, Some(5.0));
         bench.requests.0.clear();

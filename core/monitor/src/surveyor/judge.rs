@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn fail_raises_a_missed_stretch_and_unsure_section_joins_a_stretch_without_verdict() {
+    fn judgements_form_missed_stretches_and_stretches_without_verdict() {
         let mut coverage = coverage();
         let (notices, runs) = judged(&mut coverage, 40, -20.0);
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
@@ -153,7 +153,7 @@ mod tests {
 
     /// A remaining part of a cleared stretch takes over the stretch's alert, so the list must get the part first.
     #[test]
-    fn cleared_stretches_come_last_and_stretches_beyond_the_capacity_are_dropped() {
+    fn cleared_stretches_are_listed_after_all_other_changed_stretches() {
         let mut coverage = coverage();
         for section in [20, 40, 60] {
             judged(&mut coverage, section, -20.0);

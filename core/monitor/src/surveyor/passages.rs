@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn head_that_pings_without_a_fix_keeps_its_last_position() {
+    fn head_that_pings_without_a_fix_keeps_the_position_of_its_latest_fix() {
         let at = |seconds: u64| MonoNs(seconds * 1_000_000_000);
         let ping = |seconds: u64, x_m: Option<f64>| PlacedPing {
             received: at(seconds),

@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn gap_before_the_first_fix_has_no_chainages_and_the_oldest_of_many_gaps_are_joined() {
+    fn gap_before_the_first_fix_has_no_chainages() {
         let first = gaps(100, |_| None);
         assert_eq!(first.iter().map(|gap| (gap.from_m, gap.to_m)).collect::<Vec<_>>(), [(None, None)]);
         let every_other = |s: f64| ((s / 6.0).floor() % 2.0 < 1.0).then_some(5.0);

@@ -53,8 +53,8 @@ pub(super) fn report_standing(
     outputs.found.standings.push(standing);
 }
 
-/// Observations that hold now. `is_distrusted` tells whether a head is distrusted for the reason that a kind
-/// of observation names.
+/// Observations that apply at present. `is_distrusted` tells whether a head is distrusted for the reason that a kind of
+/// observation names.
 fn active(
     at: MonoNs,
     observations: &Observations,

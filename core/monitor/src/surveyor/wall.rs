@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn returns_beyond_the_tunnel_are_counted_and_the_largest_distance_is_kept() {
+    fn returns_beyond_the_tunnel_are_counted_with_their_largest_distance() {
         let mut bench = Bench::new();
         let mut note = |x_m: f64| {
             bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });

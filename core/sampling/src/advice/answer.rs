@@ -210,7 +210,7 @@ pub struct Advice {
     pub alternatives: [Option<Alternative>; MAX_MODES],
     /// Restart of the heads for their best speed; `None` if their phases do not depend on the speed.
     pub anew: Option<Anew>,
-    /// Speed cost of each margin of the target, updated every five seconds.
+    /// Largest speeds for the target as the margins are added one after the other, updated every five seconds.
     pub margins: Option<Margins>,
     /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,

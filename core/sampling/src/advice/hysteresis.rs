@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn more_severe_limiting_factor_appears_at_once_and_less_severe_one_after_1_s() {
+    fn limiting_factor_more_severe_than_the_displayed_one_appears_at_once() {
         let ladder = [Reason::HelixPitch, Reason::AngularStep, Reason::NoReturns, Reason::NoHeadingOrFix];
         for pair in ladder.windows(2) {
             let [lesser, graver] = [0, 1].map(|k| Advice::nothing(pair[k]));
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn lower_advised_speed_is_displayed_at_once_and_higher_one_after_10_s() {
+    fn decrease_of_the_advised_speed_is_displayed_at_once_and_increase_after_10_s() {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn exceedance_is_displayed_at_once_and_cleared_below_the_target() {
+    fn warning_of_a_missed_target_is_displayed_until_the_predicted_spacing_is_below_the_target() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
             // The predicted spacing T exceeds the target by less than `BEYOND`.

@@ -41,7 +41,8 @@ pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f6
 
 /// Returns `fastest_mps`, which meets the target, reduced by `share`.
 ///
-/// If the reduced speed misses the target, the result is the middle of the interval that ends at `fastest_mps`.
+/// If the reduced speed misses the target, the result is midway between `fastest_mps` and the lower limit of the speeds
+/// below it that meet the target.
 pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) -> bool) -> f64 {
     debug_assert!((0.0..1.0).contains(&share), "a margin is a share of the speed: {share}");
     debug_assert!(fastest_mps >= 0.0, "a speed isn't negative: {fastest_mps} m/s");

@@ -179,7 +179,7 @@ fn backward_travel_has_its_own_phases_and_remaining_length() {
 }
 
 #[test]
-fn advice_has_the_speed_of_each_mode_and_says_whether_the_remaining_time_suffices() {
+fn advice_has_for_each_mode_the_speed_and_whether_the_remaining_time_suffices() {
     let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     assert_eq!(case.advice().left.suffices_at(1.0), None);
     case.left_s = Some(3000.0);
@@ -344,7 +344,7 @@ fn cached_rings_of_rays_change_the_advice_by_at_most_2_percent() {
 }
 
 #[test]
-fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
+fn swing_of_the_vehicle_lowers_the_advised_speed() {
     let case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     let advise = |swing: Swing| case.advisor().advise(&case.situation, swing, None);
     let still = advise(Swing::default());
@@ -434,7 +434,7 @@ fn lost_returns_lower_the_speed() {
 
 /// Heads far apart along the hull meet the target in a speed interval that ends at the advised speed.
 #[test]
-fn target_is_met_in_the_speed_interval_and_missed_below_it() {
+fn target_is_met_within_the_advised_speed_interval_but_not_below_it() {
     let case = Case::new(&[0.0, 0.0], &[2.4, 0.0], 0.2, 1.0);
     let advice = case.advice();
     let t_at = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
@@ -505,7 +505,7 @@ fn speed_search_rules_out_no_speed_that_meets_the_target() {
 ///
 /// Higher intervals appear and vanish while heads run out of phase.
 #[test]
-fn higher_interval_is_advised_once_it_meets_the_target_with_margin() {
+fn faster_speed_interval_is_advised_once_it_meets_the_target_with_a_margin_of_2_percent() {
     let mut advisor = Case::new(&[0.0, 0.0], &[1.1, 0.0], 0.1, 0.5).advisor();
     let (mut last_mps, mut jumps, mut waited) = (None::<f64>, 0, 0);
     for k in 0..1440 {

@@ -47,7 +47,7 @@ fn evenly_phased_heads_pass_at_equal_intervals() {
 }
 
 #[test]
-fn place_hidden_from_some_heads_has_longer_times_between_passes() {
+fn place_hidden_from_some_heads_has_longer_times_between_passes_than_other_places() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
@@ -168,7 +168,7 @@ fn planned_heads_without_a_failed_head_pass_at_equal_intervals() {
 }
 
 #[test]
-fn parallax_is_larger_in_a_narrow_tunnel() {
+fn parallax_is_larger_in_a_narrow_tunnel_than_in_a_wide_one() {
     let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
     let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
     let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);

@@ -117,7 +117,7 @@ fn yaw_widens_sample_spacing_until_a_beam_along_the_tunnel_is_an_error() {
 }
 
 #[test]
-fn largest_sample_distance_over_every_eighth_ray_equals_the_distance_of_a_coarser_head() {
+fn every_eighth_ray_gives_the_largest_distance_of_a_head_with_an_8_times_larger_step() {
     let profile = shapes::ceran().unwrap();
     let fine = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let coarse = |start: u32| {

@@ -80,7 +80,7 @@ fn hidden_strip_across_the_seam_is_one_strip() {
 }
 
 #[test]
-fn fewer_passes_on_a_hidden_strip_lower_the_speed() {
+fn strip_hidden_from_some_heads_lowers_the_speed() {
     let hidden = [arc(7.0, 1.7)];
     let views = [all_around(&hidden), all_around(&[]), all_around(&hidden), all_around(&[])];
     let some = strips(&views);
@@ -306,7 +306,7 @@ fn full_list_of_hidden_arcs_overestimates_the_hidden_wall() {
 
 /// In either direction of rotation, the strip ends at the computed distance, even across the seam.
 #[test]
-fn distance_to_the_end_of_the_strip_is_right_for_each_sounding() {
+fn distance_to_the_end_of_the_strip_is_right_for_each_sample() {
     let mut strips = strips(&[all_around(&[arc(4.0, 3.0), arc(28.0, 3.5)]), all_around(&[arc(10.0, 5.0)])]);
     let ring = ring(&pipe());
     for (forward, side) in [(true, 1.0), (false, -1.0)] {

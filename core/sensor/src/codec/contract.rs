@@ -153,7 +153,7 @@ macro_rules! codec_contract {
                 #![proptest_config($crate::codec::contract::config())]
 
                 #[test]
-                fn any_bytes_cause_no_panic_and_are_released_by_flush(
+                fn flush_releases_all_bytes_of_arbitrary_input(
                     bytes in proptest::collection::vec(any::<u8>(), 0..2000),
                     pieces in proptest::collection::vec(0usize..40, 0..60),
                 ) {

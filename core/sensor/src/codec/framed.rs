@@ -45,10 +45,13 @@ pub trait Framing: Copy {
 
 /// Codec of a [`Framing`]: keeps an incomplete frame between pushes and finds frames in arbitrary input.
 ///
-/// `N` is the maximum frame length; a candidate that needs more bytes is bad. On a byte stream, scanning resumes at
-/// the second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame is
-/// skipped, and does not count as a bad frame. In a whole message, all bytes from the first one outside a frame to
-/// the end count as one bad frame. Apparent frames among these bytes are ignored.
+/// `N` is the maximum frame length, bytes. A candidate that needs more bytes counts as a bad frame.
+///
+/// On a byte stream, a bad candidate may contain the start of a good frame. The search therefore continues at the
+/// second byte of the bad candidate. A byte that starts no frame is skipped and not counted.
+///
+/// In a whole message, the first byte outside a frame begins one bad frame, which extends to the end of the message. No
+/// frames are looked for in it.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]

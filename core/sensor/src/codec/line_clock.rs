@@ -12,9 +12,9 @@ const MAX_PARTS: usize = 32;
 
 /// Stamps each frame of a byte stream with the receive time of the packet that contained its first byte.
 ///
-/// A frame may begin in a packet that arrived long before the one that completes it. If bytes of an incomplete frame
-/// come from over `MAX_PARTS` packets, the packets just before the newest one are merged. A frame that begins in a
-/// merged packet, after a false start, is then stamped too early.
+/// A frame may begin in one packet and end in a packet that arrives much later. If bytes of an incomplete frame come
+/// from over `MAX_PARTS` packets, the packets just before the newest one are merged. A frame that begins in a merged
+/// packet, after a false start, is then stamped too early.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]

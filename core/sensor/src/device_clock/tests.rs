@@ -141,7 +141,7 @@ fn device_time_continues_after_hours_of_silence() {
 }
 
 #[test]
-fn clock_restart_begins_an_epoch_and_keeps_the_drift() {
+fn clock_restart_begins_an_epoch_but_keeps_the_drift() {
     let device = Device { first_ticks: 0, ..xsens(80.0) };
     let mut clock = device.clock();
     let mut random = Random(4);

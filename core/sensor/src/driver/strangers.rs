@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_ignored_messages_are_counted_and_first_4_senders_named() {
+    fn only_the_first_4_senders_of_ignored_messages_are_named() {
         let mut strangers = IgnoredSenders::default();
         assert_eq!(strangers.words(), None);
         for number in 0..1000 {

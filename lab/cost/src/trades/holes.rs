@@ -386,7 +386,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
         let coarse = find(points, scene, "tolerance", Some(0.05))?;
         let search = figure(exact, SEARCH);
         Some(format!(
-            "Scene {scene}: the search takes {} of {} ns per return, so a tolerance can save at most {} %. A tolerance of 0.05 m saves {} ns and \
+            "Scene `{scene}`: the search takes {} of {} ns per return, so a tolerance can save at most {} %. A tolerance of 0.05 m saves {} ns and \
              leaves {} of 100 m without a verdict, instead of {}.",
             number(search),
             number(exact.cost.middle),
@@ -396,7 +396,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
             number(figure(exact, "not said"))
         ))
     };
-    let by_chance = "If position errors exceed the tolerance (drop-outs, field), a coarser search can look more accurate by \
+    let by_chance = "If position errors exceed the tolerance (`drop-outs`, `field`), a coarser search can look more accurate by \
                      chance, because it reports a lower bound of D."
         .to_owned();
     ["ideal", "drop-outs", "field"].into_iter().filter_map(of).chain([by_chance]).collect()
@@ -411,7 +411,7 @@ fn advice(points: &[Point]) -> String {
     let planned = find(points, "drop-outs", "of the plan", None);
     format!(
         "Keep the exact search. It takes {} of {} ns per return and is within {} m of D_true in an ideal dive. A grid of 0.1 m cells is {} m \
-         off. In the scene drop-outs, of every 100 m the grid wrongly passes {} m, and a verdict by the planned spacing T {} m.",
+         off. In the scene `drop-outs`, of every 100 m the grid wrongly passes {} m, and a verdict by the planned spacing T {} m.",
         number(figure(exact, SEARCH)),
         number(exact.cost.middle),
         number(exact.error()),

@@ -404,7 +404,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
     for scene in scenes {
         if let (Some((ring, coarse)), Some((tick, long))) = (pair(scene, "ring"), pair(scene, "tick")) {
             reasons.push(format!(
-                "Scene {scene}: rays every {} are the default. Rays every {} would save {} % of the loop's time, but the advised speed would be {} \
+                "Scene `{scene}`: rays every {} are the default. Rays every {} would save {} % of the loop's time, but the advised speed would be {} \
                  m/s off instead of {}, and the finest mode of a head has steps of 0.3 degrees. Ticks of {} are the default, so that an \
                  operator does not wait; ticks of {} would save {} % and change the verdict of {} m in 100.",
                 ring.value,

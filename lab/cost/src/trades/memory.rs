@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn packed_sample_is_smaller_and_moves_by_less_than_its_quantum() {
+    fn packing_moves_a_sample_by_less_than_its_quantum() {
         let store = filled(PACKED_M).unwrap();
         let usage = store.usage();
         let bytes = usage.bytes as f64 / usage.kept as f64;

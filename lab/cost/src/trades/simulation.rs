@@ -459,7 +459,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
     };
     let rays = of_rays(1).zip(of_rays(USUAL_RAYS)).map(|(one, usual)| {
         format!(
-            "A beam has {USUAL_RAYS} rays by default. In the scene {}, D with one ray differs by {} m from D with {MANY_RAYS} rays; D with {USUAL_RAYS} rays \
+            "A beam has {USUAL_RAYS} rays by default. In the scene `{}`, D with one ray differs by {} m from D with {MANY_RAYS} rays; D with {USUAL_RAYS} rays \
              differs by {} m. {USUAL_RAYS} rays cost {} ns per return, one ray {}. Only several rays find the edge of a boulder that cuts a beam; D \
              does not show this benefit.",
             usual.scene.trim_end_matches(", rays"),
@@ -499,12 +499,15 @@ fn advice(points: &[Point]) -> String {
     let idle = left_out().filter(within).max_by(|a, b| figure(a, "saved").total_cmp(&figure(b, "saved")));
     let most = most.map(|point| {
         let by_m = figure(point, "change of D");
-        format!("Leaving out `{}` changes D most: by {by_m:+.3} m in the scene {}.", point.value, point.scene)
+        format!(
+            "Leaving out `{}` changes D most: by {by_m:+.3} m in the scene `{}`.",
+            point.value, point.scene
+        )
     });
     let idle = idle.map(|point| {
         let saved_ns = figure(point, "saved");
         format!(
-            "Of the effects that change D by less than 1 cm, `{}` costs most: {saved_ns:.0} ns per return in the scene {}.",
+            "Of the effects that change D by less than 1 cm, `{}` costs most: {saved_ns:.0} ns per return in the scene `{}`.",
             point.value, point.scene
         )
     });

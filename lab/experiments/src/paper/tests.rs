@@ -66,7 +66,7 @@ fn recomputed_table_2_matches_to_the_digit() {
 }
 
 #[test]
-fn t_x_matches_the_paper_at_fitting_speed_except_in_mode_fast() {
+fn t_x_matches_the_paper_except_in_mode_fast_if_the_speed_is_fitted() {
     let tables = tables();
     let one = tables.table_3.rows.iter().map(|row| (row.mode.to_owned(), &row.t_x_m));
     assert_eq!(apart(one), ["FAST"]);

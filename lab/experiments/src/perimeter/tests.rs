@@ -73,7 +73,7 @@ fn polygon_of_a_square_has_its_perimeter() {
 }
 
 #[test]
-fn small_gap_between_pings_is_interpolated_and_an_open_outline_is_refused() {
+fn small_gap_between_pings_is_interpolated() {
     let profile = shapes::circle(4.0).unwrap();
     let mut pings = turn(&profile, [0.0, 4.0], 0.0, 1);
     pings.retain(|p| p.angle_rad > 0.5);

@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn spurs_are_removed_and_rings_remain() {
+    fn spurs_are_removed_but_rings_remain() {
         let mut image = drawn(&[
             "...........",
             ".#.........",

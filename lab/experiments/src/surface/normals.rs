@@ -26,7 +26,7 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
 
     #[test]
-    fn normals_point_inwards_and_match_an_arc_about_the_reference() {
+    fn normals_point_inwards_and_match_those_of_an_arc() {
         let profile = shapes::ceran_blueprint().unwrap();
         let places: Vec<Xyz> =
             (0..200).map(|k| profile.point_at(f64::from(k) * 0.17)).map(|[y, z]| [1.0, y, z]).collect();

@@ -152,7 +152,7 @@ fn swapping_the_pairs_swaps_w_plus_and_w_minus() {
 }
 
 #[test]
-fn unrankable_input_is_refused() {
+fn input_without_ranks_is_refused() {
     let refused = |values: &[f64]| of_differences(values, Options::default()).err();
     assert_eq!(refused(&[]), Some(WilcoxonError::NoDifference));
     assert_eq!(refused(&[0.0, -0.0]), Some(WilcoxonError::NoDifference));

@@ -166,7 +166,7 @@ export class World {
     const predicted = round(0.5 * (this.speed_mps / this.v_max_mps) ** 0.8);
     const missed = Math.floor(x / 137) * 6.25, unsure = Math.floor(x / 411) * 14;
     const yaw = 2 * Math.sin(this.t_s / 7);
-    return { type: "state", version: 2, t_s: round(this.t_s), text: "", now_s: round(this.t_s), at_s: round(this.t_s), age_s: 0.02, old: false,
+    return { type: "state", version: 3, t_s: round(this.t_s), text: "", now_s: round(this.t_s), at_s: round(this.t_s), age_s: 0.02, old: false,
       condition, lamp,
       position: { state: none ? "none" : this.position, why: none ? "no_heading" : this.position === "doubtful" ? "cable" : null,
         chainage_m: none ? null : round(x), station: none ? null : station(x), chainage_sd_m: none ? null : 0.31, place_sd_m: none ? null : 0.04,
@@ -174,7 +174,7 @@ export class World {
       speed_mps: none ? null : round(v), v_max_mps: none ? null : this.v_max_mps, reason: none ? "no_heading_or_fix" : "helix_pitch",
       remedy: this.remedy, margins: { speed_mps: none || this.v_max_mps === null ? null : round(this.v_max_mps - v), turn_m: none ? null : round(dive.TARGET_M - predicted), position_m: none ? null : 0.024, lost_share: null },
       turn: none ? null : { target_m: dive.TARGET_M, predicted_t_m: predicted, will_exceed: predicted > dive.TARGET_M, t_y_m: 0.29, pass_gap_s: 1, phase_error_deg: 2 },
-      sensors: SENSORS.map(({ id }, n) => ({ id, state: this.dead.has(id) && age(id) > 2 ? "silent" : "ok", age_s: age(id), is_head: n < 4 })),
+      sensors: SENSORS.map(({ id }, n) => ({ id, state: this.dead.has(id) && age(id) > 2 ? "silent" : "ok", age_s: age(id), is_head: n < 4, withheld: null })),
       metres: { pass_m: round(x - missed - unsure - 1.8, 2), fail_m: missed, cannot_say_m: unsure, open_m: 0.8, not_inspected_m: 1, way_m: round(x, 2) },
       cannot_say: null,
       alert_counts: { unacknowledged: this.alerts.filter((a) => a.needs_acknowledgement && !a.acknowledged).length, active: this.alerts.length },

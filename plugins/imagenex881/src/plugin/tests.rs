@@ -52,7 +52,7 @@ fn reading_is_valid_one_latency_before_its_return() {
 }
 
 #[test]
-fn short_range_setting_has_2_mm_resolution_and_missing_echo_gives_no_range() {
+fn short_range_setting_has_2_mm_resolution() {
     let mut decoder = decoder("mode = \"fast\"\nrange_m = 3");
     let near = Return { header: Header { range_m: 3, profile_counts: 1234, ..good().header }, ..good() };
     let [(_, sonar)] = decode(&mut decoder, 0, &bytes(&near))[..] else { panic!() };

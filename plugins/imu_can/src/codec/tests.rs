@@ -158,7 +158,7 @@ fn configured_base_shifts_xsens_message_ids_to_29_bits() {
 }
 
 #[test]
-fn frames_outside_the_message_set_are_ignored_and_wrong_lengths_are_bad() {
+fn frames_of_the_message_set_with_a_wrong_length_count_as_bad() {
     let mut codec = ImuCodec::new(XSENS);
     let mut none = |message| panic!("{message:?}");
     let remote = CanFrame::of_kind(FrameKind::Remote(CanId::Standard(0x34)), &[0; 6]).unwrap();

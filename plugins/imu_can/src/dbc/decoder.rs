@@ -8,6 +8,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{Decoded, Packet, Reading};
 use headrace_sensor::sample_times::SampleTimes;
 use headrace_sensor::stateful;
+use headrace_sensor::withheld::WithheldReason;
 
 use super::layout::DATA_BYTES;
 use super::mapping::{Attitude, Axes, Condition, Mapping, Part, Stamp};
@@ -180,6 +181,10 @@ impl Decoder for DbcDecoder {
     /// with a component missing.
     fn withheld(&self) -> u64 {
         self.state.withheld
+    }
+
+    fn withheld_reason(&self) -> Option<WithheldReason> {
+        (self.state.withheld > 0).then_some(WithheldReason::MarkedInvalid)
     }
 
     fn clock(&self) -> Option<ClockReport> {

@@ -174,7 +174,7 @@ mod tests {
         }
 
         #[test]
-        fn inserted_bits_are_extracted_and_no_others_change(
+        fn bit_insertion_changes_no_other_bit(
             data: [u8; 8], raw: u64, start in 0_u64..64, size in 1_u64..=64, order in order(),
         ) {
             let Some(layout) = Layout::new(start, size, order, 8) else { return Ok(()) };

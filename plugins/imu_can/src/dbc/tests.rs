@@ -211,7 +211,7 @@ proptest! {
 }
 
 #[test]
-fn dbc_readings_equal_the_preset_readings() {
+fn readings_by_a_dbc_file_equal_those_by_the_preset_of_the_device() {
     let [(mapping, set), ..] = &*MAPPINGS;
     let packets: Vec<Vec<u8>> = [
         frame(0x05, &[0, 0, 0x27, 0x10]),
@@ -289,7 +289,7 @@ fn vector_in_several_frames_is_reported_when_its_last_frame_arrives() {
 }
 
 #[test]
-fn worked_examples_of_other_makers_are_decoded() {
+fn worked_examples_of_makers_without_a_preset_are_decoded() {
     let dbc = DbcFile::parse(OTHERS).unwrap();
     let value = |name: &str, data: [u8; 8]| {
         let place = dbc.signal(name).unwrap().place;

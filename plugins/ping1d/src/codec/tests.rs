@@ -146,7 +146,7 @@ fn nack_keeps_its_readable_text() {
 }
 
 #[test]
-fn unknown_message_is_kept_and_cannot_be_sent_under_a_known_id() {
+fn unknown_message_cannot_be_sent_under_a_known_id() {
     let other = |id| Addressed {
         source: 1,
         destination: 0,
@@ -185,7 +185,7 @@ fn frame_with_a_false_length_hides_no_other_frame() {
 }
 
 #[test]
-fn longest_frame_is_accepted_and_a_longer_one_refused() {
+fn longest_frame_is_accepted_but_a_longer_one_refused() {
     let longest = frame(2300, &[7; MAX_PAYLOAD_BYTES]);
     assert_eq!(longest.len(), MAX_FRAME_BYTES);
     assert_eq!(decode(&longest).1.good_frames, 1);

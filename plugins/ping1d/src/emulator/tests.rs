@@ -41,7 +41,7 @@ fn run(
 }
 
 #[test]
-fn readings_are_the_wall_distance_in_device_millimetres() {
+fn distances_are_scaled_by_the_sound_speed_setting_of_the_device() {
     let wall_m = |at_s: f64| 3.8 - 0.1 * at_s;
     for device_mps in [1500.0, 1447.0] {
         let text = format!("sound_speed_mps = {device_mps}");

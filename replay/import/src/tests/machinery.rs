@@ -70,7 +70,7 @@ fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
 }
 
 #[test]
-fn imported_entries_are_sorted_by_time_and_losses_are_counted() {
+fn imported_entries_are_sorted_by_time() {
     let file = [
         eight(5000, b'E', b'a', 1),
         eight(5020, b'E', b'b', 3),

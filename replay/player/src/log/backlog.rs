@@ -124,7 +124,7 @@ impl Tally {
         self.last = Some(head.log_time);
     }
 
-    /// Returns the totals as a part's metadata contain them.
+    /// Returns the numbers of messages so far, in the form of a part's metadata.
     pub(super) fn progress(&self, header: &LogHeader) -> Progress {
         let sequences = self.next.iter().filter_map(|(lane, next)| Some((topic(*lane, header)?, *next)));
         Progress { messages: self.messages, tick: self.tick, sequences: sequences.collect() }

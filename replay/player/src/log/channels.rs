@@ -82,7 +82,7 @@ impl Channels {
         channels
     }
 
-    /// Returns the limit that the channel definitions known at opening exceeded, if any.
+    /// Returns the limit that was exceeded by the channel definitions known at opening; `None` if no limit was.
     pub(super) fn refused(&self) -> Option<Many> {
         self.refused
     }
@@ -107,8 +107,8 @@ impl Channels {
         &self.later
     }
 
-    /// Restores the channels as known at an earlier position. `later` are the definitions found among the messages
-    /// before that position.
+    /// Restores the channels that were known at an earlier position in the log. `later` holds the definitions found
+    /// among the messages up to that position.
     pub(super) fn go_to(&mut self, later: &[Definition]) {
         let same = self.later.iter().zip(later).take_while(|(one, other)| one.id == other.id).count();
         for gone in self.later.drain(same..).rev() {

@@ -18,6 +18,8 @@ pub enum LossKind {
     Truncated,
     /// Bytes that aren't records, because lengths are wrong or bytes were overwritten.
     Framing,
+    /// Another log in the same file, which isn't read.
+    AnotherLog,
     /// A chunk with a wrong checksum. None of its messages is delivered.
     Checksum,
     /// A chunk that can't be unpacked, or has content other than records. None of its messages is delivered.
@@ -181,6 +183,7 @@ impl fmt::Display for LossKind {
         match self {
             Self::Truncated => out.write_str("the file ends before its closing records"),
             Self::Framing => out.write_str("bytes that aren't records"),
+            Self::AnotherLog => out.write_str("another log begins in the same file and isn't read: save it as a file"),
             Self::Checksum => out.write_str("a chunk that fails its checksum"),
             Self::Contents => out.write_str("a chunk that can't be decompressed"),
             Self::Unreadable(error) => write!(out, "the medium can't read them: {error}"),
@@ -281,6 +284,13 @@ impl LossKind {
 }
 
 impl Loss {
+    /// The loss with its times in dive time, from the beginning of the log at `begun`.
+    #[must_use]
+    pub fn in_dive_time(&self, begun: MonoNs) -> Self {
+        let dive_time = |at: MonoNs| MonoNs(at.0.saturating_sub(begun.0));
+        Self { from: self.from.map(dive_time), to: self.to.map(dive_time), ..self.clone() }
+    }
+
     /// Whether the loss is the cut-off end of the dive's last file.
     pub(crate) fn is_open_end(&self) -> bool {
         let kind = match &self.kind {

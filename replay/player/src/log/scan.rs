@@ -22,7 +22,7 @@ use super::limits::{
     MAX_UNPACKED_BYTES, MAX_UNPACKED_RATIO, map_cost, quoted, unpacked_limit,
 };
 use super::loss::{Loss, LossKind, Losses, Many};
-use super::search::find_records;
+use super::search::{find_log, find_records};
 
 /// Approximate size of a piece of messages outside chunks, bytes.
 const RUN_BYTES: u64 = 1 << 20;
@@ -146,13 +146,15 @@ fn not_mcap<R: Read + Seek>(file: &LogFile<R>, first: &[u8]) -> LogError {
 impl Scan {
     fn walk<R: Read + Seek>(&mut self, file: &mut LogFile<R>, start: u64) -> Result<(), LogError> {
         let (mut at, mut found) = (start, look(file, start)?);
+        // Begin of the last record before `at`. The length of a record that was cut off may reach into another log.
+        let mut last = start;
         loop {
             // Position in the file at which the scan continues after damage.
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
                     self.check_closing(at);
-                    if end < file.len() {
+                    if end < file.len() && !self.ends_at_other_log(file, at..end + 1, file.len())? {
                         self.lose(LossKind::Framing, end..file.len());
                     }
                     return Ok(());
@@ -164,7 +166,13 @@ impl Scan {
                 Found::Record(frame) => {
                     let next = look(file, frame.end)?;
                     if is_believed(file, &frame, &next)? {
-                        (at, found) = (frame.end, next);
+                        // Times go back in a copy of a log, whose begin may lie within the last chunk.
+                        let before = self.spans.last().filter(|before| before.is_after(&frame.item));
+                        let from = before.map_or(at, |before| before.at);
+                        if self.ends_at_other_log(file, from..at, at)? {
+                            return Ok(());
+                        }
+                        (last, at, found) = (at, frame.end, next);
                         self.accept(file, &frame)?;
                         continue;
                     }
@@ -185,10 +193,29 @@ impl Scan {
                 }
                 Found::Nothing => find_records(file, at + 1, u64::MAX)?,
             };
-            self.lose(LossKind::Framing, at..resumed.unwrap_or(file.len()));
+            let until = resumed.unwrap_or(file.len());
+            if self.ends_at_other_log(file, last..until, at)? {
+                return Ok(());
+            }
+            self.lose(LossKind::Framing, at..until);
             let Some(resumed) = resumed else { return Ok(()) };
-            (at, found) = (resumed, look(file, resumed)?);
+            (last, at, found) = (resumed, resumed, look(file, resumed)?);
         }
+    }
+
+    /// Whether another log begins in this range of the file. If so, it isn't read, and the log was cut off at `at`.
+    fn ends_at_other_log<R: Read + Seek>(
+        &mut self,
+        file: &mut LogFile<R>,
+        range: core::ops::Range<u64>,
+        at: u64,
+    ) -> Result<bool, LogError> {
+        let Some(other) = find_log(file, range.start, range.end)? else { return Ok(false) };
+        if at < other {
+            self.lose(LossKind::Truncated, at..other);
+        }
+        self.lose(LossKind::AnotherLog, other..file.len());
+        Ok(true)
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
@@ -514,6 +541,11 @@ fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Foun
 }
 
 impl Span {
+    /// Whether an item is a chunk whose messages begin before this piece.
+    fn is_after(&self, item: &Item) -> bool {
+        matches!(item, Item::Chunk(place) if place.times.0 < self.from)
+    }
+
     /// Reads the chunk's header; `None` for a run of messages outside chunks.
     pub(super) fn chunk<R: Read + Seek>(
         &self,

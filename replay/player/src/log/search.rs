@@ -5,7 +5,7 @@ use std::io::{Read, Seek};
 use mcap::records::op;
 
 use super::error::LogError;
-use super::framing::{Found, Item, LogFile, look};
+use super::framing::{Found, Frame, Item, LogFile, look};
 
 /// Number of consecutive records after which a position is accepted.
 const CHAIN: usize = 3;
@@ -36,21 +36,45 @@ struct Chain {
     confirmed: bool,
 }
 
+/// Returns the first position in `from..until` at which a log begins: the magic bytes and a header record.
+pub(super) fn find_log<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    from: u64,
+    until: u64,
+) -> Result<Option<u64>, LogError> {
+    find(file, from, until, |file, head, at| {
+        let is_log = head == mcap::MAGIC
+            && matches!(
+                look(file, at + mcap::MAGIC.len() as u64)?,
+                Found::Record(Frame { item: Item::Header { .. }, .. })
+            );
+        Ok(is_log.then_some(at))
+    })
+}
+
 fn find_chain<R: Read + Seek>(
     file: &mut LogFile<R>,
     from: u64,
     until: u64,
 ) -> Result<Option<Chain>, LogError> {
+    find(file, from, until, |file, head, at| if may_begin(head) { chain_at(file, at) } else { Ok(None) })
+}
+
+/// Returns the first result of `examine`, which gets every eight bytes with their position in `from..until`.
+fn find<R: Read + Seek, T>(
+    file: &mut LogFile<R>,
+    from: u64,
+    until: u64,
+    examine: impl Fn(&mut LogFile<R>, &[u8], u64) -> Result<Option<T>, LogError>,
+) -> Result<Option<T>, LogError> {
     let mut block = vec![0; SEARCH_BYTES];
     let mut start = from;
     while start < until.min(file.len()) {
         let got = file.read_at(start, &mut block)?;
         let bytes = block.get(..got).unwrap_or_default();
         for (at, head) in (start..until).zip(bytes.windows(mcap::MAGIC.len())) {
-            if may_begin(head)
-                && let Some(chain) = chain_at(file, at)?
-            {
-                return Ok(Some(chain));
+            if let Some(found) = examine(file, head, at)? {
+                return Ok(Some(found));
             }
         }
         // Windows that cross the end of this block are checked with the next block.

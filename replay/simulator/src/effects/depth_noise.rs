@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_offset_is_constant_in_a_dive_and_noise_does_not_depend_on_time_slices() {
+    fn depth_offset_is_constant_in_a_dive() {
         let errors = errors_pa("[effects.depth_noise]\noffset_sd_pa = 1000\n");
         assert!(errors[0] != 0.0 && errors.iter().all(|error| (error - errors[0]).abs() < 1e-6));
         same_in_any_slices(&Bench::turning("[effects.depth_noise]\nnoise_pa = 300\ndrift_pa = 100\n"));

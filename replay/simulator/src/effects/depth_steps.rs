@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_quantisation_of_other_sensors_is_refused() {
+    fn depth_quantisation_of_an_inertial_unit_is_refused() {
         assert!(refusal("[effects.depth_steps]\nsensors = [\"imu\"]\n").contains("can act on: depth"));
     }
 }

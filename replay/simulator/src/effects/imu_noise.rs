@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_zero_noise_is_refused() {
+    fn time_slice_length_does_not_change_results() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_noise]\n").contains("accel_mps2_rthz, attitude_deg must not be"));
     }

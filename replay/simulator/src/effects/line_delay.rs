@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_zero_delay_is_refused() {
+    fn time_slice_length_does_not_change_results() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.line_delay]\n").contains("jitter_ms must not be zero"));
     }

@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn multipath_returns_have_the_given_share_and_mean_run() {
+    fn multipath_returns_have_the_given_share_and_mean_run_length() {
         let dive = Dive {
             seconds: 1000.0,
             tunnel: "profile = \"rectangle\"\nwidth_m = 4\nheight_m = 3",

@@ -1,4 +1,4 @@
-//! Returns from objects in front of the wall, in clusters.
+//! Sonar returns from objects in front of the wall, in clusters.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -178,7 +178,7 @@ mod tests {
     /// The wall is 3 m away, so half of the clusters from 2 to 4 m are in front of the wall. A ping that the sonar
     /// loses has no return, even if it hit a cluster.
     #[test]
-    fn clusters_beyond_the_wall_have_no_effect_and_lost_pings_stay_lost() {
+    fn near_return_clusters_beyond_the_wall_have_no_effect() {
         let dive = Dive { seconds: 400.0, ..Dive::with_sounder() };
         let keys = "[effects.near_returns]\nshare = 0.4\nnear_m = 2\nfar_m = 4\nspread_m = 0\n";
         let (base, with) = (dive.dive("").ranges_m(0), dive.dive(keys).ranges_m(0));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.near_returns]\n{keys}"));
         assert!(refusal("").contains("share: must be above zero"));

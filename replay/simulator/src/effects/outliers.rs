@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn default_outliers_stay_within_the_range_setting_and_missing_returns_stay_missing() {
+    fn default_outliers_stay_within_the_range_setting() {
         let mut dive = Dive::with_head();
         dive.tunnel = "profile = \"rectangle\"\nwidth_m = 40\nheight_m = 5";
         let (base, dived) = (dive.dive(""), dive.dive("[effects.outliers]"));

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_heads_without_a_sector_are_refused() {
+    fn time_slice_length_does_not_change_results() {
         same_in_any_slices(&Bench::sectors(KEYS));
         let why = refusal("[effects.sector_end_slowing]\n");
         assert!(why.contains("none of its heads turns in a sector"), "{why}");

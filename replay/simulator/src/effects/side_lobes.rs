@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn side_lobes_are_heard_in_the_given_share_of_oblique_beams_and_in_no_perpendicular_beam() {
+    fn side_lobes_are_heard_only_in_the_given_share_of_oblique_beams() {
         let dive = Dive { seconds: 500.0, ..Dive::with_head() };
         let (mut oblique, mut taken) = (0, 0);
         for row in &dive.dive("[effects.side_lobes]\nshare = 0.2").rows {

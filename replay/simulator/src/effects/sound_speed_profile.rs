@@ -140,7 +140,7 @@ mod tests {
     /// At a gradient of -50 m/s per metre, the speed would be zero about thirty metres up. The mean slowness is
     /// computed with at least a third of the speed at the floor.
     #[test]
-    fn speed_of_sound_never_falls_below_a_third_of_the_floor_value() {
+    fn speed_of_sound_never_falls_below_a_third_of_the_speed_at_the_tunnel_floor() {
         let profile = Parameters { floor_mps: 1440.0, per_metre_mps: -50.0, assumed_mps: 1440.0 };
         let expected = 1.5 * math::ln(3.0);
         for height_m in [20.0, 40.0, 400.0] {
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
         assert!(refusal.contains("is missing; give floor_mps, per_metre_mps or both"), "{refusal}");

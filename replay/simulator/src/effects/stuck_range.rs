@@ -85,7 +85,7 @@ mod tests {
     use crate::testing::Dive;
 
     #[test]
-    fn stuck_range_is_constant_from_start_to_end_and_true_otherwise() {
+    fn range_is_constant_while_stuck_and_true_otherwise() {
         let dive = Dive { seconds: 30.0, ..Dive::with_head() };
         let effect = "[effects.stuck_range]\nrange_m = 0.7\nfrom_s = 10\nto_s = 20";
         let (base, dived) = (dive.dive(""), dive.dive(effect));

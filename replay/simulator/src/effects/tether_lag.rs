@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn cable_count_is_constant_within_the_threshold_and_lags_equally_both_ways() {
+    fn cable_count_lags_equally_in_both_directions() {
         let mut winding = winding();
         for k in 0..1000 {
             let travelled_m = 3.0 + 0.49 * math::sin(f64::from(k) * 0.05);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_invalid_keys_are_refused() {
+    fn time_slice_length_does_not_change_results() {
         same_in_any_slices(&Bench::turning("[effects.late_winding]\nhold_m = 0.2\n"));
         assert!(refusal("[effects.late_winding]\nspeed_mps = 0\n").contains("from 0.01 to 5"));
     }

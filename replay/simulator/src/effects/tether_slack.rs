@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn time_slice_length_does_not_change_results_and_other_sensors_are_refused() {
+    fn time_slice_length_does_not_change_results() {
         same_in_any_slices(&Bench::turning("[effects.tether_slack]\n"));
         same_in_any_slices(&Bench::turning(
             "[effects.tether_slack]\nreach_m = 0.1\nswings = [{ reach_m = 0.1, period_s = 7 }]\n",

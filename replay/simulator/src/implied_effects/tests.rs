@@ -97,7 +97,7 @@ fn each_description_implies_its_effects() {
 }
 
 #[test]
-fn named_effects_override_implied_effects_and_the_key_leave_omits_effects() {
+fn named_effects_override_implied_effects() {
     let text = format!(
         "{MURK}[effects]\ntake = \"called\"\nleave = [\"beam_cone\"]\nrange_noise = {{ sd_m = 0.2 }}\n"
     );
@@ -123,7 +123,7 @@ fn leaving_out_an_effect_equals_not_naming_it_in_the_scene() {
 }
 
 #[test]
-fn later_implied_effect_overrides_keys_of_an_overlapping_earlier_one() {
+fn second_of_two_overlapping_implied_effects_sets_their_common_keys() {
     let on = |call: Call| call.on(&["a".to_owned(), "b".to_owned()]);
     let calls = [
         on(Call::new("echo_strength", "one", &[("wall_db", number(0.0)), ("silt_gpl", number(1.0))])),

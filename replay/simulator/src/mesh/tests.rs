@@ -256,7 +256,7 @@ fn no_ray_from_the_axis_of_a_tube_slips_through_its_wall() {
 }
 
 #[test]
-fn degenerate_triangles_leak_no_rays_and_keep_ranges_exact() {
+fn ranges_to_a_mesh_with_degenerate_triangles_are_exact() {
     // A third vertex on an edge splits a triangle of the box's upper face. One of the three pieces has no area.
     let mut t = cuboid([1.0, 1.0, 1.0]);
     let old =

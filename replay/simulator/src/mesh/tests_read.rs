@@ -82,7 +82,7 @@ fn triangles_are_read_back_in_every_encoding() {
 }
 
 #[test]
-fn polygons_are_split_into_triangles_and_text_files_keep_all_digits() {
+fn polygons_are_split_into_triangles() {
     let ply = "ply\r\nformat ascii 1.0\r\nelement vertex 5\r\nproperty float x\r\nproperty int y\r\nproperty float \
                z\r\nelement face 1\r\nproperty list uchar uint vertex_index\r\nend_header\r\n0 0 0\r\n0.1 0 0\r\n1 1 0\r\n0 \
                1 0\r\n-1 0.5 12345.678\r\n5 0 1 2 3 4\r\n\r\n";

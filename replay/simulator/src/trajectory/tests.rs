@@ -294,7 +294,7 @@ fn current_changes_the_speed_only_within_its_stretch() {
 }
 
 #[test]
-fn current_changes_legs_and_pilot_and_is_refused_for_ground_trajectories() {
+fn current_is_refused_for_trajectories_over_ground() {
     let mut legs = trajectory("[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.2\n");
     legs.carry(&everywhere(0.1)).unwrap();
     assert!((legs.duration_s() - 40.0).abs() < 1e-9 && (legs.place(20.0).chainage_m - 6.0).abs() < 1e-9);

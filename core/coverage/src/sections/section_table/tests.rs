@@ -44,7 +44,7 @@ fn each_section_counts_once_in_the_metres_of_its_latest_verdict() {
 ///
 /// A section without pings has the largest error of the sections within half the target.
 #[test]
-fn section_without_pings_has_the_largest_position_error_nearby() {
+fn section_without_pings_has_the_largest_position_error_of_nearby_sections() {
     let error_of = |placed_in: i64, asked: i64| {
         let mut sections = sections();
         for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
@@ -106,7 +106,7 @@ fn verdict_requires_the_configured_number_of_standard_deviations() {
 }
 
 #[test]
-fn verdict_stays_open_until_enough_of_the_hole_is_beyond_the_heads_reach() {
+fn verdict_stays_open_until_enough_of_the_hole_is_out_of_reach_of_the_heads() {
     let at = |clear_m: f64| verdict(&hole(2.0), 0.1, Target::new(1.0), clear_m);
     assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
     let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, Target::new(1.0), clear_m);

@@ -43,7 +43,7 @@ fn dive_without_an_estimate_records_no_smoothing_steps() {
 
 /// A clock set back by more than 10 s ends a piece of the track exactly once, even if no later reading follows.
 #[test]
-fn filter_steps_before_a_clock_reset_are_recorded_completely_and_end_once() {
+fn filter_steps_before_a_clock_reset_are_recorded_completely() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 30.0) {

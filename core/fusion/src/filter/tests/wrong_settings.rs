@@ -92,7 +92,7 @@ fn slow_swing_verifies_mounts_and_reveals_a_yawed_head() {
 }
 
 #[test]
-fn mounts_stay_unverified_without_a_swing_and_need_no_check_for_a_single_head() {
+fn mounts_stay_unverified_without_a_swing() {
     let is_unverified = |is_heard: &dyn Fn(usize) -> bool| {
         dived(&Rig::new(rest, 5), 240.0, 0.0, is_heard).has_unverified_mounts()
     };

@@ -310,7 +310,7 @@ fn only_side_by_side_heads_gain_from_mounts_in_line() {
 ///
 /// The live advice therefore differs from a plan, which may restart the heads.
 #[test]
-fn heads_started_for_another_speed_lower_the_largest_speed() {
+fn heads_started_for_a_slower_speed_than_v_max_lower_the_largest_speed() {
     let target_m = 0.6;
     let mode = 2;
     let apart = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();

@@ -23,6 +23,7 @@ export interface Hello {
 
 export interface Sensor {
   id: string; state: keyof typeof SENSOR_STATES; age_s: number | null; is_head: boolean;
+  withheld: string | null;
 }
 
 export interface Turn {
@@ -49,7 +50,7 @@ export interface State {
   sensors: Sensor[];
   metres: Metres;
   /** Verdicts of the same dive for the second target, which the hello states. */
-  compared?: { target_m: number; pass_m: number; fail_m: number; cannot_say_m: number; open_m: number };
+  compared?: { target_m: number; pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number };
   cannot_say: { why: string; from_m: number; to_m: number } | null;
   /** Whether the replay has reached its end, or the dive has ended. */
   ended?: boolean;

@@ -48,7 +48,7 @@ function Compared() {
   return (
     <p class="compared">
       <b>T {figure(other.target_m, 2)} m:</b>{" "}
-      {(["pass", "fail", "cannot_say", "open"] as const).map((key) => `${VERDICTS[key]} ${metres(other[`${key}_m`])}`).join(" · ")}
+      {(["pass", "fail", "cannot_say", "open", "not_inspected"] as const).map((key) => `${VERDICTS[key]} ${metres(other[`${key}_m`])}`).join(" · ")}
     </p>
   );
 }

@@ -22,7 +22,7 @@ export function Sensors() {
           const lamp = ended ? "none" : is === "ok" ? "green" : is === "unknown" ? "none" : is === "stalled" || is === "distrusted" ? "amber" : "red";
           const hz = state?.rates?.find((rate) => rate.id === sensor.id)?.hz;
           const kind = hello?.sensors.find((each) => each.id === sensor.id)?.kind ?? "";
-          const word = is === "unknown" ? is : (SENSOR_STATES[is] ?? is);
+          const word = is === "unknown" ? is : (sensor.withheld ?? SENSOR_STATES[is] ?? is);
           return (
             <li key={sensor.id} class={`sensor ${lamp}`} data-sensor={sensor.id} data-state={is} title={kind}>
               <Shape lamp={lamp} size={18} />

@@ -3,7 +3,7 @@
 
 /** Conditions: name, explanation, action, and words before v_max. */
 export const CONDITIONS = {
-  no_data: { name: "WAITING", detail: "nothing from any sensor yet", action: "", speed: "" },
+  no_data: { name: "WAITING", detail: "no reading from any sensor yet", action: "", speed: "" },
   old: { name: "OLD", detail: "nothing from any sensor", action: "stop", speed: "" },
   no_position: { name: "NO POSITION", detail: "", action: "hold still", speed: "" },
   outside: { name: "OUTSIDE", detail: "no head is within the tunnel", action: "", speed: "" },
@@ -58,6 +58,7 @@ export const UNSEEN = "unseen";
 export const SENSOR_STATES = {
   never: "no data yet",
   silent: "silent",
+  withheld: "readings withheld",
   stalled: "doesn't turn",
   deaf: "detects no wall",
   hung: "stuck",

@@ -55,7 +55,7 @@ fn sounder_resolution_is_1_cm_at_every_range() {
 }
 
 #[test]
-fn position_past_a_turn_is_refused_for_heads_and_accepted_for_sounders() {
+fn position_beyond_one_turn_is_refused_for_heads_but_not_for_echosounders() {
     let mut bytes = EXAMPLE_4;
     [bytes[5], bytes[6]] = pack(1201);
     let refused = ReturnError::TooGreat { field: "head position", got: 1201, max: 1200 };
@@ -105,7 +105,7 @@ fn echo_data_resembling_a_return_is_not_decoded_as_a_return() {
     assert_eq!(got, [value]);
 }
 
-/// Returns that can't form a false return together with the next one.
+/// Sonar returns that can't form a false return together with the next one.
 ///
 /// The front of one return and the whole of the next could form a false return that no decoder can detect. These
 /// returns exclude this in three ways. 0xFC occurs only at the end. Echo lengths differ by less than a header. No

@@ -51,6 +51,19 @@ fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
 }
 
 #[test]
+fn log_that_follows_another_one_in_a_file_is_reported_and_not_read() {
+    let (bytes, seen, places) = log();
+    for cut in places[0]..=bytes.len() {
+        let (alone, _) = read(&bytes[..cut]);
+        let (got, losses) = read(&[&bytes[..cut], &bytes].concat());
+        assert_eq!(got, alone, "cut at {cut}");
+        assert_eq!(got, seen[..got.len()], "cut at {cut}");
+        let is_told = losses.iter().any(|loss| loss.kind == LossKind::AnotherLog);
+        assert!(is_told, "cut at {cut}: {losses:?}");
+    }
+}
+
+#[test]
 fn log_cut_anywhere_delivers_messages_before_the_cut() {
     let (bytes, seen, places) = log();
     for cut in places[CHUNKS - 2]..bytes.len() {
@@ -292,7 +305,7 @@ fn intact_messages_are_read_despite_thousands_of_losses() {
 }
 
 #[test]
-fn channels_are_known_after_loss_of_their_chunk_and_the_summary() {
+fn channels_stay_known_if_their_chunk_and_the_summary_are_lost() {
     let (bytes, seen, places) = log();
     let mut bytes = bytes[..places[CHUNKS - 1]].to_vec();
     let definitions = super::places(&bytes, op::CHUNK)[0];

@@ -175,7 +175,7 @@ fn mixed_recordings_and_duplicate_parts_are_refused() {
 }
 
 #[test]
-fn damaged_parts_lose_only_damaged_messages_and_recover_to_one_log() {
+fn damaged_parts_lose_only_their_damaged_messages() {
     let folder = Folder::new("damaged");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let whole = all(&mut DiveLog::open(&folder.files()).unwrap());

@@ -105,7 +105,7 @@ proptest! {
 /// Two adjacent chunks fail their checksums, and the first one states a wrong time.
 /// The times of each loss depend on the other chunk.
 #[test]
-fn loss_times_of_damaged_chunks_are_unchanged_after_resuming_earlier() {
+fn reading_from_any_message_gives_the_same_loss_times_of_damaged_chunks() {
     for (whole, changed) in [(by_ticks(), 2), (by_times(), 4)] {
         let chunks = places(&whole, op::CHUNK);
         let mut bytes = whole;

@@ -150,7 +150,7 @@ fn messages_older_than_a_second_are_readable_in_an_open_log() {
 }
 
 #[test]
-fn entry_larger_than_the_queue_is_refused_and_not_written_in_part() {
+fn entry_larger_than_the_queue_is_refused_as_a_whole() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let capacity = port.capacity_bytes();
@@ -163,7 +163,7 @@ fn entry_larger_than_the_queue_is_refused_and_not_written_in_part() {
 }
 
 #[test]
-fn dropped_recorder_handle_syncs_every_message_and_writes_no_end_mark() {
+fn dropped_recorder_handle_syncs_every_message_but_writes_no_end_mark() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.raw(0, MonoNs(5), MonoNs(5), b"ping").unwrap();
@@ -193,7 +193,7 @@ impl Write for SmallMedium {
 }
 
 #[test]
-fn full_medium_is_reported_and_does_not_stop_the_loop() {
+fn full_medium_is_reported_but_does_not_stop_the_loop() {
     let room = Arc::new(AtomicUsize::new(1 << 20));
     let (mut port, handle) = Recorder::start(SmallMedium(Arc::clone(&room)), &header(true), 0).unwrap();
     room.store(0, Ordering::Relaxed);
@@ -418,7 +418,7 @@ impl DerivedChannels for Echoing {
 }
 
 #[test]
-fn derived_messages_follow_their_result_and_are_dropped_first() {
+fn derived_messages_are_dropped_before_all_others() {
     for (free, kept) in [(None, 3), (Some(5_000_000), 0)] {
         let (medium, flushed) = slow(0);
         let mut header = header(true);

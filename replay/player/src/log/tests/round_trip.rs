@@ -111,7 +111,7 @@ fn messages_for_undeclared_channels_are_refused() {
 }
 
 #[test]
-fn logs_are_opened_by_path_and_file_digest_is_sha256() {
+fn file_digest_of_a_log_is_its_sha256() {
     let path = std::env::temp_dir().join(format!("headrace-round-trip-{}.mcap", std::process::id()));
     let mut log = LogWriter::create(&path, &header(true)).unwrap();
     write(&mut log, 10);
@@ -133,7 +133,7 @@ fn logs_are_opened_by_path_and_file_digest_is_sha256() {
 }
 
 #[test]
-fn later_log_format_is_refused() {
+fn log_format_newer_than_this_program_is_refused() {
     let (bytes, _) = LogWriter::new(Vec::new(), &header(true)).unwrap().finish().unwrap();
     assert!(LogReader::new(Cursor::new(bytes), "old".to_owned()).is_ok());
     let mut writer = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();

@@ -193,7 +193,7 @@ fn header_ops() -> u64 {
 }
 
 #[test]
-fn storage_fault_that_occurs_once_loses_nothing_and_is_recorded() {
+fn single_storage_fault_is_recorded_and_loses_no_message() {
     for (name, every) in [("once", None), ("once in parts", Some(Every::Span(DurNs::from_millis(2000))))] {
         let (expected, ops) = without_faults(name, every);
         for (at, forgets) in (header_ops()..ops).flat_map(|at| [(at, false), (at, true)]) {
@@ -235,7 +235,7 @@ fn storage_fault_that_occurs_once_loses_nothing_and_is_recorded() {
 }
 
 #[test]
-fn brief_medium_fault_loses_nothing_and_permanent_fault_only_later_messages() {
+fn medium_fault_loses_no_message_if_brief_and_no_earlier_message_if_permanent() {
     let (expected, ops) = without_faults("while", None);
     for from in header_ops()..ops {
         for lasts in [2, 5, u64::MAX] {

@@ -139,7 +139,7 @@ fn single_echo_is_found_at_its_range_and_then_removed() {
 }
 
 #[test]
-fn strongest_echo_sets_the_range_and_neighbouring_echoes_are_averaged() {
+fn range_is_the_mean_of_the_strongest_echo_and_its_neighbours() {
     let mut bins = Bins::new(0.02);
     bins.add(3.0, 1.0);
     bins.add(4.0, 1.5);

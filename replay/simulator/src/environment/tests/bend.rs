@@ -22,7 +22,7 @@ fn conversions_between_chainage_and_tunnel_frame_are_inverse() {
 }
 
 #[test]
-fn axis_is_smooth_and_heading_matches_its_direction() {
+fn heading_matches_the_direction_of_the_axis() {
     let axis = axis();
     let step = 1e-4;
     for k in -200_000..2_000_000 {

@@ -141,7 +141,7 @@ fn arc_length_is_measured_on_the_design_profile_in_bends_too() {
 }
 
 #[test]
-fn rough_wall_is_the_same_from_all_viewpoints_and_ends_with_its_stretch() {
+fn rough_wall_is_the_same_from_all_viewpoints() {
     let profile = shapes::ceran().unwrap();
     let smooth = Environment::straight(profile.clone());
     let rough = parse("[tunnel]\n[[tunnel.rough]]\nfrom_m = 10\nto_m = 20\nsd_m = 0.03", &profile);

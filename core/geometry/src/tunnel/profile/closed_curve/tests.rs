@@ -84,7 +84,7 @@ proptest! {
 
 /// The centre of a regular polygon is equally far from all edges.
 #[test]
-fn first_of_equally_near_elements_is_the_result() {
+fn search_tree_returns_the_same_element_of_equally_near_ones_as_a_full_search() {
     let tree = polygon(&[2.0; 96]);
     assert_eq!(tree.nearest([0.0, 3.0]), plain(&tree).nearest([0.0, 3.0]));
 }
