@@ -84,7 +84,7 @@ struct State {
     meaning: DecoderSettings,
     last: Option<Velocity>,
     withheld: Withheld,
-    /// Reason for the last withheld report.
+    /// Reason why the latest withheld report was withheld.
     reason: Option<WithheldReason>,
 }
 

@@ -80,7 +80,7 @@ pub struct Collector {
     rates_from: Option<MonoNs>,
     begun: Option<MonoNs>,
     sent: Option<MonoNs>,
-    /// Time of the last tick that was played. Ticks that a seek skips don't count.
+    /// Time of the latest tick that was played. Ticks that a seek skips don't count.
     played: Option<MonoNs>,
     changed: BTreeSet<i64>,
     samples: Vec<SampleRecord>,

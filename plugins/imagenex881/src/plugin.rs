@@ -174,7 +174,7 @@ struct Reader {
     settings: Settings,
     latency: DurNs,
     rejected: Rejected,
-    /// Reason for the last rejected return.
+    /// Reason why the latest rejected return was rejected.
     reason: Option<WithheldReason>,
 }
 

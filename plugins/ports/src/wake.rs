@@ -63,7 +63,7 @@ impl<T: Threads> Waker<T> {
     }
 }
 
-/// Sleeps until this thread is woken, at most for `at_most`. Returns at once if the thread was woken since its last
+/// Sleeps until this thread is woken, at most for `at_most`. Returns at once if the thread was woken since its previous
 /// sleep.
 pub(crate) fn sleep<T: Threads>(at_most: Duration) {
     T::park(at_most);

@@ -42,7 +42,7 @@ pub trait Adviser: Send {
     /// Processes a message that has crossed its line. Messages must be passed in order of time.
     fn hear(&mut self, message: &Message<'_>);
 
-    /// Returns the advice given since the last call, in order of time.
+    /// Returns the advice given since the previous call, in order of time.
     fn told(&mut self) -> Vec<PilotAdvice>;
 }
 
@@ -205,7 +205,7 @@ impl Simulation {
         true
     }
 
-    /// Ground truth of all measurements since the last call. Empty unless the simulation was created by
+    /// Ground truth of all measurements since the previous call. Empty unless the simulation was created by
     /// [`Simulation::with_truth`].
     pub fn take_truth(&mut self) -> Vec<TruthRow> {
         self.truth.as_mut().map(std::mem::take).unwrap_or_default()

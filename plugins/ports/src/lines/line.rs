@@ -73,7 +73,7 @@ pub trait Line: Send {
         None
     }
 
-    /// Returns the number of messages dropped unread since the last call, as far as the carrier reports them.
+    /// Returns the number of messages dropped unread since the previous call, as far as the carrier reports them.
     fn dropped(&mut self) -> u64 {
         0
     }

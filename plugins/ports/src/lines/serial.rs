@@ -22,7 +22,7 @@ const WRITE_TIME: Duration = Duration::from_millis(500);
 struct Serial {
     port: TTYPort,
     byte_time: DurNs,
-    /// Time at which the port was last found empty.
+    /// Time at which the port was most recently found empty.
     emptied: MonoNs,
 }
 

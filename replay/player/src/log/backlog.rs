@@ -1,4 +1,4 @@
-//! Messages that aren't synced yet: written since the last sync, or waiting for a medium that accepts data.
+//! Messages that aren't synced yet: written since the latest sync, or waiting for a medium that accepts data.
 
 use std::collections::{BTreeMap, VecDeque};
 

@@ -82,7 +82,7 @@ impl Channels {
         channels
     }
 
-    /// Returns the limit that was exceeded by the channel definitions known at opening; `None` if no limit was.
+    /// Returns the limit that the channel definitions known at opening exceeded; `None` if they exceeded none.
     pub(super) fn refused(&self) -> Option<Many> {
         self.refused
     }

@@ -201,7 +201,7 @@ pub(super) fn until_stopped(
 /// The end of the queue at which the recorder's thread takes entries.
 pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
     pub(super) ring: R,
-    /// Message of the queue entry that was taken last.
+    /// Message of the queue entry that was taken most recently.
     pub(super) message: Vec<u8>,
 }
 

@@ -51,7 +51,7 @@ pub struct RecorderPort {
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
-    /// Ticks that were skipped since the last recorded tick.
+    /// Ticks that were skipped since the latest recorded tick.
     gap: Option<Gap>,
 }
 

@@ -3,7 +3,7 @@
 //! A part that can't be written any more is left without an end. Another part is begun, and messages that may be
 //! missing from the previous part are written again.
 //!
-//! After an error, nothing written since the last sync is reliable: a file system may discard it and report success
+//! After an error, nothing written since the latest sync is reliable: a file system may discard it and report success
 //! the next time. Messages are therefore kept in memory until they are synced.
 
 use std::io::ErrorKind;
@@ -163,7 +163,7 @@ impl Recording {
         self.open.is_none()
     }
 
-    /// Returns the recording's events since the last call.
+    /// Returns the recording's events since the previous call.
     pub(super) fn take_events(&mut self) -> Vec<RecordingEvent> {
         core::mem::take(&mut self.events)
     }
@@ -431,7 +431,7 @@ impl Recording {
         Err(LogError::Create { path, source: ErrorKind::AlreadyExists.into() })
     }
 
-    /// Removes the file created last. If that fails, the next part skips its name.
+    /// Removes the newest file. If that fails, the next part skips its name.
     fn discard(&mut self, path: &Path) {
         match self.storage.remove(path) {
             Ok(()) => self.named = self.named.saturating_sub(1),

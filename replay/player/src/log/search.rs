@@ -60,7 +60,7 @@ fn find_chain<R: Read + Seek>(
     find(file, from, until, |file, head, at| if may_begin(head) { chain_at(file, at) } else { Ok(None) })
 }
 
-/// Returns the first result of `examine`, which gets every eight bytes with their position in `from..until`.
+/// Calls `examine` with the eight bytes at each position in `from..until`, and returns its first result.
 fn find<R: Read + Seek, T>(
     file: &mut LogFile<R>,
     from: u64,

@@ -46,7 +46,7 @@ pub(super) struct Space {
     asked: Option<Duration>,
     warned: bool,
     sparing: bool,
-    /// Free bytes of the disk at the last query.
+    /// Free bytes of the disk at the latest query.
     free: u64,
     left_out: LeftOut,
 }

@@ -126,9 +126,9 @@ struct Cutter<'a, W: Write> {
     numbers: BTreeMap<&'a str, u16>,
     log: LogWriter<W>,
     done: Trimmed,
-    /// Source numbers of the packets kept since the last tick, in order.
+    /// Source numbers of the packets kept since the latest tick, in order.
     order: Vec<u16>,
-    /// Whether all packets since the last tick were kept.
+    /// Whether all packets since the latest tick were kept.
     whole: bool,
     shorter: Vec<u8>,
 }

@@ -48,7 +48,7 @@ pub struct RecorderWorker {
     queue: Queue,
     recording: Recording,
     flushed: Duration,
-    /// Whether anything has been written since the last flush.
+    /// Whether anything has been written since the latest flush.
     open: bool,
     space: Space,
     echoes: Echoes,
@@ -256,7 +256,7 @@ impl RecorderWorker {
         self.state.failing.store(self.recording.is_failing(), Ordering::Release);
     }
 
-    /// Writes the entry taken last, and the messages derived from it.
+    /// Writes the entry that was taken most recently, and the messages derived from it.
     fn write_all(&mut self, entry: &Entry) {
         let message = core::mem::take(&mut self.queue.message);
         self.write(entry, &message);

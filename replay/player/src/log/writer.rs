@@ -179,7 +179,7 @@ pub struct LogWriter<W: Write> {
     losses: u64,
     /// Log time of the open chunk's first message.
     chunk_began: Option<MonoNs>,
-    /// Whether the last message was a voice recording, which has a chunk of its own.
+    /// Whether the latest message was a voice recording, which has a chunk of its own.
     is_alone: bool,
 }
 
