@@ -34,7 +34,7 @@ pub struct DecoderSettings {
     pub fom_max_mps: f64,
     /// Largest accepted speed, m/s.
     pub max_speed_mps: f64,
-    /// Delay from sending a report to its receipt.
+    /// Delay from the sending of a report to its receipt.
     pub latency: DurNs,
 }
 
@@ -177,8 +177,8 @@ fn late(delay_us: i64) -> WithheldReason {
     WithheldReason::Late { age_s: seconds(delay_us), at_most_s: seconds(MOST_DELAY_US) }
 }
 
-/// Whether a report repeats the previous one: both have the same timestamp, or their values are bit-identical. Noise
-/// makes the values of two different measurements differ.
+/// Whether a report repeats the previous one: the timestamps are equal, or the values are bit-identical. Noise makes
+/// the values of two different measurements differ.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

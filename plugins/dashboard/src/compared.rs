@@ -7,8 +7,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::run::Loop;
 use serde::Serialize;
 
-/// Interval between comparisons of all sections. Sections are compared periodically, because they change without a
-/// notice while the vehicle passes them.
+/// Interval at which all sections are judged for the second target. The judging is periodic, because sections change
+/// without a notice while the vehicle passes them.
 const EVERY: DurNs = DurNs(1_000_000_000);
 
 /// Length of the sections with each verdict for the second target. Only sections with a measured hole count.
@@ -28,7 +28,7 @@ pub struct ComparedJson {
     pub not_inspected_m: f64,
 }
 
-/// Verdicts for a second target, as of the latest comparison.
+/// Verdicts for a second target, as most recently judged.
 #[derive(Debug)]
 pub(crate) struct Compared {
     target_m: f64,
@@ -72,7 +72,7 @@ impl Compared {
         self.verdicts = verdicts;
     }
 
-    /// Makes the next call of `refresh` compare, because the loop's state may have changed.
+    /// Makes the next call of `refresh` judge all sections, because the loop's state may have changed.
     pub(crate) fn forget(&mut self) {
         self.at = None;
         self.verdicts.clear();

@@ -56,7 +56,7 @@ pub struct Export {
     thread: JoinHandle<Taken>,
 }
 
-/// Data of the dive collected by the export's thread.
+/// Data of the dive that the export's thread has collected.
 struct Taken {
     model: Model,
     states: States,

@@ -218,7 +218,7 @@ impl LineService {
         }
     }
 
-    /// Opens a closed line. Waits once for bytes on an open line, and serves its drivers.
+    /// Opens the line if it is closed. If it is open, waits once for bytes, and serves the drivers.
     pub fn step(&mut self) {
         let closed = LineState::Closed { until: self.common.host.now() };
         self.state = match core::mem::replace(&mut self.state, closed) {

@@ -179,7 +179,8 @@ mod tests {
 
     /// Explores a model of a line's thread, which behaves as `LineService::run`.
     ///
-    /// The thread checks the flag before each step. At its end it delivers the bytes that its driver still holds.
+    /// The thread checks the stop flag before each step. When the thread ends, it delivers the bytes that its driver
+    /// still holds.
     fn line_and_stop(name: &str, ends: Ends) -> usize {
         explore(name, Some(4), move || {
             let (mut port, mut reader) = packets(96);

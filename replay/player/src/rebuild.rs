@@ -21,8 +21,8 @@ use crate::playback::PlaybackError;
 use crate::player::Player;
 use crate::saved_state::{Consumed, SavedState};
 
-/// Once the rebuilding loop has at most this many new packets left, the dive's loop waits for it, for a fraction of a
-/// second.
+/// Number of new packets left to the rebuilding loop at which the dive's loop waits for it. The wait takes a fraction
+/// of a second.
 const NEAR_PACKETS: u64 = 100;
 
 /// A dive whose state is being rebuilt.

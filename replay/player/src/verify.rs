@@ -176,7 +176,7 @@ impl Verifier {
         Ok(Self { reader: DiveLog::open(log)?, streams, last_tick: 0, has_results: false, at_end: false })
     }
 
-    /// Compares the results of the replay's latest tick.
+    /// Compares the results of the replay's latest tick with the live results.
     ///
     /// Errors: reading the log fails.
     pub fn after_tick(&mut self, dive: &Loop) -> Result<(), LogError> {

@@ -264,8 +264,8 @@ impl Simulation {
         }
     }
 
-    /// Makes the cable counters repeat their next count, or count again. Returns the counters' numbers in the vehicle
-    /// file.
+    /// Makes the cable counters repeat their next count if `is_frozen`, and count again if not. Returns the counters'
+    /// numbers in the vehicle file.
     pub fn freeze_counters(&mut self, is_frozen: bool) -> Vec<usize> {
         let mut frozen = Vec::new();
         for (number, entity) in self.entities.iter().enumerate() {

@@ -300,7 +300,7 @@ impl<R: Read + Seek> LogReader<R> {
         self.late
     }
 
-    /// Reads pieces of the log until a message is available. Returns `false` at the end.
+    /// Reads pieces of the log until a message is available. Returns `false` at the end of the log.
     pub(super) fn has_next(&mut self) -> Result<bool, LogError> {
         while self.must_read() {
             self.read_piece()?;

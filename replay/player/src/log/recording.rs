@@ -412,7 +412,7 @@ impl Recording {
         }
     }
 
-    /// Creates the next file. A name that exists is skipped; for the first part it is an error.
+    /// Creates the next file. An existing name is skipped; for the first part an existing name is an error.
     fn create(&mut self) -> Result<(PathBuf, Box<dyn super::storage::StoredFile>), LogError> {
         let first = self.named + 1;
         for name in first..first.saturating_add(NAMES) {
@@ -431,7 +431,7 @@ impl Recording {
         Err(LogError::Create { path, source: ErrorKind::AlreadyExists.into() })
     }
 
-    /// Removes the newest file. If that fails, the next part skips its name.
+    /// Removes the newest file. If that fails, the next part skips the file's name.
     fn discard(&mut self, path: &Path) {
         match self.storage.remove(path) {
             Ok(()) => self.named = self.named.saturating_sub(1),

@@ -267,7 +267,7 @@ impl Scan {
             self.lose(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }, frame.at..frame.end);
             return;
         }
-        // The length of a run includes other records between its messages.
+        // The length of a run of messages includes the other records between these messages.
         let within = |last: &&mut Span| self.run_open && frame.end - last.at <= RUN_BYTES;
         let last = self.spans.last_mut().filter(within);
         if let Some(run) = last {

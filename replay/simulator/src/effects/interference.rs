@@ -226,7 +226,8 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this apparent range arrives before all sounds so far, and not from within the least range.
+    /// Whether a sound with this apparent range arrives before all sounds heard so far. Sounds from within the least
+    /// range don't count.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }

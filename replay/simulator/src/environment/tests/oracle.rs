@@ -192,8 +192,8 @@ impl Oracle {
             let next = t + step;
             let p = ray.at(next);
             chart = self.chart(p, chart[0]);
-            // Far from the axis, the nearest point of the axis may jump between steps, so it is searched without an
-            // estimate.
+            // Far from the axis, the nearest point of the axis may jump between steps, so this point is searched
+            // without an estimate.
             if chart[1].abs() > 8.0 && !self.axis.is_empty() {
                 chart = self.search(p);
             }
