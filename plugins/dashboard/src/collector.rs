@@ -73,7 +73,7 @@ struct Followed {
 #[expect(clippy::struct_excessive_bools, reason = "independent flags for what is due")]
 pub struct Collector {
     to: Sender<Fed>,
-    /// Whether the collector waits if the queue is full. A replay waits, a live dive does not.
+    /// Whether the collector waits while the queue is full. A replay waits, but a live dive doesn't.
     waits: bool,
     is_playback: bool,
     sensors: Vec<Followed>,

@@ -431,8 +431,8 @@ impl LineService {
 
     /// Wakes drivers that are due, unless another driver on the line awaits an answer.
     ///
-    /// Several drivers may await answers, e.g. just after the line was opened. The first of these is woken all the
-    /// same, so that it can time out. Otherwise these drivers would wait for each other for ever.
+    /// Several drivers may await answers, e.g. just after the line was opened. The first of these drivers is woken all
+    /// the same, so that it can time out. Otherwise these drivers would wait for each other for ever.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();

@@ -244,7 +244,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Restores the snapshot of time `at`. The store must have returned `at` as the time of a snapshot.
+    /// Restores the snapshot of time `at`, which must be a time that the snapshot store has returned.
     fn restore(&mut self, at: MonoNs) -> Result<(), PlaybackError> {
         let Some(snapshot) = self.store.load(at) else { return Ok(()) };
         let mut restorer = Restorer::new(&snapshot);

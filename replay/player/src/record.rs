@@ -180,7 +180,7 @@ fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &
 
 /// Records the results of a tick.
 ///
-/// Input has priority, so results that don't fit are left out. Gaps in the record numbers show that.
+/// Input has priority, so results that don't fit are left out. Gaps in the record numbers show such omissions.
 fn record_results(
     port: &mut RecorderPort,
     streams: &[(&str, &ResultStream)],

@@ -196,7 +196,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Whether another live state may be sent now at the rate that the viewer requested.
+    /// Whether the rate that the viewer requested allows another live state now.
     fn wants_state(&mut self) -> bool {
         let now = Instant::now();
         let is_due = self.state_sent.is_none_or(|sent| now.duration_since(sent) >= self.state_every);

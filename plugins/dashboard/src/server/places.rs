@@ -33,7 +33,7 @@ struct Held {
 
 /// A connection's place among the limited number of places. The place is freed on drop.
 pub(super) struct Place {
-    /// Notifies the connection to close, and identifies its place.
+    /// Tells the connection to close, and identifies the connection's place.
     key: Arc<Notify>,
     places: Arc<Places>,
     shown: Mutex<Option<(Client, Role)>>,

@@ -61,7 +61,7 @@ pub struct PartEnd {
     pub follows: bool,
 }
 
-/// Position of a log in its recording.
+/// Position of a log in the recording that it is part of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
     /// Metadata at the start of the part.

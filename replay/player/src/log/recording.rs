@@ -251,7 +251,8 @@ impl Recording {
         let (mut lost, mut from) = (0, self.settled.last);
         // A part without synced content is removed. The first part is kept, because it has the recording's name.
         if is_taken {
-            // A deleted file isn't a part either. A file that is now at its path belongs to another program.
+            // A deleted file isn't a part either. A file that is now at the deleted file's path belongs to another
+            // program.
             (lost, from) = (certain.0, before);
             self.sum.messages -= certain.0;
             self.sum.message_bytes -= certain.1;

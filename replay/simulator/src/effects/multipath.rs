@@ -158,7 +158,7 @@ mod tests {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Distances along the straightened beam at which it crosses the side walls, and floor and ceiling.
+            // Distances along the straightened beam: to the side wall ahead, and to floor or ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =
