@@ -65,7 +65,7 @@ pub struct HeadDriver {
     next_at: MonoNs,
     aim: Aim,
     way_home: VecDeque<Command>,
-    /// Number of the scan program's ping that follows homing.
+    /// Number, in the scan program, of the first ping after homing.
     joins_at: u64,
     unanswered: u32,
     /// Which of the latest 32 commands were unanswered, one bit each. The lowest bit is the latest command.

@@ -24,7 +24,7 @@ pub(super) struct Wire<'a> {
     big_endian: bool,
 }
 
-/// The header of a message with a timestamp.
+/// Header of a message, which has a timestamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
     /// Timestamp, nanoseconds on the sender's clock, which may have any epoch.
