@@ -113,7 +113,7 @@ impl Canvas {
         self.0.borrow_mut().append(node);
     }
 
-    /// Draws a line of text, vertically centred on its position.
+    /// Draws a line of text whose vertical centre is at the given position.
     pub fn text(&self, [x, y]: Px, text: &str, side: Side, letters: Letters) {
         let anchor = match side {
             Side::Right => "start",

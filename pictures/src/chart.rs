@@ -6,7 +6,8 @@ use super::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
 use super::look::{AXIS, BLACK, Colour, GRID, Look};
 use super::polyline::{Frame, Px};
 
-/// Minimum ratio of end to start for logarithmic ticks. An axis with a smaller ratio gets linear ticks.
+/// Smallest ratio of an axis's end to its start for logarithmic ticks. With a smaller ratio, the axis gets linear
+/// ticks.
 const SHORT: f64 = 4.0;
 /// Length of an axis's tick mark, pixels.
 const TICK_PX: f64 = 4.0;
@@ -71,7 +72,7 @@ impl Axis {
         Self { name_px, ..self }
     }
 
-    /// Removes name and numbers, for a chart whose neighbour shows them.
+    /// Removes the axis's name and numbers, for a chart whose neighbour shows the same ones.
     pub fn bare(self) -> Self {
         Self { name: String::new(), numbered: false, ..self }
     }

@@ -103,8 +103,8 @@ pub fn thinned(line: &[Px]) -> Vec<Px> {
     line.iter().zip(keep).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
 }
 
-/// Returns the index of the point that is farthest from the chord between `first` and `last`; `None` if it is within
-/// the tolerance.
+/// Returns the index of the point that is farthest from the chord between `first` and `last`; `None` if every point is
+/// within the tolerance of the chord.
 fn farthest(line: &[Px], first: usize, last: usize) -> Option<usize> {
     let (from, to) = (*line.get(first)?, *line.get(last)?);
     let between = line.iter().enumerate().take(last).skip(first + 1);

@@ -15,16 +15,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// Longest usual gap between the bytes of a line. It allows for a TCP retransmission, whose timer is at least
-/// 200 ms.
+/// Longest usual gap between the bytes of one text line. The gap allows for a TCP retransmission, whose timer is at
+/// least 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
 /// Minimum number of valid beams for a velocity, which has three components.
 const LEAST_BEAMS: u8 = 3;
 /// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
-/// Largest plausible delay between the sound's reflection and the report. The two-way travel time is only 70
-/// ms.
+/// Largest plausible delay between the sound's reflection and the report. Reports with a larger delay are withheld. The
+/// two-way travel time is only 70 ms.
 const MOST_DELAY_US: i64 = 2_000_000;
 
 /// Decoding settings of an A50.
@@ -34,7 +34,7 @@ pub struct DecoderSettings {
     pub fom_max_mps: f64,
     /// Largest accepted speed, m/s.
     pub max_speed_mps: f64,
-    /// Delay from sending a report to its receipt.
+    /// Delay from the sending of a report to its receipt.
     pub latency: DurNs,
 }
 
@@ -84,7 +84,7 @@ struct State {
     meaning: DecoderSettings,
     last: Option<Velocity>,
     withheld: Withheld,
-    /// Reason for the last withheld report.
+    /// Reason why the latest withheld report was withheld.
     reason: Option<WithheldReason>,
 }
 
@@ -177,8 +177,8 @@ fn late(delay_us: i64) -> WithheldReason {
     WithheldReason::Late { age_s: seconds(delay_us), at_most_s: seconds(MOST_DELAY_US) }
 }
 
-/// Whether a report repeats the previous one: both have the same timestamp, or their values are bit-identical. Noise
-/// makes the values of two different measurements differ.
+/// Whether a report repeats the previous one: the timestamps are equal, or the values are bit-identical. Noise makes
+/// the values of two different measurements differ.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

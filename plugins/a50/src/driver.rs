@@ -9,7 +9,7 @@ use crate::report::{Lines, MAX_LINE_BYTES, format_of};
 /// Carriers over which an A50 can be connected.
 pub const CARRIERS: [Carrier; 2] = [Carrier::Tcp, Carrier::Udp];
 
-/// Longest usual gap between the bytes of a line.
+/// Longest usual gap between the bytes of one text line.
 const SILENCE: DurNs = DurNs::from_millis(200);
 /// Number of consecutive lines without a velocity after which the device's format counts as unknown.
 ///

@@ -21,7 +21,7 @@ const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
 pub struct Simulated {
     /// Report rate, Hz.
     pub rate_hz: f64,
-    /// Delay from sending a report to its receipt.
+    /// Delay from the sending of a report to its receipt.
     pub latency: DurNs,
 }
 

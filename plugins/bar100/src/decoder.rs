@@ -32,7 +32,7 @@ pub struct Bar100Decoder {
     cells: CalibrationCells,
     calibration: Result<Option<Calibration>, CalibrationError>,
     withheld: u64,
-    /// Reason for the last withheld measurement.
+    /// Reason why the latest withheld measurement was withheld.
     reason: Option<WithheldReason>,
 }
 

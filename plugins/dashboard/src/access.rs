@@ -11,7 +11,7 @@ pub(crate) const COOKIE: &str = "headrace_token";
 /// Entropy of a random token, bytes.
 const TOKEN_BYTES: usize = 16;
 
-/// Role of a viewer of the page, which decides about the viewer's rights.
+/// Role of a viewer of the page. The role decides the viewer's rights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
     /// A viewer who may only watch.
@@ -100,7 +100,7 @@ impl Access {
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }
 
-    /// Whether a token is the token of a role. It isn't compared with other roles' tokens.
+    /// Whether a token is the token of this role. The token isn't compared with those of other roles.
     pub(crate) fn is_token_of(&self, role: Role, token: &str) -> bool {
         self.tokens.as_ref().is_some_and(|tokens| match role {
             Role::Viewer => tokens.viewer.is(token),

@@ -2,7 +2,7 @@
 //!
 //! While the queue is full, data stays in the collector and is sent with the next message. The collector keeps all
 //! section numbers, the latest state, and a limited number of samples and events. Data beyond these limits is dropped
-//! and counted. Dropped wall samples are read again from the loop's own store if it has them.
+//! and counted. Dropped wall samples are read again from the loop's own store if the store has them.
 
 use std::collections::BTreeSet;
 
@@ -32,13 +32,14 @@ pub(crate) const WAITING: usize = 64;
 const MOST_SAMPLES: usize = 20_000;
 /// Maximum length of wall whose samples are read from the loop's store for one message, m.
 const MENDED_AT_ONCE_M: f64 = 10.0;
-/// Shortest piece of wall whose samples are read from the store, m. If it has too many samples, some are left out.
+/// Shortest piece of wall for which samples are read from the loop's store, m. If so short a piece still has too many
+/// samples, some of them are left out.
 const SHORTEST_MENDED_M: f64 = 0.01;
 /// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
 /// Maximum number of sections in one message.
 const SECTIONS_AT_ONCE: usize = 4096;
-/// Maximum interval between two states sent to the page, even without an update.
+/// Longest interval between two live states sent to the page. After it a state is sent even without an update.
 const EVERY: DurNs = DurNs(200_000_000);
 /// Averaging window for the sensors' rates of readings.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
@@ -72,14 +73,14 @@ struct Followed {
 #[expect(clippy::struct_excessive_bools, reason = "independent flags for what is due")]
 pub struct Collector {
     to: Sender<Fed>,
-    /// Whether the collector waits if the queue is full. A replay waits, a live dive does not.
+    /// Whether the collector waits while the queue is full. A replay waits, but a live dive doesn't.
     waits: bool,
     is_playback: bool,
     sensors: Vec<Followed>,
     rates_from: Option<MonoNs>,
     begun: Option<MonoNs>,
     sent: Option<MonoNs>,
-    /// Time of the last tick that was played. Ticks that a seek skips don't count.
+    /// Time of the latest tick that was played. Ticks that a seek skips don't count.
     played: Option<MonoNs>,
     changed: BTreeSet<i64>,
     samples: Vec<SampleRecord>,
@@ -90,9 +91,9 @@ pub struct Collector {
     skips: bool,
     back_due: bool,
     notes_due: bool,
-    /// The most recently sent list of missed stretches, with its time and the length of the coverage extent.
+    /// The most recently sent list of missed stretches, with its time and the length of the way back, m.
     back_told: Option<(MonoNs, f64, Value)>,
-    /// Depth by the last reading of the pressure sensor, m.
+    /// Depth by the latest reading of the pressure sensor, m.
     depth_m: Option<f64>,
     recording: RecordingJson,
     playback: Option<PlaybackState>,
@@ -154,8 +155,8 @@ impl Collector {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call it before the
-    /// method for that event.
+    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call this method before the one
+    /// that handles the notice, tick or end.
     pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let mut value =
@@ -169,7 +170,7 @@ impl Collector {
         }
     }
 
-    /// Collects one notice of the last tick.
+    /// Collects one notice of the latest tick.
     pub fn notice(&mut self, notice: &Notice) {
         match notice {
             Notice::Section { section, .. } => {
@@ -181,7 +182,7 @@ impl Collector {
         }
     }
 
-    /// Collects the results of the last tick, and sends the data that are due.
+    /// Collects the results of the latest tick, and sends the data that are due.
     pub fn tick(&mut self, dive: &Loop) {
         self.gather(dive);
         let now = dive.now();
@@ -205,7 +206,7 @@ impl Collector {
         self.skips = false;
     }
 
-    /// Handles a dive's state that was rebuilt from its log. The wall of the dive so far is sent in pieces.
+    /// Handles a state of the dive that was rebuilt from the log. The wall of the dive so far is sent in pieces.
     pub fn rebuilt(&mut self, dive: &Loop) {
         self.begun = dive.view().span().map(|(first, _)| first);
         self.lacking_m = dive.view().coverage().frontier.way().map(|way| [way.from_m, way.to_m]);
@@ -239,7 +240,7 @@ impl Collector {
         self.hand(Fed::Playback(state));
     }
 
-    /// Handles a seek or pause of playback, which may have changed the loop's state.
+    /// Handles a seek or pause of playback. Either may have changed the loop's state.
     pub fn stopped(&mut self, dive: &Loop) {
         if self.played == Some(dive.now()) {
             self.send(dive);
@@ -299,7 +300,7 @@ impl Collector {
         self.aims_of(dive);
     }
 
-    /// Collects the samples and doubtful returns of the last tick.
+    /// Collects the samples and doubtful returns of the latest tick.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn samples_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
@@ -515,7 +516,7 @@ impl Collector {
         let now = dive.now();
         let told = self.back_told.as_ref();
         let waits = told.is_some_and(|(told, ..)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
-        // Even without new stretches, the way changes with the vehicle's place.
+        // Even without new missed stretches, the way back changes as the vehicle moves.
         let has_legs = told.is_some_and(|(.., legs)| legs.as_array().is_some_and(|legs| !legs.is_empty()));
         if waits || !self.back_due && !has_legs {
             return None;

@@ -7,28 +7,28 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::run::Loop;
 use serde::Serialize;
 
-/// Interval between comparisons of all sections. A comparison is periodic because sections change without a notice
-/// while the vehicle passes them.
+/// Interval at which all sections are judged for the second target. The judging is periodic, because sections change
+/// without a notice while the vehicle passes them.
 const EVERY: DurNs = DurNs(1_000_000_000);
 
-/// Lengths by verdict for the second target. Only sections with a measured hole count.
+/// Length of the sections with each verdict for the second target. Only sections with a measured hole count.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct ComparedJson {
     /// Second target, m.
     pub target_m: f64,
-    /// Length with the verdict "pass", m.
+    /// Length of the sections with the verdict "pass", m.
     pub pass_m: f64,
-    /// Length with the verdict "fail", m.
+    /// Length of the sections with the verdict "fail", m.
     pub fail_m: f64,
-    /// Length with the verdict "can't say", m.
+    /// Length of the sections with the verdict "can't say", m.
     pub cannot_say_m: f64,
-    /// Length of the other open sections, m.
+    /// Length of the sections with the verdict "open", without those not inspected, m.
     pub open_m: f64,
-    /// Length of the open sections that are not inspected, m.
+    /// Length of the sections with the verdict "open" that are not inspected, m.
     pub not_inspected_m: f64,
 }
 
-/// Verdicts for a second target, as of the last comparison.
+/// Verdicts for a second target, as most recently judged.
 #[derive(Debug)]
 pub(crate) struct Compared {
     target_m: f64,
@@ -43,7 +43,8 @@ impl Compared {
         Self { target_m, verdicts: BTreeMap::new(), at: None, json }
     }
 
-    /// Compares all sections if a comparison is due. Calls `changed` with each section whose verdict has changed.
+    /// Judges all sections for the second target if this is due. Calls `changed` with each section whose verdict has
+    /// changed.
     pub(crate) fn refresh(&mut self, dive: &Loop, changed: impl FnMut(i64)) {
         let now = dive.now();
         if self.at.is_some_and(|at| (0..EVERY.0).contains(&now.since(at).0)) {
@@ -71,7 +72,7 @@ impl Compared {
         self.verdicts = verdicts;
     }
 
-    /// Makes the next call of `refresh` compare, because the loop's state may have changed.
+    /// Makes the next call of `refresh` judge all sections, because the loop's state may have changed.
     pub(crate) fn forget(&mut self) {
         self.at = None;
         self.verdicts.clear();

@@ -27,8 +27,8 @@ const MOST_SAMPLES: usize = 500_000;
 const MOST_STATES: usize = 7200;
 /// Attribute that marks the embedded dive in an exported page.
 pub const MARK: &str = "id=\"dive\"";
-/// Fields of a live state that an exported file omits, because it stores them only once or they have no
-/// meaning there.
+/// Fields of a live state that an exported file omits. The file stores them once elsewhere, or they have no meaning in
+/// a file.
 const LEFT_OUT: [&str; 8] =
     ["type", "seq", "alert_list", "playback", "ended", "page_dropped", "rates", "recording"];
 
@@ -56,7 +56,7 @@ pub struct Export {
     thread: JoinHandle<Taken>,
 }
 
-/// Data of the dive collected by the export's thread.
+/// Data of the dive that the export's thread has collected.
 struct Taken {
     model: Model,
     states: States,
@@ -97,7 +97,8 @@ impl Export {
 
     /// Returns the page with the dive. All collectors must have been dropped.
     ///
-    /// `alerts` are all alerts of the dive, `voices` the recordings of its notes, and `end` its last message.
+    /// `alerts` are all alerts of the dive, `voices` the recordings of the dive's notes, and `end` is the last message
+    /// of the dive.
     ///
     /// Errors: see [`ExportError`].
     pub fn page(self, alerts: &Value, voices: &[Voice], end: &Value) -> Result<Vec<u8>, ExportError> {

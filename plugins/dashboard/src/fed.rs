@@ -12,7 +12,7 @@ use crate::wire::{SampleRecord, SectionRecord};
 /// A message to the page's thread.
 #[derive(Debug)]
 pub enum Fed {
-    /// New data since the last message.
+    /// New data since the previous message.
     News(Box<News>),
     /// Playback has jumped to this time, and later messages refer to the time after the jump.
     Jump(MonoNs),
@@ -25,10 +25,9 @@ pub enum Fed {
 /// New data of one or several ticks.
 #[derive(Debug)]
 pub struct News {
-    /// End time of the last tick.
+    /// End time of the latest tick.
     pub now: MonoNs,
-    /// Whether a seek skips this tick. If so, only the tick's samples are used; the state follows with the
-    /// jump.
+    /// Whether a seek skips this tick. Only the samples of a skipped tick are used; the state follows with the jump.
     pub is_skipped: bool,
     /// Time at which the dive began; `None` while unknown.
     pub begun: Option<MonoNs>,
@@ -36,17 +35,17 @@ pub struct News {
     pub state: Box<LiveStateJson>,
     /// Displayed data besides the live state.
     pub beside: Beside,
-    /// Samples since the last message.
+    /// Samples since the previous message.
     pub samples: Vec<SampleRecord>,
     /// Wall samples read from the loop's store to replace dropped samples.
     pub mended: Vec<SampleRecord>,
-    /// Sections that have changed since the last message.
+    /// Sections that have changed since the previous message.
     pub sections: Vec<SectionRecord>,
-    /// Events since the last message, as JSON objects with a type.
+    /// Events since the previous message, as JSON objects with a type.
     pub told: Vec<Value>,
     /// All notes of the dive; `None` if there is no new note.
     pub notes: Option<Vec<NoteJson>>,
-    /// Missed stretches to go back to; `None` if they haven't changed.
+    /// Missed stretches to go back to; `None` if the list hasn't changed.
     pub back: Option<Value>,
     /// Counts of data dropped so far.
     pub dropped: Dropped,
@@ -59,9 +58,9 @@ pub struct Beside {
     pub pose: Option<PoseJson>,
     /// Time at which the dive began, seconds on the log's clock; `None` while unknown.
     pub begun_s: Option<f64>,
-    /// Depth below the water level by the last reading of the pressure sensor, m; `None` without one.
+    /// Depth below the water level by the latest reading of the pressure sensor, m; `None` without one.
     pub depth_m: Option<f64>,
-    /// Last pings of the echosounders.
+    /// Latest pings of the echosounders.
     pub echosounders: Vec<EchoJson>,
     /// Rate of readings of each sensor.
     pub rates: Vec<RateJson>,
@@ -94,13 +93,13 @@ pub struct PoseJson {
 pub struct EchoJson {
     /// Sensor id.
     pub id: String,
-    /// Last range, m; `None` without an echo.
+    /// Latest range, m; `None` without an echo.
     pub range_m: Option<f64>,
     /// Time since the ping, seconds.
     pub age_s: f64,
     /// Position of the echosounder in the cross-section, m.
     pub from: [f64; 2],
-    /// Position of the echo, m.
+    /// Position of the echo in the cross-section, m; `None` without an echo.
     pub to: Option<[f64; 2]>,
 }
 
@@ -146,8 +145,8 @@ pub struct PlaybackState {
     pub speed: Option<f64>,
     /// Present position, seconds on the log's clock.
     pub at_s: f64,
-    /// Start of the log, seconds.
+    /// Start of the log, seconds on the log's clock.
     pub from_s: f64,
-    /// End of the log, seconds.
+    /// End of the log, seconds on the log's clock.
     pub to_s: f64,
 }

@@ -1,4 +1,4 @@
-//! The page's displayed data, as of the last message from the loop. The model uses neither sockets nor clocks.
+//! The page's displayed data, as of the latest message from the loop. The model uses neither sockets nor clocks.
 //!
 //! Each message has a number, and each section stores the number of the last message that contained it. A viewer that
 //! reconnects therefore gets only later changes, and a new viewer gets everything.
@@ -25,7 +25,8 @@ const MOST_TOLD: usize = 256;
 const MOST_AT_ONCE: usize = 1000;
 /// Maximum number of samples sent to a viewer that connects or reconnects.
 const MOST_BACK: usize = 10_000;
-/// Number of messages for which the number of samples sent before is kept: five minutes of messages.
+/// Number of latest messages for which the model remembers how many samples were sent up to each: five minutes of
+/// messages.
 const MOST_PLACES: usize = 1500;
 /// Maximum number of samples in the answer to a request for a range of chainage.
 pub const MOST_IN_RANGE: usize = 200_000;
@@ -35,7 +36,7 @@ pub const MOST_IN_RANGE: usize = 200_000;
 pub enum Sort {
     /// A live state, which replaces the previous one.
     State,
-    /// Samples since the last message.
+    /// Samples since the previous message.
     Samples,
     /// Any other message.
     Other,
@@ -230,7 +231,7 @@ impl Model {
         if self.jumps == 0 { self.instance.clone() } else { format!("{}.{}", self.instance, self.jumps) }
     }
 
-    /// Returns the changes since the last call, as messages for all viewers.
+    /// Returns the changes since the previous call, as messages for all viewers.
     pub fn flush(&mut self) -> Vec<Message> {
         let mut messages = Vec::new();
         for value in core::mem::take(&mut self.told_new) {
@@ -320,7 +321,8 @@ impl Model {
     /// Call [`Model::flush`] first.
     pub fn catch_up(&self, since: Option<u64>, may: May, tokens_needed: bool) -> Vec<Message> {
         let since = since.filter(|since| *since <= self.seq);
-        // These messages carry the number `since`, so that a viewer disconnected among them resumes from there.
+        // These messages carry the number `since`. A viewer that disconnects before it has all of them resumes from
+        // `since`.
         let low = since.unwrap_or(0);
         let text = |value: &Value| {
             let body = Body::Text(numbered(value, low).to_string().into());
@@ -358,7 +360,7 @@ impl Model {
         messages
     }
 
-    /// Returns the number of samples sent up to message `since`; `None` if it is no longer known.
+    /// Returns the number of samples sent up to message `since`; `None` if the model no longer has this number.
     fn samples_until(&self, since: u64) -> Option<usize> {
         let place = self.places.partition_point(|(seq, _)| *seq <= since).checked_sub(1)?;
         self.places.get(place).map(|(_, count)| *count)
@@ -433,7 +435,7 @@ impl Model {
         self.dropped
     }
 
-    /// Returns the number of the last message.
+    /// Returns the number of the latest message.
     pub fn seq(&self) -> u64 {
         self.seq
     }

@@ -6,8 +6,8 @@ use qrcode::{EcLevel, QrCode};
 /// Returns the lines of a QR code, with dark modules as gaps; `None` if the text is too long.
 pub fn qr(text: &str) -> Option<String> {
     let code = QrCode::with_error_correction_level(text, EcLevel::L).ok()?;
-    // Most terminals are dark with light characters, so the light modules are drawn. The renderer draws `Dark`, hence
-    // the swap.
+    // Most terminals are dark with light characters, so the light modules are drawn. The renderer draws `Dark` modules,
+    // so the two colours are swapped.
     Some(code.render::<Dense1x2>().dark_color(Dense1x2::Light).light_color(Dense1x2::Dark).build())
 }
 

@@ -95,7 +95,7 @@ impl Samples {
         chunks.skip(part).take(self.visible.saturating_sub(first))
     }
 
-    /// Returns visible samples between two chainages, thinned to at most `most`, and the thinning step.
+    /// Returns visible samples between two chainages, m, thinned to at most `most` samples, and the thinning step.
     pub fn between(&self, from_m: f32, to_m: f32, most: usize) -> (Vec<SampleRecord>, usize) {
         let count = self.each(from_m, to_m).count();
         let step = count.div_ceil(most.max(1)).max(1);

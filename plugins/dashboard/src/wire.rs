@@ -38,8 +38,8 @@ pub struct SectionRecord {
     /// Bit 0: flagged. Bit 1: settled, which means that no further sample on the present course can change the
     /// verdict. Bits 2 to 4: verdict for a second target plus 1, or 0 without a second target.
     pub flags: u8,
-    /// Diameter of the largest hole, its standard deviation, and chainage and arc length of its centre, m;
-    /// NaN if there is none.
+    /// Diameter of the largest hole, the diameter's standard deviation, and chainage and arc length of the hole's
+    /// centre, m; NaN without a hole.
     pub hole: [f32; 4],
 }
 

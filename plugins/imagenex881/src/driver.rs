@@ -31,8 +31,8 @@ const LINE_BAUD: f64 = 115_200.0;
 /// Source: LSTS DUNE, which retries after a second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// Limits beyond which a head is homed: a lag of the scan program's period divided by the first value, or a lead of the
-/// second value. Before the head has joined its program, the limit of the lag is one ping.
+/// Limits beyond which a head is homed. The largest lag is the scan program's period divided by the first value. The
+/// largest lead is the second value. Before the head has joined its program, the limit of the lag is one ping.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
 /// A head that answers is reported as too slow for its settings if it lags by more than the scan program's period
@@ -65,10 +65,10 @@ pub struct HeadDriver {
     next_at: MonoNs,
     aim: Aim,
     way_home: VecDeque<Command>,
-    /// Number of the scan program's ping that follows homing.
+    /// Number, in the scan program, of the first ping after homing.
     joins_at: u64,
     unanswered: u32,
-    /// Whether each of the last 32 commands was unanswered. The lowest bit is the latest command.
+    /// Which of the latest 32 commands were unanswered, one bit each. The lowest bit is the latest command.
     losses: u32,
     /// Whether the head has followed its scan program at least once.
     joined: bool,
@@ -161,7 +161,7 @@ impl HeadDriver {
         self.timetable.ping(number).is_some_and(|ping| ping.position == position)
     }
 
-    /// Continues with a ping of the scan program when it is due, or at once if it is overdue.
+    /// Continues the scan program with ping `number`, when this ping is due or, if overdue, at once.
     fn go_on(&mut self, number: u64, now: MonoNs) {
         self.joined = true;
         self.aim = Aim::Ping(number);
@@ -169,7 +169,8 @@ impl HeadDriver {
         self.behind = self.timetable.first_at(now).saturating_sub(number);
     }
 
-    /// Continues the scan program at the head's position, or homes the head if that position is too far off.
+    /// Continues the scan program at the head's position, or homes the head if that position is too far off the
+    /// program.
     fn join(&mut self, position: u16, clockwise: bool, now: MonoNs) {
         let current = self.timetable.first_at(now);
         let most_behind = if self.joined { self.timetable.len() / BEHIND_SHARE } else { 1 };

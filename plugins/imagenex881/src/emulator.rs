@@ -1,4 +1,4 @@
-//! An emulated head. An emulated host polls it once per ping period, or a real host polls it.
+//! An emulated head, polled once per ping period by an emulated host, or by a real host.
 
 use std::collections::VecDeque;
 

@@ -5,7 +5,8 @@ use headrace_sensor::sampling::head::HeadProgram;
 use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
-/// Range setting while homing, m: the shortest one. It must differ from the configured setting.
+/// Range setting while homing, m: the shortest one. It must differ from the configured setting, so that returns of
+/// homing can be told from samples.
 const RANGE_M: u8 = 1;
 
 /// Position and stepping direction of a head.
@@ -17,11 +18,12 @@ pub struct Standing {
     pub growing: bool,
 }
 
-/// Commands that move a head the short way to the start of its scan program and leave it stepping in the
-/// program's direction.
+/// Commands that move a head the short way to the start of its scan program and leave it stepping in the program's
+/// direction.
 ///
 /// A head pings with every command. The range setting while homing differs from the configured one, so that these
-/// returns don't count as samples. If the direction is wrong at the end, a final command reverses it without a step.
+/// returns don't count as samples. If the stepping direction is wrong at the end, a final command reverses it without a
+/// step.
 pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Vec<Command> {
     let normal = settings.angle_sign > 0.0;
     let half = COUNTS_PER_TURN / 2;

@@ -168,13 +168,13 @@ pub struct HeadDecoder {
 
 stateful!(HeadDecoder { state: codec, clock, reader; });
 
-/// Converts whole returns to readings. This state is separate from the codec, so that both can be borrowed.
+/// Converts whole returns to readings. It is separate from the codec, so that both can be borrowed at once.
 #[derive(Debug, Clone)]
 struct Reader {
     settings: Settings,
     latency: DurNs,
     rejected: Rejected,
-    /// Reason for the last rejected return.
+    /// Reason why the latest rejected return was rejected.
     reason: Option<WithheldReason>,
 }
 

@@ -89,7 +89,7 @@ pub struct Timetable {
     period: DurNs,
 }
 
-/// Maximum period of a scan program, in pings. A sector in the mode "slow" has 2,400.
+/// Maximum period of a scan program, in pings. A sector in the mode "slow" has 2,400 pings.
 const MAX_PINGS: usize = 10_000;
 
 impl Timetable {

@@ -315,7 +315,7 @@ fn sbg_values_with_bad_status_are_withheld() {
     let samples = [sbg::Message::Acceleration([0; 3]), sbg::Message::Rate([0; 3])];
     assert_eq!(readings(&mut decoder, MessageSet::Sbg, &samples.map(Message::Sbg)).len(), 2);
     // The checked bits are the accelerometer bits, the gyro bits and the response bit. The overall test bit combines
-    // others and isn't checked.
+    // other bits and isn't checked.
     for (bit, expected) in [(0, 0), (1, 2), (2, 1), (4, 1), (5, 1), (7, 1), (8, 1), (9, 1), (10, 2)] {
         let messages = [info(0x3FF & !(1 << bit)), samples[0], samples[1]].map(Message::Sbg);
         assert_eq!(readings(&mut decoder, MessageSet::Sbg, &messages).len(), expected, "bit {bit}");

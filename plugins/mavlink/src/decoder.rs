@@ -91,7 +91,7 @@ struct State {
     system_id: Option<u8>,
     passed_over: u64,
     withheld: u64,
-    /// Reason for the last withheld message.
+    /// Reason why the latest withheld message was withheld.
     reason: Option<WithheldReason>,
 }
 

@@ -84,8 +84,8 @@ impl Header {
         self.summed_bytes() + CHECKSUM_SIZE + if self.signed { v2::SIGNATURE_SIZE } else { 0 }
     }
 
-    /// Whether the checksum of the frame's message can be checked. In version 1 the length must also be
-    /// exactly the message's.
+    /// Whether the checksum of the frame's message can be checked. In version 1 the payload must also have exactly the
+    /// length of the message.
     fn is_known(&self) -> bool {
         match self.version {
             MavlinkVersion::V1 => v1_payload_bytes(self.message_id) == Some(self.payload_bytes),

@@ -38,7 +38,7 @@ pub enum Message {
 pub struct Imu {
     /// Type of the message.
     pub message: ImuMessage,
-    /// Time since the autopilot's boot, or since 1970. The SCALED_IMU messages have it in milliseconds.
+    /// Time since the autopilot's boot, or since 1970. The SCALED_IMU messages have this time in milliseconds.
     pub time_us: u64,
     /// Specific force, milli-g.
     pub force_mg: [i16; 3],
@@ -239,7 +239,8 @@ impl MessageData for Distance {
             signal_quality: self.quality_percent,
             ..DISTANCE_SENSOR_DATA::DEFAULT
         };
-        // The field after the orientation, the unknown variance, isn't zero, so the orientation is never truncated.
+        // The field after the orientation is the variance. Its value for "unknown" isn't zero, so the orientation is
+        // never truncated.
         let len = data.ser(version, payload);
         if let Some(orientation) = payload.get_mut(ORIENTATION_AT) {
             *orientation = self.orientation;

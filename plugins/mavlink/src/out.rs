@@ -19,8 +19,8 @@ pub const COMPONENT_ID: u8 = 191;
 pub const TEXT_BYTES: usize = 50;
 /// Maximum length of a value's name. Source: MAVLink, NAMED_VALUE_FLOAT.
 pub const NAME_BYTES: usize = 10;
-/// Names of values that QGroundControl attributes to the autopilot, whoever sends them. Source: its ArduSub
-/// plugin, August 2026.
+/// Names of values that QGroundControl attributes to the autopilot, whoever sends them. Source: QGroundControl's
+/// ArduSub plugin, August 2026.
 pub const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
@@ -93,7 +93,7 @@ impl Speaker {
         let text = ascii(text);
         let is_whole = text.len() <= TEXT_BYTES;
         let id = if is_whole { 0 } else { self.next_text() };
-        // A full part can't be marked as the last part, so an empty part follows it.
+        // A part of full length can't mark the end of the text. If the last part is full, an empty part follows.
         let parts = if is_whole { 1 } else { text.len() / TEXT_BYTES + 1 };
         let part = |part: usize| {
             let from = part * TEXT_BYTES;

@@ -15,10 +15,10 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Udp, Carrier::Tcp]
 
 /// Longest usual gap between the bytes of a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
-/// Timeout of the device's answer to a setting or request. Source: Ping protocol, 50 ms, plus an allowance
-/// for a bridge.
+/// Timeout for the device's answer to a setting or request. Source: Ping protocol, 50 ms, plus an allowance for a
+/// bridge.
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
-/// Time beyond the ping interval that the device has to answer a distance request.
+/// Time that the device has to answer a distance request, in addition to the ping interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
 /// Maximum number of times that a setting is sent. Without an acknowledgement, the next setting then follows.
 const TRIES: u32 = 4;
@@ -163,7 +163,7 @@ impl PingDriver {
         }
     }
 
-    /// Timeout of the device's answer to this message.
+    /// Timeout for the device's answer to this message.
     fn timeout(&self, asked: Asked) -> DurNs {
         match asked {
             Asked::Setting(_) => ANSWER_TIME,

@@ -14,7 +14,7 @@ use crate::codec::{
 };
 use crate::settings::Settings;
 
-/// Listening range of an emulated device. It extends to the practical limit of a `Ping1D`.
+/// Listening range of an emulated device, up to the practical limit of a `Ping1D`.
 const SCAN: ScanRange = ScanRange { start_mm: 0, length_mm: 30_000 };
 
 /// Longest usual gap between the bytes of a frame.

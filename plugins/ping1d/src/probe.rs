@@ -17,7 +17,7 @@ pub struct PingProbe {
 }
 
 impl Probe for PingProbe {
-    /// The version is requested first, so that it is known when the identity arrives.
+    /// The protocol version is requested first, so that it is known when the identity arrives.
     fn questions(&self) -> Vec<Vec<u8>> {
         let asked = [id::PROTOCOL_VERSION, id::DEVICE_INFORMATION].into_iter().filter_map(|about| {
             let message = Message::GeneralRequest(about);

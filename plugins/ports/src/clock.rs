@@ -32,8 +32,8 @@ pub fn set_ahead(by: DurNs) {
 
 /// Converts a wall-clock timestamp of the kernel to the monotonic clock.
 ///
-/// The age of the timestamp is kept. A timestamp in the future becomes the current time. It can occur after the wall
-/// clock was set back.
+/// The age of the timestamp is kept. A timestamp in the future becomes the current time. Such timestamps can occur
+/// after the wall clock was set back.
 pub fn of_wall(stamped: SystemTime) -> MonoNs {
     let now = now();
     let ago = wall().duration_since(stamped).unwrap_or(Duration::ZERO);

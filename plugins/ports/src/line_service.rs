@@ -1,5 +1,5 @@
-//! Service of one line: opens the line, serves the drivers of its devices, and reopens the line after each
-//! failure.
+//! Service of one line, a connection to one or several devices: opens the line, serves the drivers of its devices, and
+//! reopens the line after each failure.
 //!
 //! The service runs step by step. On real ports each service has its own thread.
 
@@ -49,7 +49,7 @@ pub trait LineRecord: Send + Sync {
     fn lost(&self, sensor: usize, from: MonoNs, to: MonoNs, packets: u64);
 }
 
-/// A sensor on a line.
+/// A sensor on a line, which is a connection to one or several devices.
 pub struct Attached {
     /// Sensor index, in the order of the vehicle file.
     pub source: usize,
@@ -74,7 +74,7 @@ pub struct Common {
     pub record: Option<Arc<dyn LineRecord>>,
 }
 
-/// A line and the devices on it.
+/// A line, which is a connection, and the devices on it.
 pub struct LineService {
     connect: Result<Connect, ConnectError>,
     /// Addresses of the lines that precede this one in the vehicle file.
@@ -159,8 +159,8 @@ impl Wire for Ends<'_> {
 impl LineService {
     /// Creates a closed line.
     ///
-    /// `before` are the addresses of the lines that precede it in the vehicle file. The line isn't opened if
-    /// one of these addresses leads to the same device.
+    /// `before` are the addresses of the lines that precede this line in the vehicle file. The line isn't opened if one
+    /// of these addresses leads to the same device.
     pub fn new(
         connect: Result<Connect, ConnectError>,
         before: Vec<Connect>,
@@ -218,7 +218,7 @@ impl LineService {
         }
     }
 
-    /// Opens a closed line. Waits once for bytes on an open line, and serves its drivers.
+    /// Opens the line if it is closed. If it is open, waits once for bytes, and serves the drivers.
     pub fn step(&mut self) {
         let closed = LineState::Closed { until: self.common.host.now() };
         self.state = match core::mem::replace(&mut self.state, closed) {
@@ -431,8 +431,8 @@ impl LineService {
 
     /// Wakes drivers that are due, unless another driver on the line awaits an answer.
     ///
-    /// Several drivers may await answers, e.g. just after the line was opened. The first of these is woken all the
-    /// same, so that it can time out. Otherwise they would wait for each other for ever.
+    /// Several drivers may await answers, e.g. just after the line was opened. The first of these drivers is woken all
+    /// the same, so that it can time out. Otherwise these drivers would wait for each other for ever.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();
@@ -527,7 +527,7 @@ impl AttachedState {
         let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
-            // The frame arrived with the latest bytes, which may be earlier than `now`.
+            // The frame arrived with the latest bytes, possibly before `now`.
             self.last_frame = self.last_bytes;
         }
         if let Some(complaint) = complaint {

@@ -70,7 +70,7 @@ pub struct LineHistory {
     pub last: String,
 }
 
-/// Bounded queue of statuses. When it is full, the oldest is dropped and counted.
+/// Bounded queue of statuses. When it is full, the oldest status is dropped and counted.
 #[derive(Clone)]
 pub struct StatusQueue {
     shared: Arc<Shared>,

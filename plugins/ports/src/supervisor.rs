@@ -88,7 +88,7 @@ impl Supervisor {
 
     /// Stops all threads and drains the rings. Returns each sensor's line history, in the order of the sensors.
     pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
-        // A thread reports its own panic. Its sensors then get this history instead of their own.
+        // A thread that panics has reported the panic itself. Its sensors get this history instead of their own.
         let ended_early =
             LineHistory { last: "its thread has ended early".to_owned(), ..LineHistory::default() };
         let mut all = vec![ended_early; self.sensors];
@@ -109,10 +109,10 @@ impl Supervisor {
     }
 }
 
-/// Ends threads that fill rings, in three steps: notify them, wait for them, and drain the rings.
+/// Ends threads that fill rings, in three steps: notify the threads, wait for them, and drain the rings.
 ///
-/// Rings are drained last, because a thread may still fill its ring after the notification. Joining a thread makes
-/// its writes visible; the flag doesn't.
+/// Rings are drained last, because a thread may still fill its ring after the notification. Joining a thread makes its
+/// writes visible. Setting the stop flag doesn't.
 fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce()) -> H {
     tell();
     let handed_back = wait();
@@ -179,7 +179,8 @@ mod tests {
 
     /// Explores a model of a line's thread, which behaves as `LineService::run`.
     ///
-    /// The thread checks the flag before each step. At its end it delivers the bytes that its driver still holds.
+    /// The thread checks the stop flag before each step. When the thread ends, it delivers the bytes that its driver
+    /// still holds.
     fn line_and_stop(name: &str, ends: Ends) -> usize {
         explore(name, Some(4), move || {
             let (mut port, mut reader) = packets(96);

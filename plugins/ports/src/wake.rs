@@ -19,7 +19,7 @@ pub trait Threads {
     /// Sets a thread's token, which ends the thread's wait.
     fn unpark(thread: &Self::Thread);
 
-    /// Waits for this thread's token, at most this long, and takes it.
+    /// Waits for this thread's token, for at most `at_most`, and takes the token.
     fn park(at_most: Duration);
 }
 
@@ -63,7 +63,7 @@ impl<T: Threads> Waker<T> {
     }
 }
 
-/// Sleeps until this thread is woken, at most for `at_most`. Returns at once if the thread was woken since its last
+/// Sleeps until this thread is woken, at most for `at_most`. Returns at once if the thread was woken since its previous
 /// sleep.
 pub(crate) fn sleep<T: Threads>(at_most: Duration) {
     T::park(at_most);

@@ -12,7 +12,7 @@ use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
 use crate::tracker::{CountTracker, Counting, TrackerHealth};
 
-/// Longest usual gap between the bytes of a line. An unfinished line is dropped after this gap.
+/// Longest usual gap between the bytes of one text line. An unfinished line is dropped after this gap.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 const MILLISECOND: DurNs = DurNs::from_millis(1);

@@ -12,7 +12,7 @@ pub const REPORT_CARRIERS: [Carrier; 2] = [Carrier::Hid, Carrier::Udp];
 pub const LINE_CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Tcp, Carrier::Udp];
 
 const PATIENCE: DurNs = DurNs::from_millis(5_000);
-/// Longest usual gap between the bytes of a line.
+/// Longest usual gap between the bytes of one text line.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// Driver of a HID counter.

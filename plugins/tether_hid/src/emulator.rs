@@ -13,7 +13,7 @@ use crate::tracker::Counting;
 /// Status byte of an emulated counter, which means valid.
 const STATUS_WELL: u8 = 1;
 
-/// Number of decimal places of lengths in an emulated line, so that they are in millimetres.
+/// Number of decimal places of lengths in an emulated text line: three, for millimetres.
 const LINE_PLACES: u8 = 3;
 
 /// Settings of the emulated counter.

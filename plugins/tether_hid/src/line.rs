@@ -11,11 +11,11 @@
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 use headrace_sensor::geometry::math;
 
-/// Templates of the two kinds of lines. 9 stands for a digit, # for a character of a number, and all other characters
-/// for themselves.
+/// Templates of the two kinds of text lines. 9 stands for a digit, # for a character of a number, and all other
+/// characters for themselves.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
-/// Maximum length of a line, bytes.
+/// Maximum length of a text line, bytes.
 pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
 /// Offset in a template after `RD,`. A match up to this offset is unlikely to be chance.
@@ -47,7 +47,7 @@ pub struct Stamp {
     pub millisecond: u16,
 }
 
-/// One line of a monitor, in the units configured in the monitor.
+/// One text line of a monitor, in the units configured in the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineReading {
     /// Winch and time, which only LCI-90i lines have.
@@ -133,7 +133,7 @@ impl Decimal {
 }
 
 impl LineReading {
-    /// Encodes the line with checksum, CR and LF.
+    /// Encodes the text line with checksum, CR and LF.
     pub fn encode(&self) -> Vec<u8> {
         let mut line = Vec::with_capacity(MAX_LINE_BYTES);
         if let Some(stamp) = &self.stamp {

@@ -139,8 +139,8 @@ fn hid(reeling: &CounterSettings, own: &Section<'_>) -> Result<Wire, ConfigError
     Ok(Wire::Hid { decoder: Box::new(decoder), counter, sd_m: preset.map(|preset| preset.sd_m) })
 }
 
-/// The reference layout, with the values of the keys. If the keys change the layout, sequence, status and auxiliary
-/// value no longer default to the reference's.
+/// The report layout: the reference layout, changed by the keys. If a key changes the layout, the offsets of sequence,
+/// status and auxiliary value have no default.
 fn report_layout(own: &Section<'_>) -> Result<ReportLayout, ConfigError> {
     let reference = ReportLayout::REFERENCE;
     let byte = |key, least, usual: usize| -> Result<usize, ConfigError> {

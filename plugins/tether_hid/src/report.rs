@@ -107,7 +107,7 @@ pub enum LayoutError {
         offset: usize,
         /// Length of the field.
         bytes: usize,
-        /// Name of the field that it overlaps.
+        /// Name of the second field.
         other: &'static str,
     },
 }

@@ -41,7 +41,7 @@ pub enum Counting {
     Delta,
 }
 
-/// Health of a cable counter's tracking. The numbers only grow, and the flag stays set.
+/// Health of a cable counter's tracking. The numbers only grow, and the flag stays set once it is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TrackerHealth {
     /// Number of reports rejected because the change was faster than the winch.
@@ -86,7 +86,7 @@ struct Jump {
 }
 
 impl CountTracker {
-    /// Creates a tracker; `max_counts_per_s` is the maximum speed of the winch or the vehicle.
+    /// Creates a tracker; `max_counts_per_s` is the maximum speed of the winch or the vehicle, in counts.
     pub fn new(counting: Counting, width: Width, max_counts_per_s: f64) -> Self {
         Self {
             counting,

@@ -30,7 +30,7 @@ const SPEED: &[(&str, f64)] = &[("m/s", 1.0)];
 pub(super) const PRESSURE: &[(&str, f64)] =
     &[("Pa", 1.0), ("hPa", 100.0), ("mbar", 100.0), ("kPa", 1000.0), ("bar", 1e5)];
 
-/// Returns the quantities that a kind of sensor measures. A table must have all of them.
+/// Returns the quantities that a kind of sensor measures. A table must have all these quantities.
 fn quantities(sense: Sense) -> &'static [Quantity] {
     match sense {
         Sense::Head => &[("angle", 0, ANGLE), ("range", 1, LENGTH)],

@@ -106,7 +106,7 @@ impl EmulatedSensor {
         self.reach_m.is_some()
     }
 
-    /// Returns a value that the sensor can report, and whether it differs from the given value.
+    /// Returns a value that the sensor can report, and whether this value differs from the given one.
     ///
     /// A beam whose range is outside the head's range setting becomes a beam without an echo.
     pub(super) fn within_reach(&self, value: Value) -> (Value, bool) {

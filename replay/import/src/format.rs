@@ -3,7 +3,7 @@
 use crate::entry::{Clock, Entry, ImportReport, Step};
 use crate::order::WINDOW_NS;
 
-/// Default limit for the bytes of a file held in memory. Entries longer than that are lost.
+/// Default limit for the bytes of a file held in memory. Entries longer than this limit are lost.
 const MOST_HELD: usize = 1 << 20;
 
 /// Splits a file of one kind into entries, without I/O. The caller supplies the bytes.

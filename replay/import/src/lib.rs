@@ -1,10 +1,11 @@
 //! Imports foreign logs.
 //!
-//! A file is split into entries. They are put in time order, and routed to the sensors that would have received them.
+//! A file is split into entries. The entries are put in time order, and routed to the sensors that would have received
+//! them.
 //!
-//! A [`Format`] splits one kind of file, without I/O; [`FileKind`] lists the known kinds. [`Import`] reads with
-//! bounded memory, moves the file's times to a clock that begins at [`BEGIN`], and counts losses. A [`Taker`] is a
-//! sensor of the vehicle file; [`routing`] assigns recorded connections to sensors.
+//! A [`Format`] splits one kind of file, without I/O; [`FileKind`] lists the known kinds. [`Import`] reads with bounded
+//! memory, moves the file's times to a clock that begins at [`BEGIN`], and counts losses. A [`Taker`] is a sensor of
+//! the vehicle file; [`routing`] assigns recorded connections to sensors.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

@@ -18,7 +18,7 @@ pub struct PingFormat {
 /// Name of the only stream in a Ping Viewer log: all messages belong to it.
 pub const STREAM: &str = "ping";
 
-/// Number of texts in the preface after the title and the version. Two numbers follow them.
+/// Number of texts in the preface after the title and the version. Two numbers follow these texts.
 const TEXTS: usize = 5;
 const TITLE: &str = "PingViewer sensor log file";
 const DAY_NS: u64 = 86_400_000_000_000;
@@ -88,7 +88,7 @@ fn number(rest: &mut &[u8]) -> Result<u32, Stop> {
 }
 
 fn sized<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Stop> {
-    // Qt writes a null string with this length.
+    // Qt writes `u32::MAX` as the length of a null string.
     let len = match number(rest)? {
         u32::MAX => 0,
         len => usize::try_from(len).map_err(|_| Stop::Bad)?,

@@ -1,5 +1,5 @@
 //! Assigns the connections recorded in a foreign log, such as CAN interfaces, to sensors. Options and error texts call
-//! them lines.
+//! these connections lines.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_replay::log::SourceInfo;
@@ -121,7 +121,7 @@ pub enum RoutingError {
 
 /// Returns the sensors that receive data: the sensors of the vehicle file, or the sensors in `explicit`.
 ///
-/// `explicit` has pairs of a sensor's id and the name of its connection. They replace the connections in the vehicle
+/// `explicit` has pairs of a sensor's id and the name of its connection. These connections replace those in the vehicle
 /// file.
 ///
 /// Errors: see [`RoutingError`].

@@ -9,9 +9,9 @@ use headrace_geometry::time::MonoNs;
 
 use crate::log::{DiveLog, LogError, MessageKind};
 
-/// Minimum offset between two clocks, far longer than any dive.
+/// Minimum offset between two clocks, far longer than any dive. Timestamps with smaller gaps come from one clock.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Maximum number of clocks that are distinguished. Messages of more clocks are assigned to no clock.
+/// Maximum number of clocks that are distinguished. Messages of further clocks are assigned to no clock.
 const MAX_CLOCKS: usize = 100;
 
 /// A clock, described by the range of its timestamps. The ranges of two clocks are more than a year apart.
@@ -57,7 +57,7 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
         }
     }
     let several = clocks.len() > 1 || others > 0;
-    // If two counts are equal, the earlier clock wins, because a monotonic clock starts at zero.
+    // If two counts are equal, the clock with the earlier timestamps wins, because a monotonic clock starts at zero.
     let most = clocks.into_iter().min_by_key(|clock| (core::cmp::Reverse(clock.messages), clock.from));
     Ok(most.filter(|_| several))
 }

@@ -251,7 +251,7 @@ impl Clock {
         Self { origin, paced: speed.map(|speed| (Instant::now(), speed)) }
     }
 
-    /// Returns the wall time that is left until packet time reaches `until`; `None` if it has been reached.
+    /// Returns the wall time that is left until packet time reaches `until`; `None` if that time has been reached.
     pub(crate) fn left(&self, until: MonoNs) -> Option<Duration> {
         let (started, speed) = self.paced?;
         let wanted = Duration::try_from_secs_f64(until.since(self.origin).as_secs_f64() / speed).ok()?;

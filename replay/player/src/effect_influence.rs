@@ -76,20 +76,21 @@ pub struct EffectInfluence {
 }
 
 impl LeftOut {
-    /// Whether leaving out these effects changes nothing by more than [`HOLE_LIMIT_M`] and [`PASSED_LIMIT`].
+    /// Whether leaving out these effects changes the hole diameter D by at most [`HOLE_LIMIT_M`], and the passed share
+    /// by at most [`PASSED_LIMIT`].
     ///
     /// The whole confidence intervals must be within the limits.
     pub fn is_free(&self) -> bool {
         self.excess() <= 1.0
     }
 
-    /// Returns the largest change within the confidence intervals, as a multiple of its limit.
+    /// Returns the largest change within the confidence intervals, as a multiple of the limit for that quantity.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
 }
 
-/// Measures the effects of a scene, which must be given once per seed.
+/// Measures the effects of a scene. `scenes` has this scene once per seed.
 ///
 /// `note` is called with the number of finished dives and the maximum number of dives.
 ///
@@ -103,7 +104,7 @@ pub fn measure(
     }
     let effects = scenes.first().map(Scene::simulated).unwrap_or_default();
     // Leaving out all negligible effects together takes one measurement. Each effect that must be restored takes one
-    // more.
+    // more measurement.
     let most = scenes.len() * (2 * effects.len() + 2);
     let mut paired = Paired { with: Vec::new(), scenes, dived: 0, most, note };
     paired.with = paired.dive(&[])?;
@@ -227,8 +228,8 @@ impl Figures {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }
 
-    /// Returns the mean difference of the hole diameter D over the sections that both dives have, m; zero if there
-    /// are none.
+    /// Returns the mean difference of the hole diameter D over the sections that both dives have, m; zero without such
+    /// sections.
     fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();

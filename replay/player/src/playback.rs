@@ -60,8 +60,8 @@ pub trait PlaybackObserver {
     /// Called after each tick that a jump skips. Notices of such a tick must not be displayed.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
-    /// Called when playback pauses, after a jump, and at the end of the log. Only at the end of the log, `ended` is
-    /// true.
+    /// Called when playback pauses, after a jump, and at the end of the log. `ended` is true only at the end of the
+    /// log.
     ///
     /// `at` is the end of the latest tick.
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
@@ -244,7 +244,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Restores the snapshot of time `at`. The store must have returned `at` as the time of a snapshot.
+    /// Restores the snapshot of time `at`, which must be a time that the snapshot store has returned.
     fn restore(&mut self, at: MonoNs) -> Result<(), PlaybackError> {
         let Some(snapshot) = self.store.load(at) else { return Ok(()) };
         let mut restorer = Restorer::new(&snapshot);

@@ -32,7 +32,7 @@ pub struct Player {
     clock: Option<Clock>,
     /// Messages with timestamps of another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
-    /// The farthest position from which a jump started, as a message count, and the losses up to there.
+    /// The farthest position from which a jump started, as a message count, and the losses up to that position.
     farthest: (u64, Vec<String>),
 }
 
@@ -104,10 +104,10 @@ impl Player {
 
     /// Continues from a position of this player, or of another player of the same log and vehicle.
     ///
-    /// Losses are then counted as if the log had been played straight through. Losses found after the position stay
-    /// in the list until playback passes them again.
+    /// Losses are then counted as if the log had been played straight through. Losses found after the position stay in
+    /// the list until playback passes them again.
     ///
-    /// Errors: the log can't be read there.
+    /// Errors: the log can't be read at that position.
     pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {
         if self.order > self.farthest.0 {
             self.farthest = (self.order, self.losses_here());
@@ -133,7 +133,7 @@ impl Player {
         self.played
     }
 
-    /// Returns losses and omissions so far, as text. Those found before a jump back are included.
+    /// Returns losses and omissions so far, as text, including those found before a jump back.
     pub fn losses(&self) -> Vec<String> {
         let (order, losses) = &self.farthest;
         if *order > self.order { losses.clone() } else { self.losses_here() }
@@ -178,7 +178,7 @@ impl Player {
         losses
     }
 
-    /// Returns anomalies found so far, and how they were handled, as text. They lose no data.
+    /// Returns anomalies found so far, and how they were handled, as text. These anomalies lose no data.
     pub fn notes(&self) -> Vec<String> {
         let note = |(topic, ids): (String, Vec<u16>)| {
             let ids: Vec<String> = ids.iter().map(u16::to_string).collect();

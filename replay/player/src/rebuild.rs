@@ -21,8 +21,8 @@ use crate::playback::PlaybackError;
 use crate::player::Player;
 use crate::saved_state::{Consumed, SavedState};
 
-/// Once the rebuilding loop has at most this many new packets left, the dive's loop waits for it, for a fraction of a
-/// second.
+/// Number of new packets left to the rebuilding loop at which the dive's loop waits for it. The wait takes a fraction
+/// of a second.
 const NEAR_PACKETS: u64 = 100;
 
 /// A dive whose state is being rebuilt.
@@ -44,7 +44,7 @@ pub struct Rebuilt {
     pub consumed: Consumed,
     /// Files of the log, with their numbers of messages.
     pub files: Vec<PartFile>,
-    /// Losses of the log, as text. The cut end of the last file is not among them.
+    /// Losses of the log, as text, without the cut-off end of the last file.
     pub losses: Vec<String>,
 }
 
@@ -126,7 +126,7 @@ impl Rebuild {
         self.thread.is_finished() || self.progress.read.load(Ordering::Relaxed) && behind <= NEAR_PACKETS
     }
 
-    /// Waits until all packets passed on are processed, ends the thread, and returns the state.
+    /// Waits until all packets that were passed on have been processed, ends the thread, and returns the state.
     ///
     /// Errors: the log can't be read, or the loop fails.
     pub fn finish(self) -> Result<Rebuilt, PlaybackError> {
@@ -134,7 +134,8 @@ impl Rebuild {
         self.thread.join().unwrap_or(Err(PlaybackError::Log(LogError::Panicked)))
     }
 
-    /// Tells the thread to end without a result. It isn't waited for, because its medium may not respond.
+    /// Tells the thread to end without a result. Doesn't wait for the thread, because the thread's medium may not
+    /// respond.
     pub fn cancel(self) {
         self.progress.cancelled.store(true, Ordering::Relaxed);
     }

@@ -18,7 +18,7 @@ use crate::view;
 /// sources.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
-/// A tick may consume at most the free room of the queue divided by this number, in a dive that reads ports.
+/// In a dive that reads ports, a tick may consume at most the free room of the queue divided by this number.
 ///
 /// Short packets, together with their results, take several times their length in the queue.
 const SMALLER_TICK: usize = 8;
@@ -68,7 +68,7 @@ pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
     filled.map(message).collect()
 }
 
-/// Records with one or several recorders every packet that the loop consumes, every tick and every result.
+/// Records every packet that the loop consumes, every tick and every result, with one or several recorders.
 ///
 /// Packets are recorded in the order of consumption. If a recorder's queue has no room for a tick of the largest size,
 /// the loop consumes nothing until there is room. Recorded input is therefore never dropped.
@@ -180,7 +180,7 @@ fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &
 
 /// Records the results of a tick.
 ///
-/// Input has priority, so results that don't fit are left out. Gaps in the record numbers show that.
+/// Input has priority, so results that don't fit are left out. Gaps in the record numbers show such omissions.
 fn record_results(
     port: &mut RecorderPort,
     streams: &[(&str, &ResultStream)],
@@ -199,7 +199,7 @@ fn record_results(
     }
 }
 
-/// Writes the words of a stream into a message, without allocation. Returns `false` if they don't all fit.
+/// Writes the words of a stream into a message, without allocation. Returns `false` if the words don't all fit.
 fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) -> bool {
     message.clear();
     let room = message.capacity() / 8 - HEAD_WORDS;

@@ -1,8 +1,8 @@
 //! Smooths a dive in two replays.
 //!
-//! During the first replay the steps of the navigation filter are stored on disk. They are then smoothed backwards,
-//! and the second replay uses the result. The steps don't fit in memory. An unlinked file holds them, and disappears
-//! with the process.
+//! During the first replay the steps of the navigation filter are stored on disk. The steps are then smoothed
+//! backwards, and the second replay uses the result. The steps don't fit in memory. An unlinked file holds them, and
+//! disappears with the process.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
@@ -93,7 +93,7 @@ impl FirstPass {
         self.consistency = core::array::from_fn(|source| dive.consistency(source));
     }
 
-    /// Smooths from the last step to the first. Returns the navigation for the second replay.
+    /// Smooths the filter steps, from the last to the first. Returns the navigation for the second replay.
     ///
     /// Errors: a step was lost, or the file of steps can't be written or read.
     pub fn smooth(self) -> Result<(Box<dyn Navigation>, Changes), SmoothError> {

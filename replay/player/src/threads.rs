@@ -23,7 +23,7 @@ pub const MOST_THREADS: usize = 3;
 
 /// Number of ticks in a batch. One queue operation then passes some milliseconds of work.
 const BATCH_TICKS: usize = 32;
-/// Maximum number of batches of ticks that wait between two threads.
+/// Maximum number of batches of ticks that wait in the queue between two threads.
 const MOST_WAITING: usize = 4;
 /// Capacity of the queue of used batches. It has room for the batches of two queues, and for the batches being
 /// processed.
@@ -54,7 +54,7 @@ impl Batch {
         }
         let tick = &mut self.ticks[self.len];
         tick.now = now;
-        // A loop may still hold the georeferenced pings of its latest tick. Those of all other ticks can be
+        // A loop may still hold the georeferenced pings of its latest tick. The pings of all other ticks can be
         // overwritten.
         if Arc::get_mut(&mut tick.placed).is_none() {
             tick.placed = Arc::default();
@@ -272,7 +272,7 @@ fn drive_all(
     })
 }
 
-/// Runs advice and judging of each loop for all ticks in a batch of georeferenced pings. Advice is for the loop's own
+/// Advises and judges in each loop, for all ticks in a batch of georeferenced pings. Advice is for the loop's own
 /// target.
 fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
     let mut own = Tick::default();

@@ -129,8 +129,8 @@ impl Stream {
         }
     }
 
-    /// Adds the live results of a tick. If too many results wait, the replay doesn't have them, which is reported as a
-    /// difference.
+    /// Adds the live results of a tick. If too many results wait, the replay evidently lacks them, and a difference is
+    /// reported.
     fn wait(&mut self, batch: Batch, name: &'static str) {
         // After a stream's first difference nothing more of it is compared.
         if self.difference.is_some() {
@@ -176,7 +176,7 @@ impl Verifier {
         Ok(Self { reader: DiveLog::open(log)?, streams, last_tick: 0, has_results: false, at_end: false })
     }
 
-    /// Compares the results of the replay's latest tick.
+    /// Compares the results of the replay's latest tick with the live results.
     ///
     /// Errors: reading the log fails.
     pub fn after_tick(&mut self, dive: &Loop) -> Result<(), LogError> {

@@ -7,7 +7,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Time at which every simulated dive starts.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// Number of parts in a second. Drifts are whole numbers of parts per second, so sums have no rounding errors.
+/// Number of parts into which a second is divided. A drift is a whole number of parts per second, so sums have no
+/// rounding errors.
 const PARTS: i128 = 1_000_000_000_000;
 
 /// A clock that is correct at the start and drifts at a constant rate.

@@ -28,7 +28,7 @@ pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) 
     Inertia { at, period, attitude: now, rate_radps, force_mps2 }
 }
 
-/// Half the time over which a velocity log averages.
+/// Half of the time over which a velocity log averages its measurement.
 const HALF_PING: DurNs = DurNs::from_millis(5);
 
 /// Velocity of the sensor's mounting point at time `at`, m/s.

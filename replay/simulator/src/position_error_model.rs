@@ -1,8 +1,8 @@
 //! Expected position errors of a calm dive, computed by running the filter.
 //!
 //! The vehicle moves straight through its tunnel, with devices that are ideal except for their wire formats. The
-//! filter's covariance does not depend on the readings, so the errors between two passes apply to any calm dive. They
-//! agree within 10 % with dives simulated from data sheets (`tests/tests/sampling/calm.rs`).
+//! filter's covariance does not depend on the readings, so the errors between two passes apply to any calm dive. These
+//! errors agree within 10 % with dives simulated from data sheets (`tests/tests/sampling/calm.rs`).
 
 use headrace_config::Document;
 use headrace_coverage::PassError;

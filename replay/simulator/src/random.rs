@@ -46,8 +46,8 @@ impl Stream {
         self.block(step, 0)
     }
 
-    /// Block number `block` of random numbers for `step`. An effect needs it if it draws more than two numbers per
-    /// step.
+    /// Block number `block` of random numbers for `step`. An effect that draws more than two numbers per step needs
+    /// more than one block.
     pub fn block(self, step: u64, block: u64) -> Draw {
         let half = |value: u64| [(value & 0xFFFF_FFFF) as u32, (value >> 32) as u32];
         let ([a, b], [c, d]) = (half(step), half(block));

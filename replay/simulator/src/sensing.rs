@@ -24,7 +24,7 @@ const CHECK_S: f64 = 0.5;
 pub(crate) struct Slice {
     /// Start of the time slice.
     pub from: MonoNs,
-    /// End of the time slice, excluded.
+    /// End of the time slice. The end itself belongs to the next slice.
     pub until: MonoNs,
 }
 

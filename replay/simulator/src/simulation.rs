@@ -42,7 +42,7 @@ pub trait Adviser: Send {
     /// Processes a message that has crossed its line. Messages must be passed in order of time.
     fn hear(&mut self, message: &Message<'_>);
 
-    /// Returns the advice given since the last call, in order of time.
+    /// Returns the advice given since the previous call, in order of time.
     fn told(&mut self) -> Vec<PilotAdvice>;
 }
 
@@ -205,7 +205,7 @@ impl Simulation {
         true
     }
 
-    /// Ground truth of all measurements since the last call. Empty unless the simulation was created by
+    /// Ground truth of all measurements since the previous call. Empty unless the simulation was created by
     /// [`Simulation::with_truth`].
     pub fn take_truth(&mut self) -> Vec<TruthRow> {
         self.truth.as_mut().map(std::mem::take).unwrap_or_default()
@@ -245,8 +245,8 @@ impl Simulation {
         }
     }
 
-    /// Replaces device number `source` of the vehicle file by one that is switched on now. A cable counter keeps its
-    /// count.
+    /// Replaces device number `source` of the vehicle file by a device that is switched on now. A cable counter keeps
+    /// its count.
     pub fn restart(&mut self, scene: &Scene, source: usize) {
         let (facts, _) = programmed(scene);
         let parts = (self.entities.get(source), scene.vehicle.sensors.get(source), facts.sensors.get(source));
@@ -264,8 +264,8 @@ impl Simulation {
         }
     }
 
-    /// Makes the cable counters repeat their next count, or count again. Returns the counters' numbers in the vehicle
-    /// file.
+    /// Makes the cable counters repeat their next count if `is_frozen`, and count again if not. Returns the counters'
+    /// numbers in the vehicle file.
     pub fn freeze_counters(&mut self, is_frozen: bool) -> Vec<usize> {
         let mut frozen = Vec::new();
         for (number, entity) in self.entities.iter().enumerate() {

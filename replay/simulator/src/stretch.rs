@@ -34,7 +34,7 @@ impl Stretch {
         (self.from_m..self.to_m).contains(&chainage_m)
     }
 
-    /// Whether the stretch overlaps another.
+    /// Whether the stretch overlaps another stretch.
     pub(crate) fn meets(&self, other: &Self) -> bool {
         self.from_m < other.to_m && other.from_m < self.to_m
     }

@@ -20,7 +20,7 @@ pub struct TruthRow {
     pub source: u16,
     /// Quantity that the sensor measures.
     pub sense: Sense,
-    /// Number of the measurement among those of its sensor.
+    /// Number of the measurement among all measurements of its sensor.
     pub number: u64,
     /// True pose of the vehicle.
     pub pose: Pose,

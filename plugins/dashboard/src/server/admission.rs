@@ -1,4 +1,4 @@
-//! Decides by its tokens whether a request may see the dive, and with which role.
+//! Decides from the tokens of a request whether the request may see the dive, and with which role.
 
 use std::collections::BTreeSet;
 use std::net::IpAddr;

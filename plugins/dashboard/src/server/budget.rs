@@ -17,7 +17,7 @@ struct Rate {
     per_s: f64,
 }
 
-/// Number of requests left in a budget, and the time for which this number is right.
+/// Number of requests that a budget had left, and the time at which this number was computed.
 #[derive(Debug, Clone, Copy)]
 struct Left(f64, Instant);
 
@@ -88,7 +88,8 @@ impl Budgets {
     }
 }
 
-/// Makes room in a full table. Removes all clients with a full budget, or else the client with the largest one.
+/// Makes room in a full table. Removes all clients with a full budget. If the table is then still full, removes the
+/// client with the largest budget.
 fn forget_one(left: &mut BTreeMap<Client, Left>, rate: Rate, now: Instant) {
     left.retain(|_, left| left.now(rate, now) < rate.most);
     if left.len() >= MOST_CLIENTS {

@@ -1,11 +1,11 @@
-//! Clients by address, as rate limits count them.
+//! Identifies clients by address, for rate limits.
 
 use std::net::{IpAddr, Ipv6Addr};
 
 use axum::http::{HeaderMap, HeaderName};
 
-/// Header with the addresses that a request has passed. Each proxy appends the address that it received the request
-/// from.
+/// Header with the addresses that a request has passed. Each proxy appends the address of the machine that sent it the
+/// request.
 const FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 
 /// Address by which rate limits identify a client.

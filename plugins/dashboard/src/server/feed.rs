@@ -19,7 +19,7 @@ use crate::site::May;
 
 /// Time from a viewer's pong to the next WebSocket ping, and timeout of a pong.
 ///
-/// Together they drop a stalled viewer within [`STALLED_AFTER`], even if the viewer's machine buffers the
+/// Ping and timeout together drop a stalled viewer within [`STALLED_AFTER`], even if the viewer's machine buffers the
 /// feed unread.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(8);
@@ -70,14 +70,14 @@ struct Viewer {
     shared: Arc<Shared>,
     may: May,
     instance: String,
-    /// Number of the last message sent to the viewer.
+    /// Number of the latest message sent to the viewer.
     seq: u64,
     state_every: Duration,
     state_sent: Option<Instant>,
     budget: Budget,
     /// Time of the next WebSocket ping.
     ping_at: Instant,
-    /// Deadline for the pong to the last WebSocket ping; `None` if no pong is due.
+    /// Deadline for the pong to the latest WebSocket ping; `None` if no pong is due.
     answer_by: Option<Instant>,
 }
 
@@ -108,9 +108,8 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Ended => (close_code::AWAY, "ended"),
     };
     let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
-    // The viewer may already have disconnected. Otherwise wait for its answer to the close frame, so that it
-    // reads all data sent before. The number of messages read is limited, because a client may flood the
-    // server.
+    // The viewer may already have disconnected. Otherwise wait for the viewer's answer to the close frame, so that the
+    // viewer reads all data sent before. The number of messages read is limited, because a client may flood the server.
     let _closed = timeout(Duration::from_millis(500), async {
         if viewer.socket.send(close).await.is_ok() {
             for _ in 0..MOST_AFTER_CLOSE {
@@ -197,7 +196,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Whether another live state may be sent now at the rate that the viewer requested.
+    /// Whether the rate that the viewer requested allows another live state now.
     fn wants_state(&mut self) -> bool {
         let now = Instant::now();
         let is_due = self.state_sent.is_none_or(|sent| now.duration_since(sent) >= self.state_every);
@@ -223,8 +222,8 @@ impl Viewer {
         let within = STALLED_AFTER + Duration::from_secs_f64(bytes as f64 / SLOWEST_PER_S);
         match timeout(within, self.socket.send(frame)).await {
             Ok(Ok(())) => {
-                // The server reads no pongs while it sends. A slow line delivers buffered data before a pong,
-                // so the pong's deadline is extended.
+                // The server reads no pongs while it sends. A slow connection delivers buffered data before a pong, so
+                // the pong's deadline is extended.
                 self.answer_by = self.answer_by.map(|by| by + began.elapsed());
                 Ok(())
             }
@@ -233,7 +232,7 @@ impl Viewer {
         }
     }
 
-    /// Sends a WebSocket ping. The viewer's pong shows that it has read all earlier data.
+    /// Sends a WebSocket ping. The viewer's pong shows that the viewer has read all earlier data.
     async fn ping(&mut self) -> Result<(), Over> {
         if self.answer_by.is_some() {
             return Err(Over::Stalled);

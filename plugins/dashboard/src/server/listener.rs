@@ -30,7 +30,7 @@ const HANDSHAKE_WITHIN: Duration = Duration::from_secs(5);
 ///
 /// The default of some megabytes would hide for a minute that a viewer reads nothing.
 const SEND_BUFFER: u32 = 32 << 10;
-/// Maximum number of bytes in that buffer which are not yet sent. A stalled viewer fills no more.
+/// Maximum number of unsent bytes in a connection's send buffer. The buffer of a stalled viewer fills no further.
 #[cfg(any(target_os = "android", target_os = "linux"))]
 const MOST_NOT_SENT: u32 = 8 << 10;
 /// Size of a connection's buffer in this program, bytes.
@@ -99,14 +99,14 @@ impl Tls {
 
 /// Listens on an address. Must be called within the runtime.
 ///
-/// Errors: those of the system.
+/// Errors: system errors.
 pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
     // The option SO_REUSEADDR is set on Unix only, as in the standard library. On other systems the option
     // would let two programs share a port.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
-    // Accepted connections inherit these settings.
+    // Accepted connections inherit the size of the send buffer and the limit of unsent bytes.
     socket.set_send_buffer_size(SEND_BUFFER)?;
     #[cfg(any(target_os = "android", target_os = "linux"))]
     socket2::SockRef::from(&socket).set_tcp_notsent_lowat(MOST_NOT_SENT)?;
@@ -134,7 +134,8 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Let each new connection run. Otherwise so many others might arrive first that it would be closed for them.
+        // Let each new connection run. Otherwise many later connections might arrive first, and this one would be
+        // closed to make room for them.
         tokio::task::yield_now().await;
     }
 }

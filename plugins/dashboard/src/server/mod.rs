@@ -47,7 +47,7 @@ pub use self::voice_desk::{Keep, Recall, Voices};
 pub const PORT: u16 = 8881;
 /// Number of ports tried, beginning with the requested port.
 const PORTS: u16 = 10;
-/// Maximum number of message batches that a viewer may lag behind. Beyond that it gets all changes at once.
+/// Maximum number of message batches that a viewer may lag behind. A viewer that lags further gets all changes at once.
 const BATCHES: usize = 64;
 /// Budget of wrong tokens for a client: burst, and refill per second.
 const MOST_GUESSES: f64 = 20.0;
@@ -211,7 +211,8 @@ impl Drop for Page {
     }
 }
 
-/// Listens on the first free port, beginning with the requested one. Also returns the ports in use before it.
+/// Listens on the first free port, beginning with the requested one. Also returns the ports that were tried before and
+/// are in use.
 fn bind(asked: SocketAddr) -> Result<(TcpListener, Vec<u16>), PageError> {
     let mut taken = Vec::new();
     let mut failed = io::Error::other("no port");

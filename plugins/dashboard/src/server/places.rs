@@ -31,9 +31,9 @@ struct Held {
     stream: Option<Client>,
 }
 
-/// A connection's place among the limited number of places. It is freed on drop.
+/// A connection's place among the limited number of places. The place is freed on drop.
 pub(super) struct Place {
-    /// Notifies the connection to close, and identifies its place.
+    /// Tells the connection to close, and identifies the connection's place.
     key: Arc<Notify>,
     places: Arc<Places>,
     shown: Mutex<Option<(Client, Role)>>,

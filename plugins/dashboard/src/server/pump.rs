@@ -60,7 +60,8 @@ pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
     }
 }
 
-/// Applies a message, and all messages that follow it in the queue, to the model. Returns whether any is urgent.
+/// Applies a message, and all messages that follow it in the queue, to the model. Returns whether any of them is
+/// urgent.
 fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
     let mut model = shared.model();
     let mut is_urgent = model.take(one);

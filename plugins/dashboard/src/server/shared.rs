@@ -18,10 +18,10 @@ use crate::model::{Message, Model};
 /// Time after which a peer that accepts no data is dropped.
 pub(super) const STALLED_AFTER: Duration = Duration::from_secs(10);
 
-/// Handler of operators' commands. Its error is the reason for a refusal.
+/// Handler of operators' commands. The handler's error is the reason for a refusal.
 pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
 
-/// Handler of commands to playback. Its error is the reason for a refusal.
+/// Handler of commands to playback. The handler's error is the reason for a refusal.
 pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
 
 /// Counters that `/metrics` reports.

@@ -9,7 +9,7 @@ use tokio::sync::Semaphore;
 
 use super::budget::Budget;
 
-/// Maximum number of voice notes that wait for their recording. Beyond it the oldest is forgotten.
+/// Maximum number of voice notes that wait for their recording. If there are more, the oldest note is forgotten.
 const MOST_BEGUN: usize = 32;
 /// Maximum size of recordings kept in memory for playing, bytes. The oldest are dropped from memory but stay in the
 /// log.
@@ -23,7 +23,7 @@ const RATE: (f64, f64) = (8.0, 0.2);
 pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
 /// Handler that finds in a log the recording of the voice note with this id and time, seconds.
 ///
-/// Returns `None` if the log has no readable recording of it. The search may take seconds.
+/// Returns `None` if the log has no readable recording of the note. The search may take seconds.
 pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;
 
 /// Source and destination of voice recordings.
@@ -108,7 +108,7 @@ impl Desk {
             let why = format!("no voice note {} waits for its recording", voice.id);
             return Err((StatusCode::CONFLICT, why));
         }
-        // Keep the recording in memory before the loop notifies viewers, so that they can play it at once.
+        // Keep the recording in memory before the loop notifies the viewers, so that viewers can play it at once.
         let voice = Arc::new(voice);
         self.hold(Arc::clone(&voice));
         if let Err(why) = keep(&voice) {
@@ -122,7 +122,7 @@ impl Desk {
     /// Returns the recording of a note, from memory or from the log.
     pub(super) async fn recall(&self, id: u32, at_s: f64) -> Result<Option<Arc<Voice>>, Refusal> {
         let Voices::Recalled(recall) = &self.to else { return Ok(self.get(id)) };
-        // Only one search runs at a time, because each may read much of a log.
+        // Only one search runs at a time, because each search may read much of a log.
         let _turn = self.recalling.acquire().await;
         if let Some(voice) = self.get(id) {
             return Ok(Some(voice));

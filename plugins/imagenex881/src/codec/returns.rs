@@ -66,9 +66,9 @@ impl Tag {
 /// Device model of a return. The formats of position and profile range depend on the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
-    /// A rotating head: positions are 0 to 1200, and a count is 2 or 10 mm.
+    /// A rotating head: positions are 0 to 1200, and a count of profile range is 2 or 10 mm.
     Head881,
-    /// The 852 echosounder: positions have 13 bits and no meaning, and a count is always 10 mm.
+    /// The 852 echosounder: positions have 13 bits and no meaning, and a count of profile range is always 10 mm.
     Sounder852,
 }
 

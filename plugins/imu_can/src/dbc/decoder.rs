@@ -15,11 +15,12 @@ use super::mapping::{Attitude, Axes, Condition, Mapping, Part, Stamp};
 use crate::codec::can_frame;
 use crate::frame::{CanFrame, CanId, FRAME_BYTES, FrameKind};
 
-/// Maximum number of frames that a mapping uses, if each signal has its own: 3 of rate, 3 of force, 4 of
+/// Maximum number of frames that a mapping uses, if each signal has its own frame: 3 of rate, 3 of force, 4 of
 /// attitude, 4 states and a time.
 const MOST_FRAMES: usize = 15;
 
-/// Maximum time between the frames of one sample. A unit sends them back to back, and the next sample later.
+/// Maximum time between the frames of one sample. A unit sends these frames back to back, so a longer gap means another
+/// sample.
 const SAME_SAMPLE: DurNs = DurNs::from_millis(5);
 
 /// Identifiers and lengths of the mapping's frames.

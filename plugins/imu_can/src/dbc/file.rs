@@ -7,8 +7,8 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use super::layout::{Bits, DATA_BYTES, Layout, Order};
 use crate::frame::CanId;
 
-/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. The parser
-/// takes up to 75 bytes of memory for each byte of text, for lists of one-letter names.
+/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. In the worst
+/// case, lists of one-letter names, the parser takes 75 bytes of memory for each byte of text.
 const MOST_BYTES: usize = 1 << 20;
 
 /// Maximum number of names that an error lists.
@@ -165,7 +165,8 @@ impl Place {
 #[derive(Debug)]
 pub struct DbcFile {
     dbc: Dbc,
-    /// Identifiers as written, by message. They are kept because the parser truncates standard ones to 16 bits.
+    /// Identifiers as written, by name of the message. They are kept because the parser truncates standard identifiers
+    /// to 16 bits.
     wide_ids: BTreeMap<String, u64>,
 }
 
@@ -185,7 +186,7 @@ impl DbcFile {
 
     /// Looks up a signal by its name, or as `Message.Signal`.
     ///
-    /// Errors: no signal has this name, or several have it; the signal can't be extracted from a classic frame.
+    /// Errors: no signal has this name, or several signals have it; the signal can't be extracted from a classic frame.
     pub fn signal(&self, wanted: &str) -> Result<Signal, DbcError> {
         let all =
             || self.dbc.messages.iter().flat_map(|message| message.signals.iter().map(move |s| (message, s)));
@@ -314,7 +315,7 @@ fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
         let at = words.split_once("--> ").and_then(|(_, at)| at.split(':').next());
         at.and_then(|line| line.trim().parse().ok()).unwrap_or(1)
     } else {
-        // The other errors name the offending text.
+        // All other parser errors name the offending text.
         let value = words.split('\'').nth(1).or_else(|| words.rsplit(' ').next());
         let holds = |line: &str| value.is_some_and(|value| !value.is_empty() && line.contains(value));
         text.lines().position(holds).map_or(1, |line| line + 1)

@@ -266,8 +266,8 @@ impl Condition {
 }
 
 impl Stamp {
-    /// Uses a signal as a timestamp. The signal counts ticks, and the length of a tick is the signal's factor in its
-    /// unit.
+    /// Uses a signal as a timestamp. The signal counts ticks. The length of a tick is the signal's factor, in the
+    /// signal's unit.
     ///
     /// Errors: the unit is no time, the tick isn't whole nanoseconds, or the signal is a float or has an offset.
     pub fn of(signal: &Signal) -> Result<Self, MappingError> {

@@ -40,7 +40,8 @@ pub struct Slope {
     pub pitch: u32,
     /// Raw roll, 24 bits.
     pub roll: u32,
-    /// Two bits each, from bit 0: pitch compensation, pitch figure of merit, roll compensation, roll figure of merit.
+    /// Four values of two bits each, from bit 0: pitch compensation, pitch figure of merit, roll compensation, roll
+    /// figure of merit.
     pub figures: u8,
     /// Age of the values when the frame was sent, in half milliseconds.
     pub latency: u8,

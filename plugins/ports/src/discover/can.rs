@@ -23,7 +23,7 @@ fn is_can(machine: &Machine, name: &str) -> bool {
     machine.text(&format!("{CLASS}/{name}/type")).as_deref() == Some(CAN)
 }
 
-/// Whether this machine has a network interface of that name, and it is up.
+/// Whether this machine has a network interface of this name that is up.
 pub fn is_interface_up(name: &str) -> bool {
     is_up(&Machine::ours(), name) == Some(true)
 }

@@ -37,7 +37,7 @@ impl Machine {
         Self { root: root.to_owned(), user }
     }
 
-    /// Returns the path on this host of the machine's file `absolute`.
+    /// Returns the path, on this host, of the file that is at `absolute` on the machine.
     pub(super) fn path(&self, absolute: &str) -> PathBuf {
         self.root.join(absolute.trim_start_matches('/'))
     }

@@ -22,7 +22,7 @@ struct Bus<B> {
 pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
     let opened =
         I2cdev::new(bus).map_err(|error| diagnosis::opening(bus, &io::Error::other(error.to_string())));
-    // The crate's error hides its kind, so the file is opened directly to get the kind.
+    // The I2C crate hides the kind of an error. The file is therefore opened directly to get this kind.
     let opened = opened.map_err(|trouble| match std::fs::File::open(bus) {
         Err(error) => diagnosis::opening(bus, &error),
         Ok(_) => trouble,
@@ -31,7 +31,7 @@ pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
 }
 
 impl<B: I2c + Send> Line for Bus<B> {
-    /// A bus has only transactions, so there is nothing to read between them.
+    /// A bus has only transactions, so there is nothing to read between transactions.
     fn read(&mut self, wait: Duration, _: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         thread::sleep(wait);
         Ok(None)

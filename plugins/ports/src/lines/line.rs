@@ -11,7 +11,8 @@ use headrace_sensor::driver::IgnoredSenders;
 /// Maximum number of bytes returned by one read.
 pub const READ_BYTES: usize = 2048;
 
-/// Accepted and rejected senders of a line to which any machine may send. They are kept when the line is reopened.
+/// Accepted and rejected senders of a line to which any machine may send. The senders are kept when the line is
+/// reopened.
 #[derive(Default)]
 pub struct Senders {
     /// The accepted sender, which is taken to be the device.
@@ -23,7 +24,7 @@ pub struct Senders {
 /// Function that checks whether bytes contain a message of a device on the line.
 pub type IsValid<'a> = &'a dyn Fn(&[u8]) -> bool;
 
-/// An open line to one or several devices.
+/// An open line, which is a connection to one or several devices.
 pub trait Line: Send {
     /// Waits up to `wait` for bytes. Returns the receive time of the first byte, and the count; `None` on timeout.
     ///
@@ -43,7 +44,7 @@ pub trait Line: Send {
         self.read(wait, into)
     }
 
-    /// Sends bytes. On a carrier of messages they form one message.
+    /// Sends bytes. On a carrier that transfers messages, the bytes form one message.
     ///
     /// Errors: the connection is lost.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
@@ -72,7 +73,7 @@ pub trait Line: Send {
         None
     }
 
-    /// Returns the number of messages dropped unread since the last call, as far as the carrier reports them.
+    /// Returns the number of messages dropped unread since the previous call, as far as the carrier reports them.
     fn dropped(&mut self) -> u64 {
         0
     }

@@ -19,7 +19,8 @@ enum End {
     Local(u16),
 }
 
-/// Whether both lead to the same device now. They may name it by a link, a USB identity, or another host name.
+/// Whether two `connect`s lead to the same device now. Each may name the device by a link, a USB identity or another
+/// host name.
 ///
 /// Returns `false` if either device is absent, because the answer isn't known then.
 pub(crate) fn same_device(one: &Connect, other: &Connect) -> bool {

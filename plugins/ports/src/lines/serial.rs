@@ -22,7 +22,7 @@ const WRITE_TIME: Duration = Duration::from_millis(500);
 struct Serial {
     port: TTYPort,
     byte_time: DurNs,
-    /// Time at which the port was last found empty.
+    /// Time at which the port was most recently found empty.
     emptied: MonoNs,
 }
 
@@ -76,8 +76,8 @@ impl Line for Serial {
             return Err(io::Error::new(io::ErrorKind::BrokenPipe, "the port is gone"));
         }
         let now = clock::now();
-        // The time of the first byte is `now` less the line time of all bytes, but not before the port was last found
-        // empty.
+        // The time of the first byte is `now` minus the transmission time of all bytes, but not before the port was
+        // last found empty.
         let ago = DurNs(self.byte_time.0.saturating_mul(i64::try_from(count).unwrap_or(0)));
         let first = (now - ago).max(self.emptied).min(now);
         if count < into.len() {

@@ -14,14 +14,14 @@ const TABLES: [&str; 2] = ["/proc/self/net/udp", "/proc/self/net/udp6"];
 const INODE: usize = 9;
 const DROPS: usize = 12;
 
-/// Counts drops at a socket since the last query.
+/// Counts drops at a socket since the previous query.
 #[derive(Debug, Default)]
 pub(super) struct SocketDrops {
     told: u64,
 }
 
 impl SocketDrops {
-    /// Returns the number of datagrams dropped at a socket since the last call; 0 if the kernel doesn't report it.
+    /// Returns the number of datagrams dropped at a socket since the previous call; 0 if the kernel doesn't report it.
     pub(super) fn new_ones(&mut self, socket: &UdpSocket) -> u64 {
         let all = dropped(socket).unwrap_or(self.told);
         let new = all.saturating_sub(self.told);

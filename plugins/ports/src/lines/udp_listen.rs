@@ -17,8 +17,8 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// Maximum number of senders whose bytes are kept until one sends a valid message. Beyond it the oldest is
-/// forgotten.
+/// Maximum number of senders whose bytes are kept until one sends a valid message. If there are more, the oldest sender
+/// is forgotten.
 const MAX_CANDIDATES: usize = 8;
 
 struct UdpListen {
@@ -74,7 +74,7 @@ impl UdpListen {
         match (self.from, senders.believed) {
             (From::Port(peer), _) => from == peer,
             (From::Host(host), _) => from.ip() == host,
-            // After the line was reopened, the previous sender's address stays fixed.
+            // After the line was reopened, the accepted sender's address stays fixed, but its port may change.
             (From::Anybody, Some(before)) => from.ip() == before.ip(),
             (From::Anybody, None) => true,
         }
@@ -82,8 +82,8 @@ impl UdpListen {
 
     /// Handles a datagram of a sender that may be the device.
     ///
-    /// The sender is accepted once its bytes are valid, alone or together with its earlier bytes. The valid bytes are
-    /// then in `into`.
+    /// The sender is accepted once the datagram is valid, alone or together with the sender's earlier bytes. The valid
+    /// bytes are then in `into`.
     fn introduce(
         &mut self,
         (received, from, count): (MonoNs, SocketAddr, usize),
@@ -115,8 +115,8 @@ impl UdpListen {
         Some((first, count))
     }
 
-    /// Adds bytes to those of a possible sender. If they now contain a valid message, returns their receive
-    /// time and length.
+    /// Adds bytes to the earlier bytes of a possible sender. If all of them together contain a valid message, returns
+    /// their receive time and length.
     fn hold(
         &mut self,
         received: MonoNs,

@@ -17,7 +17,7 @@ use crate::input::{Input, Source as _};
 use crate::order::Order;
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// Upper bound on the length of a record's header, bytes.
+/// Upper bound on the length of a record's header, bytes. A greater length counts as damage.
 const MOST_HEADER: usize = 1 << 16;
 /// Maximum number of bytes read from the definitions at the end of a bag.
 const MOST_INDEX: u64 = 64 << 20;
@@ -51,7 +51,7 @@ struct Stated {
     chunks: u32,
 }
 
-/// An unpacked chunk, the position reached in it, and the parsing result to return at its end.
+/// The content of an unpacked chunk, the position reached in it, and the parsing result to return at the chunk's end.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
@@ -299,7 +299,7 @@ impl Bag {
         })
     }
 
-    /// Processes a record. Returns `None` if it has no valid kind, or a field that its kind requires is missing.
+    /// Processes a record. Returns `None` if the record has no valid kind, or lacks a field that its kind requires.
     fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Accepted<'a>> {
         match fields.u8(b"op")? {
             2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),

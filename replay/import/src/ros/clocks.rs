@@ -43,7 +43,7 @@ impl Clocks {
         Self { base, ..Self::default() }
     }
 
-    /// Returns the time of a message's values, and whether it comes from the header's timestamp.
+    /// Returns the time of a message's values, and whether this time comes from the header's timestamp.
     pub(super) fn time(&mut self, record_ns: u64, stamp_ns: Option<u64>) -> (u64, bool) {
         self.messages += 1;
         let Some(stamp_ns) = stamp_ns.filter(|stamp_ns| *stamp_ns > 0) else {

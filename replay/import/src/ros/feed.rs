@@ -79,7 +79,7 @@ impl Feed {
         &self.sensor.id
     }
 
-    /// Converts a message into entries. Counts it as lost if that fails.
+    /// Converts a message into entries. If the conversion fails, counts the message as lost.
     pub(super) fn take(&mut self, encoding: Encoding, record_ns: u64, bytes: &[u8], out: &mut Vec<Entry>) {
         self.taken += 1;
         let taken = read(self.of, encoding, bytes).and_then(|read| self.values(&read, record_ns, out));

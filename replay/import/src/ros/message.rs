@@ -107,7 +107,7 @@ pub(super) struct Read<'a> {
 
 /// Parses a message.
 ///
-/// Errors: the reason, as text, why it doesn't fit its type.
+/// Errors: the reason, as text, why the message doesn't fit its type.
 pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_>, &'static str> {
     let mut wire = Wire::new(bytes, encoding).ok_or("in another encapsulation than plain CDR")?;
     let read =

@@ -14,7 +14,8 @@ use super::wire::Wire;
 const MOST_BEAMS: usize = 1 << 16;
 /// Maximum time between a beam and its message's timestamp, s.
 const LONGEST_S: f64 = 120.0;
-/// Maximum distance of a point from the beam's plane, as a share of the point's range.
+/// Maximum distance of a point from the beam's plane, as a share of the point's range. Farther points are dropped and
+/// counted.
 const OFF_PLANE: f64 = 0.1;
 
 /// Interprets a range by REP 117; `None` without an echo.

@@ -24,7 +24,7 @@ pub(super) struct Wire<'a> {
     big_endian: bool,
 }
 
-/// The header of a message with a timestamp.
+/// Header of a message, which has a timestamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
     /// Timestamp, nanoseconds on the sender's clock, which may have any epoch.
@@ -71,8 +71,8 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// Reads the number of elements in a sequence. Returns `None` if its elements, of at least `element_bytes` each,
-    /// can't fit.
+    /// Reads the number of elements in a sequence. Returns `None` if that many elements, of at least `element_bytes`
+    /// each, can't fit into the message.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);

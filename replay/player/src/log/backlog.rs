@@ -1,4 +1,4 @@
-//! Messages that aren't synced yet: written since the last sync, or waiting for a medium that accepts data.
+//! Messages that aren't synced yet: written since the latest sync, or waiting for a medium that accepts data.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -8,7 +8,7 @@ use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick, VOICE_TOPIC};
 use super::part::Progress;
 use super::writer::{Lane, LogHeader};
 
-/// Maximum memory of the messages, bytes. It is enough for some minutes of a dive with four heads.
+/// Maximum memory of unsynced messages, bytes. It is enough for some minutes of a dive with four heads.
 const MAX_BYTES: usize = 16 << 20;
 
 /// Properties of an unsynced message, without its bytes.
@@ -22,7 +22,7 @@ pub(super) struct Head {
     tick: Option<u64>,
 }
 
-/// Messages in the order of their arrival, at most 16 MiB.
+/// Unsynced messages in the order of their arrival, at most 16 MiB.
 #[derive(Debug, Default)]
 pub(super) struct Backlog {
     heads: VecDeque<Head>,
@@ -36,7 +36,7 @@ impl Backlog {
         self.data.extend(bytes);
     }
 
-    /// Removes and returns the oldest message if the messages exceed the limit.
+    /// Removes and returns the oldest message if all messages together exceed the memory limit.
     pub(super) fn overflow(&mut self) -> Option<Head> {
         if self.bytes() > MAX_BYTES { self.pop() } else { None }
     }
@@ -73,7 +73,7 @@ impl Backlog {
         self.heads.len() as u64
     }
 
-    /// Returns the log times of the first and last message.
+    /// Returns the log times of the first and last unsynced message.
     pub(super) fn span(&self) -> Option<(MonoNs, MonoNs)> {
         Some((self.heads.front()?.log_time, self.heads.back()?.log_time))
     }

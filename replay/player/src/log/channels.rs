@@ -61,8 +61,8 @@ pub(super) struct Channels {
 impl Channels {
     /// Creates the channels, and numbers their sources.
     ///
-    /// The numbers are those in the channels' metadata, if every source has one and they count from 0. Otherwise the
-    /// sources are numbered in the order of their names.
+    /// The numbers are those in the channels' metadata, if every source has a number and the numbers count from 0.
+    /// Otherwise the sources are numbered in the order of their names.
     pub(super) fn new(definitions: BTreeMap<u16, Definition>, budget: HeaderBudget) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
         let numbers: BTreeMap<&str, Option<u16>> =
@@ -82,7 +82,7 @@ impl Channels {
         channels
     }
 
-    /// Returns the limit that was exceeded by the channel definitions known at opening; `None` if no limit was.
+    /// Returns the limit that the channel definitions known at opening exceeded; `None` if they exceeded none.
     pub(super) fn refused(&self) -> Option<Many> {
         self.refused
     }

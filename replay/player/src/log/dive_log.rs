@@ -344,7 +344,7 @@ impl<R: Read + Seek> DiveLog<R> {
     fn in_part(&self, loss: &Loss) -> Option<Loss> {
         let mut loss = loss.clone();
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
-            // All messages that the next part doesn't repeat were delivered, and the next part states the fault.
+            // The next part repeats all messages that weren't delivered, and states the fault. Nothing is lost here.
             if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
                 return None;
             }
@@ -387,7 +387,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
         match (LogReader::open(path), by_name) {
             (Ok(reader), by_name) => match (&reader.header().part, by_name) {
                 (Some(part), _) => parts.push((path.clone(), Glance::of(&reader, part.head.number))),
-                // The power was cut while the header was written. The part that follows has this number, too.
+                // The power was cut while this part's header was written. The next part has the same number.
                 (None, Some(part)) if reader.times().is_none() && !reader.losses().is_empty() => {
                     let why = "it ends within its header".to_owned();
                     losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));

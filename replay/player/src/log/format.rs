@@ -23,9 +23,9 @@ use sha2::{Digest, Sha256};
 pub const FORMAT_VERSION: u32 = 1;
 /// Prefix of the `library` field in this program's logs. The program's version follows it.
 pub const LIBRARY: &str = "headrace ";
-/// Topic prefix for bytes received from a source; its id follows.
+/// Topic prefix for bytes received from a source; the source's id follows.
 pub const RAW_PREFIX: &str = "/raw/";
-/// Topic prefix for bytes sent to a source; its id follows.
+/// Topic prefix for bytes sent to a source; the source's id follows.
 pub const SENT_PREFIX: &str = "/sent/";
 /// Topic prefix of the channels with the loop's results.
 pub const RESULT_PREFIX: &str = "/result/";
@@ -149,7 +149,7 @@ pub(super) fn seal(name: &str, mut metadata: BTreeMap<String, String>) -> BTreeM
     metadata
 }
 
-/// Removes the digest from a metadata record. Returns `false` if it doesn't match.
+/// Removes the digest from a metadata record. Returns `false` if the digest doesn't match.
 ///
 /// Records of other writers need no digest.
 pub(super) fn unseal(name: &str, metadata: &mut BTreeMap<String, String>) -> bool {

@@ -24,7 +24,7 @@ use super::medium::Medium;
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Length of a record's opcode and length field, bytes.
 const RECORD_HEAD_BYTES: usize = 9;
-/// Maximum number of bytes read to identify a record. Fields of fixed length and names fit into them.
+/// Maximum number of bytes read to identify a record. They hold the fields of fixed length, and names of usual length.
 const GLANCE_BYTES: usize = 1024;
 /// Length of a chunk record before its data, without the name of the compression, bytes.
 const CHUNK_HEAD_BYTES: u64 = 40;
@@ -337,8 +337,8 @@ fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool
     Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
 }
 
-/// Parses those fields of a record that framing and scanning need. Also returns the minimum record length that they
-/// imply.
+/// Parses those fields of a record that framing and scanning need. Also returns the minimum record length that these
+/// fields imply.
 fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {

@@ -12,9 +12,9 @@ use headrace_geometry::time::MonoNs;
 pub(super) const LATEST: MonoNs = MonoNs(i64::MAX as u64);
 /// Maximum length of a record outside chunks, bytes.
 ///
-/// Also the maximum for all records of a chunk, with [`RECORD_COST`] added for each.
+/// Also the maximum for all records of a chunk together, with [`RECORD_COST`] added for each.
 pub(super) const MAX_UNPACKED_BYTES: u64 = 32 << 20;
-/// Memory of a message in addition to its bytes, bytes.
+/// Memory that a message takes in addition to its content, bytes.
 pub(super) const RECORD_COST: u64 = 64;
 /// Maximum ratio of unpacked bytes to file bytes, summed over all chunks up to any position in the file.
 ///
@@ -35,7 +35,7 @@ pub(super) const MAX_CHANNELS: usize = 4096;
 pub(super) const MAX_SOURCES: usize = 1024;
 /// Maximum memory of all definitions and metadata, bytes, with [`ENTRY_COST`] added for each map entry.
 pub(super) const MAX_HEADER_BYTES: u64 = 8 << 20;
-/// Memory of a map entry in addition to its bytes, bytes.
+/// Memory that a map entry takes in addition to its texts, bytes.
 const ENTRY_COST: u64 = 128;
 /// Maximum total length of all attachments of a log, bytes.
 pub(super) const MAX_ATTACHMENT_BYTES: u64 = 16 << 20;

@@ -284,7 +284,7 @@ impl LossKind {
 }
 
 impl Loss {
-    /// The loss with its times in dive time, from the beginning of the log at `begun`.
+    /// The same loss in dive time: with times counted from the beginning of the log, `begun`.
     #[must_use]
     pub fn in_dive_time(&self, begun: MonoNs) -> Self {
         let dive_time = |at: MonoNs| MonoNs(at.0.saturating_sub(begun.0));

@@ -64,7 +64,7 @@ pub(super) struct Merge {
     batches: Vec<Batch>,
     /// Indexes of empty batches that can be reused.
     spare: Vec<usize>,
-    /// Indexes of batches used up since the last piece was read.
+    /// Indexes of batches used up since the latest piece was read.
     released: Vec<usize>,
     memory: usize,
 }

@@ -57,8 +57,8 @@ enum Fault {
 struct Break {
     fault: Fault,
     messages: u64,
-    /// First and last piece of a range. The break lies before one of the pieces in this range. The index after that of
-    /// the log's last piece stands for the log's end.
+    /// First and last piece of a range. The break lies before one of these pieces. The index after that of the log's
+    /// last piece stands for the log's end.
     pieces: (usize, usize),
 }
 
@@ -138,7 +138,8 @@ fn is_elsewhere(known: &Loss) -> bool {
 /// Whether a known loss may explain a break between two file offsets.
 fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
     match known.kind {
-        // The log's writer stated this loss. It numbers only messages that it writes, so the loss leaves no break.
+        // The log's writer stated this loss. A writer numbers only messages that it writes, so the loss leaves no
+        // break.
         LossKind::Stated(_) => false,
         // A loss of these kinds may affect several positions in the file, but states only one range.
         LossKind::Swells { .. } | LossKind::Beyond { .. } | LossKind::Unreadable(_) => true,
@@ -147,7 +148,7 @@ fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
 }
 
 impl Break {
-    /// Whether breaks in two channels may be at the same position in the file.
+    /// Whether breaks in the message numbers of two channels may be at the same position in the file.
     fn meets(&self, other: &Self) -> bool {
         let (first, last) = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
         self.fault == other.fault && first <= last

@@ -61,7 +61,7 @@ pub struct PartEnd {
     pub follows: bool,
 }
 
-/// Position of a log in its recording.
+/// Position of a log in the recording that it is part of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
     /// Metadata at the start of the part.
@@ -122,7 +122,7 @@ impl Progress {
         })
     }
 
-    /// Whether both totals are equal, apart from the sequence numbers of topics.
+    /// Whether these totals equal `other`, apart from the sequence numbers of topics.
     pub(super) fn meets(&self, other: &Self) -> bool {
         (self.messages, self.tick) == (other.messages, other.tick)
     }

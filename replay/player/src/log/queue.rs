@@ -54,8 +54,8 @@ pub(super) struct State {
     pub(super) dropped_besides: AtomicU64,
     /// Recordings of voice notes. They don't pass through the loop.
     pub(super) voices: ArrayQueue<Vec<u8>>,
-    /// Whether the recorder has stopped accepting voice recordings. Set before it looks into `voices` for the last
-    /// time.
+    /// Whether the recorder has stopped accepting voice recordings. Set before the recorder looks into `voices` for the
+    /// last time.
     pub(super) voices_end: AtomicBool,
     pub(super) results_missing: AtomicU64,
 }
@@ -101,7 +101,7 @@ pub(super) struct Dropped {
     pub(super) packets: u64,
 }
 
-/// Records traffic on the connections to devices that doesn't pass through the loop. Any thread may use it.
+/// Records messages to devices, and losses of packets, neither of which passes through the loop. Any thread may use it.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
@@ -201,7 +201,7 @@ pub(super) fn until_stopped(
 /// The end of the queue at which the recorder's thread takes entries.
 pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
     pub(super) ring: R,
-    /// Message of the queue entry that was taken last.
+    /// Message of the queue entry that was taken most recently.
     pub(super) message: Vec<u8>,
 }
 

@@ -97,7 +97,7 @@ pub struct LogPlace {
     /// Pieces of the log from which messages are left: number of the piece, and number of messages taken from
     /// it.
     open: Vec<(usize, usize)>,
-    /// True times of the chunks whose headers state wrong times, with the chunk's piece number.
+    /// True times of the chunks whose headers state wrong times, each with the piece number of the chunk.
     corrected: Vec<(usize, (u64, u64))>,
     latest: u64,
     late: u64,
@@ -142,8 +142,8 @@ pub struct LogReader<R = File> {
     losses: Losses,
     /// Pieces of the log (chunks, and runs of messages outside chunks), in file order.
     spans: Vec<Span>,
-    /// Times that chunk headers state, where they differ from those of the messages. The key is the number of
-    /// the piece.
+    /// Times that chunk headers state, if they differ from the times of the messages. The key is the number of the
+    /// piece.
     stated: BTreeMap<usize, (u64, u64)>,
     /// Numbers of the log's pieces, in reading order.
     plan: Vec<u32>,
@@ -221,7 +221,7 @@ impl<R: Read + Seek> LogReader<R> {
         &self.info
     }
 
-    /// Moves the attachments out of the header, so that long ones aren't in memory twice.
+    /// Moves the attachments out of the header, so that long attachments aren't in memory twice.
     pub(super) fn take_attachments(&mut self) -> Vec<(String, Vec<u8>)> {
         core::mem::take(&mut self.info.attachments)
     }
@@ -300,7 +300,7 @@ impl<R: Read + Seek> LogReader<R> {
         self.late
     }
 
-    /// Reads pieces of the log until a message is available. Returns `false` at the end.
+    /// Reads pieces of the log until a message is available. Returns `false` at the end of the log.
     pub(super) fn has_next(&mut self) -> Result<bool, LogError> {
         while self.must_read() {
             self.read_piece()?;
@@ -463,8 +463,8 @@ impl<R: Read + Seek> LogReader<R> {
             return;
         }
         if self.losses.is_full() {
-            // A full list only extends its last loss. Its times are determined at the end, because searching for
-            // times of each loss would be slow.
+            // A full list only extends its last loss. The times of that loss are determined at the end, because
+            // searching for times again and again would be slow.
             let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
             self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
             return;

@@ -51,7 +51,7 @@ pub struct RecorderPort {
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
-    /// Ticks that were skipped since the last recorded tick.
+    /// Ticks that were skipped since the latest recorded tick.
     gap: Option<Gap>,
 }
 
@@ -312,7 +312,7 @@ impl RecorderPort {
         }
     }
 
-    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, it first reports them to the
+    /// Begins an entry whose message has `len` bytes. If ticks were skipped before, first reports these ticks to the
     /// recorder's thread.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         if Self::entry_bytes(len) <= self.vacant_bytes() {
@@ -347,7 +347,7 @@ impl RecorderHandle {
         self.state.unsafe_for()
     }
 
-    /// Returns a port that records traffic with devices that doesn't pass through the loop.
+    /// Returns a port that records messages to devices, and losses of packets, which don't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }

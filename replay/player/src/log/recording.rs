@@ -3,7 +3,7 @@
 //! A part that can't be written any more is left without an end. Another part is begun, and messages that may be
 //! missing from the previous part are written again.
 //!
-//! After an error, nothing written since the last sync is reliable: a file system may discard it and report success
+//! After an error, nothing written since the latest sync is reliable: a file system may discard it and report success
 //! the next time. Messages are therefore kept in memory until they are synced.
 
 use std::io::ErrorKind;
@@ -23,7 +23,7 @@ use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
 /// Unsynced bytes after which a sync is due.
 const SYNC_BYTES: usize = 4 << 20;
-/// Wait after the first failed retry. It doubles after each further failed retry. The first retry is immediate.
+/// Wait after the first failed retry. The wait doubles after each further failed retry. The first retry is immediate.
 const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
 /// Number of attempts to write the rest after the dive has ended.
@@ -163,7 +163,7 @@ impl Recording {
         self.open.is_none()
     }
 
-    /// Returns the recording's events since the last call.
+    /// Returns the recording's events since the previous call.
     pub(super) fn take_events(&mut self) -> Vec<RecordingEvent> {
         core::mem::take(&mut self.events)
     }
@@ -251,7 +251,8 @@ impl Recording {
         let (mut lost, mut from) = (0, self.settled.last);
         // A part without synced content is removed. The first part is kept, because it has the recording's name.
         if is_taken {
-            // A deleted file isn't a part either. A file that is now at its path belongs to another program.
+            // A deleted file isn't a part either. A file that is now at the deleted file's path belongs to another
+            // program.
             (lost, from) = (certain.0, before);
             self.sum.messages -= certain.0;
             self.sum.message_bytes -= certain.1;
@@ -296,7 +297,8 @@ impl Recording {
         self.open = Some(part);
         if let Err(error) = self.write_again(&path) {
             self.fail(&error);
-            // A voice recording is as large as several seconds of a dive. Without it the other messages may fit.
+            // A voice recording is as large as several seconds of a dive. Without voice recordings, the other messages
+            // may fit.
             for lost in self.backlog.drop_voices() {
                 self.lose(&lost);
             }
@@ -411,7 +413,7 @@ impl Recording {
         }
     }
 
-    /// Creates the next file. A name that exists is skipped; for the first part it is an error.
+    /// Creates the next file. An existing name is skipped; for the first part an existing name is an error.
     fn create(&mut self) -> Result<(PathBuf, Box<dyn super::storage::StoredFile>), LogError> {
         let first = self.named + 1;
         for name in first..first.saturating_add(NAMES) {
@@ -430,7 +432,7 @@ impl Recording {
         Err(LogError::Create { path, source: ErrorKind::AlreadyExists.into() })
     }
 
-    /// Removes the file created last. If that fails, the next part skips its name.
+    /// Removes the newest file. If that fails, the next part skips the file's name.
     fn discard(&mut self, path: &Path) {
         match self.storage.remove(path) {
             Ok(()) => self.named = self.named.saturating_sub(1),

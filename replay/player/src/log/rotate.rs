@@ -16,7 +16,7 @@ use crate::atomic_file::folder_of;
 /// Condition under which a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Every {
-    /// The file reaches this many bytes. It may exceed them by about a second of data.
+    /// The file reaches this many bytes. It may exceed this limit by about a second of data.
     Bytes(u64),
     /// The messages of the part reach this span of dive time.
     Span(DurNs),

@@ -146,7 +146,7 @@ fn not_mcap<R: Read + Seek>(file: &LogFile<R>, first: &[u8]) -> LogError {
 impl Scan {
     fn walk<R: Read + Seek>(&mut self, file: &mut LogFile<R>, start: u64) -> Result<(), LogError> {
         let (mut at, mut found) = (start, look(file, start)?);
-        // Begin of the last record before `at`. The length of a record that was cut off may reach into another log.
+        // Start of the latest record before `at`. If this record was cut off, its length may reach into another log.
         let mut last = start;
         loop {
             // Position in the file at which the scan continues after damage.
@@ -166,7 +166,7 @@ impl Scan {
                 Found::Record(frame) => {
                     let next = look(file, frame.end)?;
                     if is_believed(file, &frame, &next)? {
-                        // Times go back in a copy of a log, whose begin may lie within the last chunk.
+                        // In a copy of a log, times go back, and the copy may begin within the latest chunk.
                         let before = self.spans.last().filter(|before| before.is_after(&frame.item));
                         let from = before.map_or(at, |before| before.at);
                         if self.ends_at_other_log(file, from..at, at)? {
@@ -267,7 +267,7 @@ impl Scan {
             self.lose(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }, frame.at..frame.end);
             return;
         }
-        // The length of a run includes other records between its messages.
+        // The length of a run of messages includes the other records between these messages.
         let within = |last: &&mut Span| self.run_open && frame.end - last.at <= RUN_BYTES;
         let last = self.spans.last_mut().filter(within);
         if let Some(run) = last {

@@ -14,8 +14,8 @@ const SEARCH_BYTES: usize = 64 * 1024;
 
 /// Returns the first position in `from..until` at which consecutive records begin.
 ///
-/// A byte before a record may look like another record, whose length happens to end at a record boundary. A position
-/// with an unconfirmed length is therefore accepted only if no records lie within that length.
+/// Bytes before a record may look like a record whose length happens to end at a record boundary. A position with an
+/// unconfirmed length is therefore accepted only if no records lie within that length.
 pub(super) fn find_records<R: Read + Seek>(
     file: &mut LogFile<R>,
     from: u64,
@@ -60,7 +60,7 @@ fn find_chain<R: Read + Seek>(
     find(file, from, until, |file, head, at| if may_begin(head) { chain_at(file, at) } else { Ok(None) })
 }
 
-/// Returns the first result of `examine`, which gets every eight bytes with their position in `from..until`.
+/// Calls `examine` with the eight bytes at each position in `from..until`, and returns its first result.
 fn find<R: Read + Seek, T>(
     file: &mut LogFile<R>,
     from: u64,

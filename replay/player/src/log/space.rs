@@ -12,7 +12,7 @@ use headrace_geometry::time::MonoNs;
 
 /// Free bytes below which the user is warned. They last for some hours of a dive.
 const WARN_BELOW_BYTES: u64 = 1 << 30;
-/// Free bytes below which echoes are dropped. They last for days of the messages that are still recorded.
+/// Free bytes below which echoes are dropped. For the messages that are still recorded, these bytes last for days.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
 /// Maximum length of a sonar packet that is kept, bytes. Longer packets are echoes, shorter ones have only ranges.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;
@@ -46,7 +46,7 @@ pub(super) struct Space {
     asked: Option<Duration>,
     warned: bool,
     sparing: bool,
-    /// Free bytes of the disk at the last query.
+    /// Free bytes of the disk at the latest query.
     free: u64,
     left_out: LeftOut,
 }

@@ -31,7 +31,7 @@ pub trait StoredFile: Send {
 
     /// Syncs the file. Once this function returns, everything written so far survives a power cut.
     ///
-    /// After an error, nothing written since the last successful sync is certain. If another program has changed the
+    /// After an error, nothing written since the latest successful sync is certain. If another program has changed the
     /// file, nothing in it is certain.
     ///
     /// Errors: a system error; another program has deleted, truncated or replaced the file.
@@ -167,7 +167,7 @@ const BUFFER_BYTES: usize = 64 << 10;
 pub(super) struct Buffered {
     file: Box<dyn StoredFile>,
     buffer: Vec<u8>,
-    /// Whether nothing was written since the last sync, so that another sync isn't needed.
+    /// Whether nothing was written since the latest sync, so that another sync isn't needed.
     is_synced: bool,
 }
 

@@ -14,8 +14,8 @@ use super::writer::{Lane, LogHeader, LogWriter, ResultChannel};
 /// Metadata key of a trimmed log. Its value describes the changes.
 pub const TRIMMED: &str = "trimmed";
 
-/// Changes a source message. It may write replacement bytes, and returns whether it did. Empty bytes drop the
-/// message.
+/// Changes a source message. The function may write replacement bytes, and returns whether it has done so. An empty
+/// replacement drops the message.
 pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 
 /// Content that is kept of a log, and changes to this content.
@@ -126,9 +126,9 @@ struct Cutter<'a, W: Write> {
     numbers: BTreeMap<&'a str, u16>,
     log: LogWriter<W>,
     done: Trimmed,
-    /// Source numbers of the packets kept since the last tick, in order.
+    /// Source numbers of the packets kept since the latest tick, in order.
     order: Vec<u16>,
-    /// Whether all packets since the last tick were kept.
+    /// Whether all packets since the latest tick were kept.
     whole: bool,
     shorter: Vec<u8>,
 }

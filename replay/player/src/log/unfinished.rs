@@ -113,10 +113,10 @@ impl Unfinished {
         Ok(last.map(unfinished))
     }
 
-    /// Returns the path that names the last recording in a folder, if that recording did not end in order.
+    /// Returns the path that names the latest recording in a folder, if that recording did not end in order.
     ///
-    /// The last recording is the one whose file was modified last. Files that aren't parts of a recording are ignored, as
-    /// are those for which `is_other` returns true.
+    /// The latest recording is the one whose file was modified last. Files that aren't parts of a recording are
+    /// ignored, as are those for which `is_other` returns true.
     ///
     /// Errors: the folder can't be read.
     pub fn last_in(folder: &Path, is_other: &dyn Fn(&LogInfo) -> bool) -> Result<Option<PathBuf>, LogError> {
@@ -155,7 +155,7 @@ impl Unfinished {
         Ok(has_head && unended(&files)?.is_some())
     }
 
-    /// Returns the same dive, to be continued at another path, where none of its parts can be continued.
+    /// Returns the same dive, to be continued at another path. None of the dive's parts at that path can be continued.
     #[must_use]
     pub fn at(&self, recording: &Path) -> Self {
         let present = in_the_way(recording).unwrap_or_default();

@@ -48,7 +48,7 @@ pub struct RecorderWorker {
     queue: Queue,
     recording: Recording,
     flushed: Duration,
-    /// Whether anything has been written since the last flush.
+    /// Whether anything has been written since the latest flush.
     open: bool,
     space: Space,
     echoes: Echoes,
@@ -122,7 +122,7 @@ impl RecorderWorker {
         }
     }
 
-    /// Returns a port that records traffic with devices that doesn't pass through the loop.
+    /// Returns a port that records messages to devices, and losses of packets, which don't pass through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
@@ -256,7 +256,7 @@ impl RecorderWorker {
         self.state.failing.store(self.recording.is_failing(), Ordering::Release);
     }
 
-    /// Writes the entry taken last, and the messages derived from it.
+    /// Writes the entry that was taken most recently, and the messages derived from it.
     fn write_all(&mut self, entry: &Entry) {
         let message = core::mem::take(&mut self.queue.message);
         self.write(entry, &message);

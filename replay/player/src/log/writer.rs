@@ -56,7 +56,7 @@ pub struct LogHeader {
 }
 
 impl LogHeader {
-    /// Whether a log with this header has a channel for such a message.
+    /// Whether a log with this header has this channel.
     pub(super) fn has(&self, lane: Lane) -> bool {
         match lane {
             Lane::Raw(source) | Lane::Sent(source) => usize::from(source) < self.sources.len(),
@@ -179,7 +179,7 @@ pub struct LogWriter<W: Write> {
     losses: u64,
     /// Log time of the open chunk's first message.
     chunk_began: Option<MonoNs>,
-    /// Whether the last message was a voice recording, which has a chunk of its own.
+    /// Whether the latest message was a voice recording, which has a chunk of its own.
     is_alone: bool,
 }
 
@@ -391,7 +391,7 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// Records a loss between `from` and `to` in the log; `None` if a time is unknown. Closes the chunk.
+    /// Records in the log a loss between the times `from` and `to`. An unknown time is `None`. Closes the chunk.
     ///
     /// Errors: an error of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {

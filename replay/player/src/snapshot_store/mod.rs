@@ -31,7 +31,7 @@ impl SnapshotStore {
         Self { snapshots: BTreeMap::new(), blocks: BTreeSet::new(), used_bytes: 0, max_bytes, interval }
     }
 
-    /// Returns the processing time between two snapshots. It doubles each time the store is full.
+    /// Returns the processing time between two snapshots. This time doubles whenever the store is full.
     pub fn interval(&self) -> Duration {
         self.interval
     }
@@ -93,7 +93,7 @@ impl SnapshotStore {
             is_kept = !is_kept;
             is_kept
         });
-        // The set itself holds one reference to each block, so a count of one means unused.
+        // `blocks` itself holds one reference to each block, so a count of one means that no snapshot uses the block.
         self.blocks.retain(|block| Arc::strong_count(block) > 1);
         let blocks: usize = self.blocks.iter().map(|block| block_bytes(block)).sum();
         let references: usize = self.snapshots.values().map(Vec::len).sum();

@@ -114,7 +114,7 @@ impl Sections {
         })
     }
 
-    /// Returns the list for display. Each of its stretches is adjacent flagged sections with the same cause.
+    /// Returns the list for display. A stretch consists of adjacent flagged sections with the same cause.
     fn stretches(&self, site: &Site) -> Vec<Stretch> {
         let mut stretches: Vec<Stretch> = Vec::new();
         let mut last = None;

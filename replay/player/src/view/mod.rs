@@ -70,14 +70,14 @@ pub struct View {
     points: Points,
     wall: Wall,
     sections: Sections,
-    /// Chainage, m, and speed, m/s, of the vehicle at its last known position.
+    /// Chainage, m, and speed, m/s, of the vehicle at its latest known position.
     last: Option<(f64, f64)>,
     v_max_mps: f64,
     told: Option<LastAdvice>,
     at: MonoNs,
 }
 
-/// The advice that was published last.
+/// The most recently published advice.
 #[derive(Debug)]
 struct LastAdvice {
     at: MonoNs,

@@ -30,7 +30,7 @@ const FARTHEST_M: f64 = 128.0;
 #[derive(Debug, Default)]
 pub(super) struct Points {
     began: Option<MonoNs>,
-    /// Chainage of the cloud's origin, m. Points are relative to it, because a float is too coarse for seven
+    /// Chainage of the cloud's origin, m. Points are relative to the origin, because a float is too coarse for seven
     /// kilometres.
     origin_m: f64,
     data: Vec<u8>,

@@ -79,7 +79,7 @@ fn object(properties: &Value, optional: &[&str]) -> Value {
     json!({"type": "object", "required": required, "properties": properties})
 }
 
-/// Returns the same schema with a title.
+/// Returns a schema with a title added.
 fn titled(title: &str, mut schema: Value) -> Value {
     if let Some(schema) = schema.as_object_mut() {
         schema.insert("title".to_owned(), title.into());

@@ -96,7 +96,7 @@ impl Wall {
         self.shown = None;
     }
 
-    /// Returns the wall around a chainage, if it has changed and a grid is due.
+    /// Returns the wall around a chainage, if the wall has changed and a grid is due.
     pub(super) fn show(&mut self, at: MonoNs, x_m: f64) -> Option<Grid> {
         let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
         (self.changed && !waits).then(|| {

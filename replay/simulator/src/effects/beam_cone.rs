@@ -72,7 +72,7 @@ pub struct Cone {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConeRay {
-    /// Components of the direction along the beam's axis, along the tunnel, and perpendicular to both.
+    /// Direction of the ray, in components: along the beam's axis, along the tunnel, and perpendicular to both.
     parts: [f64; 3],
     /// Strength of the ray relative to the beam's axis.
     strength: f64,

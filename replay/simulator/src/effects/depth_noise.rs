@@ -125,7 +125,8 @@ mod tests {
         assert!(lagged.abs() < 5.0 * 9e4 / math::sqrt(n), "{lagged}");
     }
 
-    /// Over a lag t, a Gauss-Markov process changes by a mean square of 2 sd^2 (1 - exp(-t / tau)).
+    /// Over a lag t, a Gauss-Markov process with correlation time tau changes by a mean square of 2 sd^2 (1 - exp(-t /
+    /// tau)).
     #[test]
     fn depth_drift_changes_at_the_given_rate() {
         let parameters = Parameters { noise_pa: 0.0, offset_sd_pa: 0.0, drift_pa: 100.0, tau_s: 20.0 };
@@ -137,7 +138,7 @@ mod tests {
             let pairs = drift.iter().zip(drift.iter().skip(lag));
             let found = pairs.map(|(a, b)| (b - a) * (b - a)).sum::<f64>() / (drift.len() - lag) as f64;
             let wanted = 2e4 * (1.0 - math::exp(-(lag as f64) * 0.1 / 20.0));
-            // Stretches of about two tau are independent. The series has 1,000 of them.
+            // Stretches of about two correlation times are independent. The series has 1,000 of them.
             assert!((found / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / 1000.0), "{lag}: {found} {wanted}");
         }
     }
@@ -172,7 +173,7 @@ mod tests {
         let squares = offsets.iter().map(|pa| pa * pa / 1e6);
         let (second, fourth) = (squares.clone().sum::<f64>() / n, squares.map(|of| of * of).sum::<f64>() / n);
         assert!((second - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{second}");
-        // For a normal distribution, the fourth moment is 3, and the variance of its estimate 96 / n.
+        // For standard normal values, the fourth moment is 3. The variance of its estimate from n values is 96 / n.
         assert!((fourth - 3.0).abs() < 5.0 * math::sqrt(96.0 / n) && fourth > 1.5, "{fourth}");
     }
 

@@ -1,4 +1,4 @@
-//! Detection of echoes. It depends on their strength.
+//! Decides by the strength of an echo whether a head detects it.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};

@@ -92,7 +92,7 @@ fn bump(mut units: Query<'_, '_, (&mut Samples<Inertia>, &ImuBumps)>) {
 }
 
 impl ImuBumps {
-    /// Velocity gained from bumps between two times, m/s; `None` if there is no bump.
+    /// Velocity that bumps give the vehicle between two times, m/s; `None` without a bump.
     fn gained_mps(&self, [from_s, until_s]: [f64; 2]) -> Option<Vec3<Sensor>> {
         let last = math::floor_to_i64(until_s / SPAN_S);
         let first = math::floor_to_i64((from_s - self.parameters.seconds) / SPAN_S).max(0);

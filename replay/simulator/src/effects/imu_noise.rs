@@ -140,8 +140,8 @@ mod tests {
                     let n = (means.len() - 1) as f64;
                     let variance = squares / n / 2.0;
                     let wanted = density * density / (period_s * length as f64);
-                    // Neighbouring differences share a mean. The variance of the estimate, relative to its square, is
-                    // therefore 3/n.
+                    // Two neighbouring differences have one mean in common. The relative variance of the estimate from
+                    // n differences is therefore 3 / n.
                     let off = variance / wanted - 1.0;
                     assert!(off.abs() < 5.0 * math::sqrt(3.0 / n), "{length} {axis}: {off}");
                 }

@@ -27,8 +27,9 @@ use pings::{Ping, Pings};
 /// Heads that share a frequency hear each other. A head takes the first sound after its own ping as its echo.
 ///
 /// Another head's ping arrives by reflection at the point where the other beam meets the wall, or directly if the other
-/// beam points at this head's body. The ping's apparent range is (c (t_other - t_own) + path) / 2. The head reports the
-/// apparent range if it is less than the range of the head's own echo, and not less than the head's least range.
+/// beam points at this head's body. The ping's apparent range is (c (t_other - t_own) + path) / 2, with the speed of
+/// sound c and the times t of both pings. The head reports the apparent range if it is less than the range of the
+/// head's own echo, and not less than the head's least range.
 ///
 /// The ping is always heard if it arrives within this head's beam. Otherwise it is heard through side lobes with the
 /// probability `share`. A wall point is within the beam if its angle from the axis is at most half the beam's width
@@ -206,7 +207,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Considers a ping that arrives directly, from a head whose beam points at this one.
+    /// Considers a ping that arrives directly, from a head whose beam points at this head.
     fn straight(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
         let way_m = (ping.origin - self.ray.origin).norm();
         let range_m = f64::midpoint(later_m, way_m);
@@ -225,7 +226,8 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this apparent range arrives before all sounds so far, and not from within the least range.
+    /// Whether a sound with this apparent range arrives before all sounds heard so far. Sounds from within the least
+    /// range don't count.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }

@@ -194,8 +194,8 @@ mod tests {
         let found = runs.iter().sum::<usize>() as f64 / count;
         assert!((found - mean).abs() < 5.0 * math::sqrt(mean * (mean - 1.0) / count), "{found}");
         assert_share(runs.iter().filter(|run| **run == 1).count(), runs.len(), 1.0 / mean);
-        // The share's variance is that of independent pings times (1 + r) / (1 - r), where r is the chain's
-        // correlation.
+        // The share's variance is that of independent pings times (1 + r) / (1 - r), where r is the correlation of the
+        // Markov chain.
         let correlation = Runs::new(share, mean).correlation();
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         let found = runs.iter().sum::<usize>() as f64 / whole;

@@ -12,7 +12,7 @@ use crate::stages::{AIM_HELD, Stage, aim_moving};
 
 /// Each ping starts from the vehicle's pose at the time of the ping.
 ///
-/// Without this effect, all pings of a turn are from the pose at the turn's beginning, as in simulators that take a
+/// Without this effect, all pings of a turn start from the pose at the turn's beginning, as in simulators that take a
 /// whole scan at once.
 pub(super) struct MotionWithinTurnKind;
 

@@ -22,8 +22,9 @@ use crate::stages::Stage;
 /// Some echoes arrive by way of two walls. The first wall reflects the beam specularly, and the second one returns it
 /// to the sonar.
 ///
-/// The range is half the length of this path, (r1 + r12 + r2) / 2. Such an echo replaces the direct echo more often
-/// towards grazing incidence, since the strength of the direct echo is proportional to the cosine of incidence.
+/// The range is half the length of the path from the sonar over both walls back to the sonar. Such an echo replaces the
+/// direct echo more often towards grazing incidence, since the strength of the direct echo is proportional to the
+/// cosine of incidence.
 ///
 /// Keys, with defaults in brackets:
 /// - `from_m` and `to_m` of the stretch in which this happens.
@@ -157,7 +158,7 @@ mod tests {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Distances along the straightened beam at which it crosses the side walls, and floor and ceiling.
+            // Distances along the straightened beam: to the side wall ahead, and to floor or ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =

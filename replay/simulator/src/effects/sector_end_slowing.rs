@@ -111,7 +111,8 @@ mod tests {
     const KEYS: &str = "[effects.sector_end_slowing]\nlag_ms = 150\n";
     const LAG_S: f64 = 0.15;
 
-    /// For a command c(t) = w t that grows from rest, the response is y = w (t - T + T exp(-t / T)).
+    /// The command c(t) = w t grows from rest. With time constant T, the head's response is y = w (t - T + T exp(-t /
+    /// T)).
     #[test]
     fn lag_at_sector_ends_matches_its_closed_form() {
         let (plain, slowed) = (pings(""), pings(KEYS));
@@ -127,8 +128,8 @@ mod tests {
         }
     }
 
-    /// The command reverses at time 0, long after its previous reversal. The head then moves at w (2 exp(-t / T) - 1),
-    /// and reverses at T ln 2.
+    /// The command has the rate w, and reverses at time 0, long after its previous reversal. With time constant T, the
+    /// head then moves at w (2 exp(-t / T) - 1), and reverses at T ln 2.
     #[test]
     fn head_steps_are_short_at_reversals_and_full_elsewhere() {
         let (plain, slowed) = (pings(""), pings(KEYS));

@@ -38,8 +38,7 @@ struct TetherSlip {
     at_m: Option<f64>,
     gone_m: f64,
     next_stretch: u64,
-    /// Slip in the current stretch of travel that hasn't happened yet: the travel at which it happens, and its size,
-    /// m.
+    /// The slip still to come in the current stretch of travel: the travel at which it happens, and its size, m.
     waiting: Option<(f64, f64)>,
     slipped_m: f64,
 }

@@ -62,7 +62,7 @@ impl Bulge {
         self.off_middle_m(arc_m, perimeter_m) < self.half_width_m + margin_m
     }
 
-    /// Whether the displaced patch overlaps another.
+    /// Whether the displaced patch overlaps another patch.
     pub(super) fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
         self.begin_m() < other.end_m()
             && other.begin_m() < self.end_m()

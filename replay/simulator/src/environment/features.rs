@@ -76,7 +76,7 @@ impl Features {
 
 /// Returns the hollow if it opens from the tube's wall.
 ///
-/// Errors: it opens from a mesh.
+/// Errors: the hollow opens from a mesh.
 fn opening(
     ground: Ground<'_>,
     table: &Section<'_>,

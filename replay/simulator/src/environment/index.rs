@@ -45,7 +45,8 @@ impl Index {
         index
     }
 
-    /// Numbers of all objects that extend into `[from_m, to_m]`. Numbers may be repeated, and objects nearby included.
+    /// Numbers of all objects that extend into `[from_m, to_m]`. A number may occur more than once, and objects near
+    /// this range may be included.
     pub(super) fn near(&self, from_m: f64, to_m: f64) -> &[u32] {
         let Some(count) = self.starts.len().checked_sub(1) else { return &[] };
         if to_m < self.first_m {

@@ -375,8 +375,8 @@ impl Environment {
         }
     }
 
-    /// Finds the hollow at the end of the ray that extends farthest. Returns the range of the hollow's end, the normal
-    /// there, and the hollow.
+    /// Finds, among the hollows at the end of the ray, the one in which the ray gets farthest. Returns the range of the
+    /// hollow's end, the normal there, and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
         // The index lists hollows by the chainage of their openings. Deeper in the rock, a hollow may meet any other

@@ -86,8 +86,8 @@ pub(super) fn side_tunnel(
     let to_wall_m = ground.tube.section_range_m(chainage_m, [middle_m, centre_m], [side, 0.0]).unwrap_or(0.0);
     let (sin, cos) = math::sin_cos(slant_rad);
     let whole_m = to_wall_m / cos + length_m;
-    // A positive slant points towards growing chainage on either side. The middle of the opening stays at the given
-    // chainage.
+    // A positive slant points towards growing chainage, on either side of the tunnel. The middle of the opening stays
+    // at the given chainage.
     let mut frame = ground.frame(chainage_m, [middle_m, centre_m]);
     let start = frame.outwards([-to_wall_m * sin / cos, 0.0, 0.0]);
     let inwards = frame.outwards([sin, side * cos, 0.0]);

@@ -1,4 +1,4 @@
-//! Positions of objects in the tunnel, before and after its wall is displaced.
+//! Positions of objects in the tunnel, before and after the tunnel's wall is displaced.
 
 use headrace_geometry::tunnel::Profile;
 

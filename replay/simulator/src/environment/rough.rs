@@ -95,7 +95,7 @@ impl Heights {
             squares += weight * weight;
         }
         // A weighted mean of several numbers has a smaller standard deviation than each number. The division restores
-        // it.
+        // the given standard deviation.
         self.sd_m * sum / math::sqrt(squares)
     }
 

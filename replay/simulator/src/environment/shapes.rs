@@ -175,7 +175,7 @@ fn block_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
 fn ellipsoid_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
     let local = frame.local_ray(ray);
     // In units of the half diameters, the ellipsoid is a unit sphere. Half the chord follows from the ray's least
-    // distance to the centre. Unlike b * b - a * c, that distance loses no digits.
+    // distance to the centre. The discriminant b * b - a * c would lose digits, which this distance doesn't.
     let origin = [local.origin[0] / half[0], local.origin[1] / half[1], local.origin[2] / half[2]];
     let slope = [local.direction[0] / half[0], local.direction[1] / half[1], local.direction[2] / half[2]];
     let a = dot(slope, slope);

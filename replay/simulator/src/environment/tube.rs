@@ -461,8 +461,8 @@ fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) ->
         }
         let t = below.0 - below.1 * (above.0 - below.0) / (above.1 - below.1);
         let value = f(t);
-        // If an end of the bracket is kept twice in a row, its value is halved. Otherwise the bracket could shrink from
-        // one side only.
+        // If an end of the bracket is kept twice in a row, the function's value at this end is halved. Otherwise the
+        // bracket could shrink from one side only.
         if value < 0.0 {
             below = (t, value);
             if kept == 1 {

@@ -61,13 +61,13 @@ impl Frame {
         Self { origin: [ax - y * ty, ay + y * tx, z], axes: [[tx, ty, 0.0], [-ty, tx, 0.0], [0.0, 0.0, 1.0]] }
     }
 
-    /// Transforms a point from the tunnel's frame into this one.
+    /// Transforms a point from the tunnel's frame into this frame.
     pub(super) fn local(&self, point: V3) -> V3 {
         let from = sub(point, self.origin);
         self.axes.map(|axis| dot(from, axis))
     }
 
-    /// Transforms a ray from the tunnel's frame into this one.
+    /// Transforms a ray from the tunnel's frame into this frame.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
         Ray { origin: self.local(ray.origin), direction: self.axes.map(|axis| dot(ray.direction, axis)) }
     }

@@ -13,8 +13,8 @@ const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
 
-/// Sensors that share tables, the ranges of chainage and keys of these tables, and for [`GROUPED`] the sensors that the
-/// call names.
+/// Sensors that share tables, the ranges of chainage and keys of these tables, and, for the effect [`GROUPED`], the
+/// sensors that the call names.
 type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
 /// A table to write: the range of chainage where it applies, and its keys.

@@ -21,8 +21,8 @@ pub enum Role {
 const FAR_M: f64 = 100_000.0;
 /// Largest distance between welded vertices, as a share of the mesh's diagonal.
 const WELD: f64 = 1e-9;
-/// Largest distance of a wall's opening from an end of the mesh, as a share of the wall's length. [`END_M`] applies
-/// if it is larger.
+/// Largest distance of a wall's opening from an end of the mesh, as a share of the wall's length. If [`END_M`] is
+/// larger than this distance, [`END_M`] applies.
 const END: f64 = 0.02;
 /// Largest distance of a wall's opening from an end of the mesh, metres, where it exceeds the share [`END`]. Both
 /// limits are at most a quarter of the length, which keeps the ends apart.

@@ -118,10 +118,10 @@ impl Mesh {
 
     /// Whether a point is in the solid, or within the wall and between its ends.
     ///
-    /// The function counts how often a ray from the point crosses the surface. An odd number means inside. The openings
-    /// of a wall are closed by triangles, which extend from an opening's centroid to its edges. If a ray touches an
-    /// edge, the next ray is tried. If all rays touch edges, the point is on the surface and counts as inside. A point
-    /// in two overlapping parts counts as outside.
+    /// This function counts how often a ray from the point crosses the surface. An odd number means inside. The
+    /// openings of a wall are closed by triangles, which extend from an opening's centroid to its edges. If a ray
+    /// touches an edge, the next ray is tried. If all rays touch edges, the point is on the surface and counts as
+    /// inside. A point in two overlapping parts counts as outside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
         // The negated comparison counts a point with NaN as outside.

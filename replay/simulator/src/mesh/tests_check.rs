@@ -47,7 +47,7 @@ fn duplicated_vertices_are_welded() {
     let whole = icosphere(3, || 2.0);
     let mut t = Triangles::default();
     for (i, corner) in (0_u32..).zip(whole.faces.as_flattened()) {
-        // The copies differ by less than a billionth of the diagonal, to either side.
+        // The copies of a vertex differ by less than a billionth of the mesh's diagonal.
         let off = f64::from(i % 3) * 1e-9;
         t.vertices.push(whole.vertices[*corner as usize].map(|c| c + off));
     }

@@ -13,7 +13,7 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// The position at a time depends on at most this many later knots.
+/// The position at a time depends on at most this many knots after that time.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back to a missed stretch, m/s.
 const BACK_MPS: f64 = 0.2;

@@ -67,7 +67,7 @@ impl Legs {
             let (mut at_m, mut left_m, towards) = (*begins_m, leg.distance_m, leg.speed_mps.signum());
             while left_m > 0.0 {
                 let change_m = flow.next_change_m(at_m, at_m + towards * left_m);
-                // A leg that no change of the flow cuts keeps its exact length.
+                // A leg keeps its exact length if no change of the flow cuts it.
                 let distance_m = left_m.min((change_m - at_m).abs());
                 let is_last = distance_m >= left_m - SHORTEST_M;
                 let distance_m = if is_last { left_m } else { distance_m };

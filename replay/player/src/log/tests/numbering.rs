@@ -58,7 +58,7 @@ fn joined(records: &[Vec<u8>]) -> Vec<u8> {
     [mcap::MAGIC, &records.concat(), mcap::MAGIC].concat()
 }
 
-/// Returns the records without the summary. The new footer states that there is none.
+/// Returns the records without the summary. The new footer states that there is no summary.
 fn without_summary(mut records: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
     let data_end = records.iter().position(|record| record[0] == op::DATA_END).unwrap();
     records.truncate(data_end);

@@ -110,8 +110,8 @@ fn unsynced_time_lasts_from_latest_sync_to_latest_tick() {
     assert_eq!(handle.finish().unwrap().messages, 7);
 }
 
-/// Writing the queue takes seconds. With a time limit, the end of the recording waits 0.6 s in total. Without one, it
-/// waits while the medium makes progress.
+/// Writing the queue takes seconds. With a time limit, the end of the recording waits 0.6 s in total. Without a time
+/// limit, it waits while the medium makes progress.
 #[test]
 fn slow_recording_is_cut_off_at_the_time_limit_only_on_request() {
     for in_time in [true, false] {

@@ -213,7 +213,8 @@ fn single_storage_fault_is_recorded_and_loses_no_message() {
             };
             assert_eq!((summary.faults.len(), fault.lost), (1, 0), "{which}");
             assert!(fault.error.contains("Input/output error"), "{which}");
-            // If the sync of the summary fails, the summary may still be complete. Everything before it is synced.
+            // If the sync of the summary fails, the summary may still be complete. Everything before the summary is
+            // synced.
             if fault.error.contains("the summary") {
                 continue;
             }

@@ -128,7 +128,8 @@ fn part_cut_within_its_header_does_not_prevent_the_continuation() {
     let recorder = Recorder::go_on(&interrupted, &header(true), None, QUEUE_BYTES, None).unwrap();
     drop((recorder, interrupted));
     let part = std::fs::read(folder.part(2)).unwrap();
-    // With its number, the part is continued like any other. Without it, its file has no data.
+    // If the cut-off part still has its number, it is continued like any other. Otherwise its file counts as
+    // unreadable.
     let (mut with_number, mut without) = (0, 0);
     for bytes in (0..part.len()).step_by(part.len() / 30) {
         std::fs::write(folder.part(2), &part[..bytes]).unwrap();
@@ -161,7 +162,7 @@ fn dive_is_continued_at_another_path_if_its_medium_is_gone() {
     let (after, losses) = messages(&elsewhere);
     assert_eq!(after.len(), 90);
     assert!(losses.iter().any(|loss| loss.contains("part 1 of the recording is missing")), "{losses:?}");
-    // Brought together, they are one dive again.
+    // In one folder, the two recordings are one dive again.
     std::fs::copy(folder.0.join("other.part002.mcap"), folder.part(2)).unwrap();
     let (all, losses) = messages(&recording);
     assert!(all.len() > 90 && losses.len() == 1, "{losses:?}");

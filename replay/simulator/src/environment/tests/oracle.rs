@@ -108,8 +108,8 @@ impl Oracle {
                 break;
             }
             let part = rest.min(*length);
-            // The chord of an arc follows from the sine of half the turn. It points along the heading after half the
-            // turn.
+            // The chord of an arc follows from the sine of half the turn. The chord points along the heading after half
+            // the turn.
             let half = curvature * part / 2.0;
             let chord = if half == 0.0 { part } else { 2.0 * math::sin(half) / curvature };
             at[0] += chord * math::cos(heading + half);
@@ -192,8 +192,8 @@ impl Oracle {
             let next = t + step;
             let p = ray.at(next);
             chart = self.chart(p, chart[0]);
-            // Far from the axis, the nearest point of the axis may jump between steps, so it is searched without an
-            // estimate.
+            // Far from the axis, the nearest point of the axis may jump between steps, so this point is searched
+            // without an estimate.
             if chart[1].abs() > 8.0 && !self.axis.is_empty() {
                 chart = self.search(p);
             }
