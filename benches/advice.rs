@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::{Compared, Outcome, Outing};
 
-/// Allowed ratio of advised to true speed: at most a tenth too slow, and never too fast. The limits allow for
-/// rounding, because the search for the true speed uses steps of 2 %.
+/// Allowed ratio of the advised speed to the largest passing speed: at most a tenth too slow, and never too fast. The
+/// limits allow for rounding, because the search for the passing speed uses steps of 2 %.
 const LEAST: f64 = 0.899;
 const MOST: f64 = 1.005;
 

@@ -128,7 +128,7 @@ fn without_log(report: &Report) -> Result<Value, Failure> {
     Ok(value)
 }
 
-/// Removes the log and the ports, since a replay has no ports.
+/// Removes the log and the ports from a report. A replay has no ports to compare.
 fn drop_log(report: &mut Value) {
     if let Some(object) = report.as_object_mut() {
         object.insert("log".to_owned(), Value::Null);

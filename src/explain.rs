@@ -109,8 +109,8 @@ fn worth_in_json(worth: &EffectInfluence) -> Value {
     })
 }
 
-/// Text about the worth of the effects: first the cheapest sufficient set, then each effect, the most expensive
-/// first.
+/// Text about the worth of the effects: first the cheapest set of effects that gives nearly the same results, then each
+/// effect, the most expensive first.
 fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =
         worth.each.iter().flat_map(|out| &out.effects).filter(|name| !worth.spared.effects.contains(name));

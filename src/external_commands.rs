@@ -1,5 +1,5 @@
-//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs neither an SQL
-//! engine nor oracles.
+//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs neither an SQL engine nor
+//! the reference computations of `headrace cost`.
 
 use std::ffi::OsStr;
 use std::io::ErrorKind;
@@ -22,7 +22,8 @@ pub(crate) const COST: Program = Program { name: "headrace-cost", package: "head
 
 /// Runs a program of `lab/` with `arguments` after `first`, and returns its exit code.
 ///
-/// The program is searched for next to this one, where `lab/` of the same clone builds it, and then on PATH.
+/// The program is searched for in three places: next to this one, in the build folder of `lab/` in the same clone, and
+/// on PATH.
 ///
 /// Errors: there is no such program, or it can't be started. If there is none, the text has the command that
 /// builds it.

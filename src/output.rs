@@ -17,10 +17,10 @@ use crate::terminal;
 
 /// Longest time for which a live dive waits for a reader of stdout.
 pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
-/// Length of one write, bytes. Any active reader takes this many within [`UNREAD_FOR`].
+/// Length of one write, bytes. Any active reader takes this many bytes within [`UNREAD_FOR`].
 const PIECE: usize = 1 << 10;
 
-/// Whether stdout has been given up. If so, nothing more is written to it.
+/// Whether stdout has been given up. Nothing is written to stdout after that.
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 /// Whether stdout is given up if nobody reads it.
 static NEVER_WAITS: AtomicBool = AtomicBool::new(false);
@@ -161,7 +161,7 @@ pub(crate) fn put_waiting(text: &str) {
     }
 }
 
-/// Writes `text` unchanged. It consists of lines that are already printable and of codes for the terminal.
+/// Writes `text` unchanged. The text consists of lines that are already printable and of codes for the terminal.
 ///
 /// Errors are only logged and remembered (see [`lost`]). A closed pipe or a lost session doesn't end a dive.
 /// Nothing is written after stdout has been given up.
@@ -190,7 +190,7 @@ fn note(error: io::Error) {
     }
 }
 
-/// First error through which output was lost; `None` if none was.
+/// First error through which output was lost; `None` if no output was lost.
 pub(crate) fn lost() -> Option<String> {
     LOST.get().map(|error| format!("writing standard output: {error}"))
 }

@@ -101,7 +101,7 @@ fn begins(path: &Path, mark: &str) -> bool {
     begin(path).is_some_and(|text| text.starts_with(mark))
 }
 
-/// Whether a file ends with this mark. The file may have any size.
+/// Whether a file ends with the text `mark`. The file may have any size.
 fn ends(path: &Path, mark: &str) -> bool {
     let end = || {
         let mut file = std::fs::File::open(path)?;

@@ -343,7 +343,7 @@ fn direct(directed: &Arc<Directed>) -> Direct {
         };
         let commands = directed.commands();
         if command == PlaybackCommand::Go && directed.is_at_end.load(Ordering::Relaxed) {
-            // If this command fails, so does the next one.
+            // If this jump fails, so does sending the command below, and that failure is returned.
             commands.as_ref().and_then(|commands| commands.send(PlaybackCommand::Seek(MonoNs(0))).ok());
         }
         let sent = commands.as_ref().map(|commands| commands.send(command));

@@ -17,10 +17,10 @@ use crate::report_output::files_report;
 #[derive(Default)]
 pub(crate) struct Recordings {
     all: Vec<One>,
-    /// Whether the dive's time is that of this machine.
+    /// Whether the dive runs on this machine's clock.
     ///
-    /// Otherwise a power cut loses nothing, even if minutes of the dive are unsynced, because the dive can be run
-    /// again.
+    /// A replayed or simulated dive loses nothing in a power cut, even if minutes of it are unsynced, because it can be
+    /// run again.
     is_live: bool,
     unsafe_for: DurNs,
 }

@@ -17,9 +17,9 @@ use crate::failure::Failure;
 use crate::interruption::Interruption;
 use crate::outputs::SIMULATED;
 
-/// Longest interruption after which a dive is continued without being named, seconds.
+/// Longest interruption after which a dive is continued without its path on the command line, seconds.
 const LONGEST_S: f64 = 12.0 * 3600.0;
-/// Longest interruption for which UTC is believed after a reboot, seconds.
+/// Longest interruption by UTC that is believed after a reboot, seconds. UTC that shows a longer one was probably set.
 const LONGEST_BY_UTC_S: f64 = 30.0 * 86_400.0;
 /// Shortest interruption that is assumed if the clocks show none.
 const SHORTEST: DurNs = DurNs(1_000_000_000);
@@ -257,7 +257,7 @@ fn set_clock(dive: &Unfinished) -> DurNs {
     let gap = if is_same_boot {
         DurNs(host.0.cast_signed() + ahead - dive.last.0.cast_signed())
     } else {
-        // The gap is at least the time since the reboot, also if UTC was set back meanwhile.
+        // The gap is at least the time since the reboot, even if UTC was set back meanwhile.
         by_utc.filter(is_plausible).map_or(since_boot, |gap| DurNs(gap.0.max(since_boot.0)))
     };
     let gap = DurNs(gap.0.max(SHORTEST.0));

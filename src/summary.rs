@@ -180,7 +180,7 @@ fn outside_text(dive: &DiveReport) -> String {
     format!("NO VERDICTS: the heads were outside the tunnel{place}: check the tether's zero and length_m")
 }
 
-/// Metres of tunnel by verdict, as text.
+/// Length of tunnel with each verdict, as text.
 fn metres(judged: &OtherTargetReport) -> String {
     let OtherTargetReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
     metres_text(&Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
@@ -254,7 +254,7 @@ fn declaration(opening: &SuggestedOpeningReport) -> Vec<String> {
     ]
 }
 
-/// Line about a position gap that no fix has ended, and the gap's lower chainage. The sections of other gaps have
+/// Line about a position gap that no fix has ended, and the gap's lower chainage. Sections in all other gaps have
 /// verdicts.
 fn without_position(gap: &PositionGapReport, report: &Report) -> Option<(f64, String)> {
     let (from_m, to_m, back_to_m) = (gap.from_m?, gap.to_m?, gap.back_to_m?);
@@ -294,8 +294,8 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Lines about the effect of smoothing: metres by verdict, and a line for each series of neighbouring sections with the
-/// same change.
+/// Lines about the effect of smoothing: the length with each verdict, and a line for each series of neighbouring
+/// sections with the same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(

@@ -23,8 +23,8 @@ use crate::terminal;
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
 /// Interval between state lines that are overwritten, and between states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
-/// Minimum time after the last state line before a changed lamp colour gives a new line. It applies if lines
-/// can't be overwritten.
+/// Minimum time from a state line to the next one if the lamp's colour changes. It applies if lines can't be
+/// overwritten.
 const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
 /// Kind of output during a dive.

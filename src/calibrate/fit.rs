@@ -1,8 +1,8 @@
 //! Robust least-squares fit of the vehicle's position and the heads' mounts to the design profile.
 //!
-//! The method is Gauss-Newton. Each round is a recursive fit: [`Factors`] start with the prior, then include
-//! one return after the other. If the returns don't determine an unknown, it keeps the vehicle file's value
-//! and uncertainty.
+//! The method is Gauss-Newton. Each round is a recursive fit: [`Factors`] start with the prior, then include one return
+//! after the other. If the returns don't determine an unknown, the unknown keeps the vehicle file's value and
+//! uncertainty.
 
 use crate::calibrate::estimate::median;
 use crate::calibrate::scan::{EchoScan, HeadScan, Return};
@@ -25,7 +25,7 @@ pub(crate) const COMMON: usize = 6;
 /// position, m.
 pub(crate) const OWN: usize = 3;
 
-/// Standard deviation of the prior of the vehicle's position, m: the vehicle may be anywhere in the section.
+/// Standard deviation of the prior of the vehicle's position, m: the vehicle may be anywhere in the cross-section.
 const PLACE_SD_M: f64 = 10.0;
 /// Standard deviation of the roll and pitch errors of an inertial unit at rest, radians.
 ///
@@ -50,8 +50,8 @@ const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
 /// Number of rounds with Huber's weights before those with Tukey's, which need a good start.
 const HUBER_ROUNDS: usize = 3;
-/// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. The second
-/// value is the cost of a piece that the beam grazes or misses.
+/// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. The constant below
+/// it is the cost of a piece that the beam grazes or misses.
 const MOST_COST: f64 = 9.0;
 const MISSED_COST: f64 = 4.5;
 /// Upper limit of the cost that an echosounder's range adds to the fit, in squared standard deviations.

@@ -14,14 +14,14 @@ use headrace_sampling::head::MAX_HEADS;
 const LEAST_OPPOSITE_DEG: f64 = 120.0;
 /// Largest allowed median of the absolute range residuals, m. Above it, the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
-/// An estimate is reported only if its standard deviation is at most this share of the one assumed for the file's
-/// value.
+/// An estimate is reported only if its standard deviation is at most this share of the standard deviation assumed for
+/// the file's value.
 const TOLD: f64 = 0.3;
 /// Minimum cost difference between the two senses of rotation for a decision, in squared standard deviations.
 /// Chance alone exceeds it once in 10,000 times.
 const CLEAR: f64 = 15.0;
-/// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The last value is
-/// the number of rounds of all other fits.
+/// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The last constant
+/// is the number of rounds of all other fits.
 const STARTS: usize = 24;
 const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;
@@ -119,13 +119,13 @@ fn check_evidence(head: &HeadScan) -> Result<(), NotEstimated> {
     Ok(())
 }
 
-/// Reason to report if no head can be calibrated: the one with the longest missing time, or else the first one.
+/// Reason to report if no head can be calibrated: the reason with the longest missing time, or else the first reason.
 fn hardest(refused: &[(&HeadScan, NotEstimated)]) -> Option<NotEstimated> {
     let missing_s = |why: &NotEstimated| match why {
         NotEstimated::PartOfTurn { missing_s, .. } => *missing_s,
         _ => 0.0,
     };
-    // Of equal reasons, `max_by` returns the last one. The reversed order makes that the first.
+    // `max_by` returns the last of several equal reasons. In the reversed list, that is the first reason.
     refused.iter().rev().map(|(_, why)| *why).max_by(|a, b| missing_s(a).total_cmp(&missing_s(b)))
 }
 

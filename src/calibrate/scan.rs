@@ -74,9 +74,10 @@ impl HeadScan {
         self.seen().iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
     }
 
-    /// Total angle of the sectors in which the head has seen wall both there and in the opposite direction, radians.
+    /// Total angle of the directions in which the head has seen wall, and has also seen wall in the opposite direction,
+    /// radians.
     ///
-    /// If only one side is seen, errors that all ranges share shift the estimated position and turn the estimated
+    /// If only one side is seen, an error common to all ranges shifts the estimated position and turns the estimated
     /// angle. With opposite walls these effects cancel.
     pub(crate) fn opposite_rad(&self) -> f64 {
         let seen = self.seen();

@@ -201,7 +201,7 @@ fn write(
         header: &header,
         change: &mut change,
         voices: !args.anonymise,
-        // Alerts and notes contain names of people, so an anonymised log doesn't have the results on this topic.
+        // Alerts and notes contain names of people, so an anonymised log leaves out the topic of alerts and notes.
         results: &|topic| !args.anonymise || !topic.ends_with("/alerts"),
     };
     let mut file = AtomicFile::create(&args.output).map_err(failed)?;

@@ -21,7 +21,8 @@ pub(super) const ARTIST: &str = "screen";
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
 /// Codes that restore the main screen and show the cursor.
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
-/// Another thread checks so many times, at this interval, whether the renderer has released the terminal.
+/// Interval at which another thread checks whether the renderer has released the terminal. Below it, the number of
+/// checks.
 const STEP: Duration = Duration::from_millis(25);
 const STEPS: u32 = 20;
 
@@ -125,7 +126,7 @@ pub(super) fn restore_from_elsewhere() {
         thread::sleep(STEP);
     }
     restore_settings();
-    // If the terminal reads nothing, writing blocks, so the wait for it is limited.
+    // If the terminal reads nothing, writing blocks, so the wait for the writing thread is limited.
     let writing = thread::spawn(restore);
     for _ in 0..STEPS {
         if writing.is_finished() {

@@ -105,7 +105,7 @@ impl Cell {
     }
 }
 
-/// Data about the wall within a frame.
+/// Data about the wall in a frame of the screen.
 pub(super) struct WallNews {
     pub(super) section_m: f64,
     pub(super) count: usize,

@@ -18,11 +18,12 @@ const ROUNDING: f64 = 1e-9;
 pub struct Spacing {
     /// Chainage of the sample, m.
     pub x_m: f64,
-    /// T_x: distance in chainage to the nearest earlier pass. Two values: without and with the end points of series.
+    /// T_x: distance in chainage to the nearest earlier pass. Two values: without and with the end points of series of
+    /// steps.
     pub t_x_m: [Option<f64>; 2],
     /// T_y: distance to the previous sample of the same head.
     pub t_y_m: Option<f64>,
-    /// Spacing T from T_x and T_y. Two values: without and with the end points of series.
+    /// Spacing T from T_x and T_y. Two values: without and with the end points of series of steps.
     pub t_m: [Option<f64>; 2],
 }
 

@@ -1,5 +1,5 @@
-//! Errors of a judging method, in the quantities that decide: the hole, and metres falsely passed, falsely failed, or
-//! not judged.
+//! Errors of a judging method, in the quantities that decide: the hole diameter, and the lengths falsely passed,
+//! falsely failed, or not judged.
 
 use crate::point::{Error, Interval, quantile};
 use headrace_coverage::Verdict;
@@ -16,9 +16,9 @@ pub const END_M: f64 = 2.0;
 pub struct Judged {
     /// Length of the section, m.
     pub length_m: f64,
-    /// D as judged, m; `None` if D is unknown, or only bounded from below.
+    /// Hole diameter D as judged, m; `None` if D is unknown, or only bounded from below.
     pub hole_m: Option<f64>,
-    /// Whether the section is within the target; `None` if undecided.
+    /// Whether the section's hole is within the target; `None` if the verdict is undecided.
     pub passes: Option<bool>,
     /// D_true: the true diameter of the section's largest hole, m.
     pub true_hole_m: f64,

@@ -9,9 +9,9 @@ use crate::spacing::{Spacing, spacing};
 use crate::wilcoxon::{self, Options};
 use crate::{ExperimentError, Progress};
 
-/// Tolerance of T_x relative to the paper's experiment.
+/// Tolerance of the distance T_x between passes, relative to the paper's experiment.
 const T_X_SHARE: f64 = 0.02;
-/// Tolerance of the mean T_y and the mean T relative to the paper's experiment.
+/// Tolerance of the mean ping distance T_y and of the mean T, relative to the paper's experiment.
 const MEAN_SHARE: f64 = 0.03;
 /// Length of each simulated run, m, as in the paper.
 const LENGTH_M: f64 = 130.0;
@@ -28,11 +28,11 @@ pub struct RunRow {
     pub heads: u8,
     /// Whether the heads are in the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
-    /// T_x, m.
+    /// Distance T_x between passes, m.
     pub t_x: Pair,
-    /// T_y: mean, standard deviation, least, largest, m.
+    /// Distance T_y between pings: mean, standard deviation, least, largest, m.
     pub t_y: [Pair; 4],
-    /// T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
+    /// Combined distance T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
     pub t: Option<[Pair; 3]>,
     /// The speed at which the paper's T_x was obtained, m/s.
     pub paper_speed_mps: f64,

@@ -136,7 +136,7 @@ fn ranks_of(sorted: &[f64]) -> Vec<f64> {
     let mut ranks = Vec::with_capacity(sorted.len());
     for tie in sorted.chunk_by(|a, b| a.abs() >= b.abs()) {
         let before = ranks.len();
-        // The shared rank is the mean of the ranks before + 1 to before + length.
+        // The shared rank is the mean of the ranks from `before` + 1 to `before` + the length of the tie.
         let rank = before as f64 + f64::midpoint(tie.len() as f64, 1.0);
         ranks.extend(tie.iter().map(|_| rank));
     }
@@ -154,7 +154,7 @@ fn exact(n: usize, w_plus: f64) -> [f64; 3] {
     [(2.0 * less.min(greater)).min(1.0), greater, less]
 }
 
-/// Number of sign choices for each W+ from 0 to n (n + 1) / 2. Exact: 2^50 is below 2^53.
+/// Number of sign choices for each W+ from 0 to n (n + 1) / 2. The numbers are exact in an f64: 2^50 is below 2^53.
 fn sign_choices(n: usize) -> Vec<f64> {
     let mut counts = vec![0.0; n * (n + 1) / 2 + 1];
     counts[0] = 1.0;

@@ -73,7 +73,7 @@ fn head_that_sees_one_side_only_is_refused() {
     });
 }
 
-/// Section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
+/// Cross-section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
 /// vehicle is in the centre.
 #[test]
 fn symmetric_section_hides_the_sense_of_rotation_without_echosounders_or_at_the_centre() {

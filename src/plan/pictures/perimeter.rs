@@ -31,7 +31,7 @@ struct Around {
     unseen_m: Option<f64>,
 }
 
-/// Draws the spacings along the perimeter: T_y around the wall, T_x along the tunnel, T of both, the target,
+/// Draws the spacings along the perimeter: T_y around the wall, T_x along the tunnel, T computed from both, the target,
 /// and the strips that only some heads see.
 pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;

@@ -12,8 +12,8 @@ use crate::error::TruthError;
 /// Stretches of chainage with at most this half length aren't halved again, m.
 const FINEST_M: f64 = 2e-10;
 
-/// D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and infinite
-/// without samples.
+/// Hole diameter D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and
+/// infinite without samples.
 pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
     let radius_m = |x_m: f64| wall.largest_on(x_m).map_or(f64::INFINITY, |circle| circle.radius_m);
     let mut best_m = radius_m(from_m).max(radius_m(to_m));

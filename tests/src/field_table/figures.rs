@@ -160,8 +160,8 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle centred on a section's boundary belongs to the neighbouring section's hole. To include it
-        // here would count that hole twice.
+        // A circle centred on a section's boundary belongs to the neighbouring section's hole. If the circle counted
+        // here, that hole would count twice.
         let is_own = section
             .report
             .hole_x_m

@@ -15,7 +15,8 @@ const JOIN_M: f64 = 0.5;
 /// A hole up to this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
-/// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of them.
+/// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of these
+/// sets.
 pub type Right = Vec<Vec<Cause>>;
 
 /// A failed section with true and displayed causes.
@@ -105,7 +106,8 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let is_inner = |section: &&SectionRow| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
-    // The target may be changed here: holes don't depend on it. All later reports use it for their verdicts.
+    // The target may be changed here: holes don't depend on it. All later reports use the new target for their
+    // verdicts.
     let all = report(&drawn, &|_| true);
     let without: Vec<Report> = match kinds {
         [_, _] => (0..2).map(|k| report(&drawn, &|other| other != k)).collect(),

@@ -155,8 +155,8 @@ pub(super) fn sectors(figure: &Sectors) -> String {
         measured(&chart, [*from_m, *to_m], figure.line_m, look, (&words, -13.0));
     }
     if let [from_m, _, to_m, ..] = figure.at_line.as_slice() {
-        /// Distance of a dimension line below the wall line on which passes are measured, pixels. It shows the sum of
-        /// two distances.
+        /// Distance of a dimension line below the wall line on which passes are measured, pixels. The dimension shows
+        /// the sum of two distances between passes.
         const BELOW_PX: f64 = 30.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.line_m, BELOW_PX);

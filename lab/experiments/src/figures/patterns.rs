@@ -136,7 +136,7 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
         let turned_rad = f64::from(number * FASTER_STEP_DEG).to_radians();
         let (sine, cosine) = math::sin_cos(if growing { turned_rad } else { -turned_rad });
         let arc_m = match number * FASTER_STEP_DEG % 360 {
-            // The exact value avoids rounding at the seam to either side.
+            // An exact zero can't be rounded to the wrong side of the seam.
             0 => 0.0,
             _ => dive.profile.arc_of([y_m + sine, z_m - cosine]),
         };

@@ -22,14 +22,14 @@ pub struct CombinedRow {
     pub sector_offset: Combined,
 }
 
-/// T of heads in one layout: phase shift or sector offset.
+/// Combined distance T of heads in one layout: phase shift or sector offset.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Combined {
-    /// T for the mean T_y.
+    /// Combined distance T for the mean ping distance T_y.
     pub t_mean_m: CombinedCell,
-    /// T for T_ymin.
+    /// Combined distance T for the least ping distance, T_ymin.
     pub t_min_m: CombinedCell,
-    /// T for T_ymax.
+    /// Combined distance T for the largest ping distance, T_ymax.
     pub t_max_m: CombinedCell,
 }
 

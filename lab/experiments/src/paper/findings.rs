@@ -102,13 +102,13 @@ pub(super) fn floors_m(
     )
 }
 
-/// The step along a flat floor that ends in the corner, m (Eq. 6 with m theta at the corner).
+/// The step along a flat floor that ends in the corner, m (Eq. 6, with the angle m theta at the corner).
 pub(super) fn corner_step_m(place: Place, step_rad: f64) -> f64 {
     let corner = math::atan2(place.aside_m, place.floor_m);
     place.floor_m * (math::tan(corner) - math::tan(corner - step_rad))
 }
 
-/// Note on the differences of the means in Table 3.
+/// Note on why the recomputed means differ from those printed in Table 3.
 pub(super) fn means<'a>(
     mark: char,
     baselines: &Baselines,
@@ -149,7 +149,7 @@ pub(super) fn speed(mark: char, baselines: &Baselines) -> Result<Note, PaperErro
     Ok(Note::new(mark, NoteKind::NewErratum, text))
 }
 
-/// Note on the differences of Table 3's minima.
+/// Note on why the recomputed minima differ from those printed in Table 3.
 pub(super) fn minima_of_one(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let profile = shapes::ceran_blueprint()?;
     let most = floors_m(baselines, Rig::Vita1, |mode| mode != "FASTEST")?;
@@ -168,7 +168,7 @@ pub(super) fn minima_of_one(mark: char, baselines: &Baselines) -> Result<Note, P
     Ok(Note::new(mark, NoteKind::Erratum, text))
 }
 
-/// Note on the differences of Table 4's minima.
+/// Note on why the recomputed minima differ from those printed in Table 4.
 pub(super) fn minima_of_several(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let in_line = floors_m(baselines, Rig::Vita2InLine, |mode| mode != "FASTEST")?;
     let fastest = floors_m(baselines, Rig::Vita2InLine, |mode| mode == "FASTEST")?;
@@ -187,7 +187,7 @@ pub(super) fn minima_of_several(mark: char, baselines: &Baselines) -> Result<Not
     Ok(Note::new(mark, NoteKind::Erratum, text))
 }
 
-/// Note on the differences of Table 3's maxima.
+/// Note on why the recomputed maxima differ from those printed in Table 3.
 pub(super) fn maxima_of_one(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let place = fitting_place(Rig::Vita1);
     let slow_m = corner_step_m(place, baselines.mode("SLOW")?.turn.step_rad());
@@ -201,7 +201,7 @@ pub(super) fn maxima_of_one(mark: char, baselines: &Baselines) -> Result<Note, P
     Ok(Note::new(mark, NoteKind::Finding, text))
 }
 
-/// Note on the differences of Table 4's maxima.
+/// Note on why the recomputed maxima differ from those printed in Table 4.
 pub(super) fn maxima_of_several(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let (in_line, pairs) = (fitting_place(Rig::Vita2InLine), fitting_place(Rig::Vita2Pairs));
     let fast_m = corner_step_m(pairs, baselines.mode("FAST")?.turn.step_rad());

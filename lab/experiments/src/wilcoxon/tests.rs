@@ -107,7 +107,7 @@ fn mean_and_variance_with_ties_and_zeros_match_all_sign_choices() {
 
 #[test]
 fn tie_correction_matches_the_textbook() {
-    // The variance is n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48.
+    // The variance is n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48 over all ties of t values.
     let values = [1.0, 1.0, 1.0, -2.0, 2.0, 4.0, -5.0, 5.0, 5.0, 5.0];
     let test = of_differences(&values, Options::default()).unwrap();
     let variance = 10.0 * 11.0 * 21.0 / 24.0 - (24.0 + 6.0 + 60.0) / 48.0;
