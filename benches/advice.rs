@@ -7,7 +7,7 @@
 //!   at the driven speed;
 //! - planned: each shipped vehicle in each mode at 0.95 of the planned speed.
 //!
-//! D_true comes from `headrace_tests::truth`, which shares nothing with the program's coverage.
+//! The true hole D_true comes from `headrace_tests::truth`, which shares nothing with the program's coverage.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 

@@ -56,7 +56,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let mut claims = Claims::reading(args.page.files(), &args.overwrite);
     claims.claim("--out", &log, Kind::Simulation)?;
     claims.claim("--out", &report_file, Kind::Report)?;
-    // The recorder writes only new logs.
+    // The recorder creates only new logs, so an earlier log is removed.
     outputs::make_way(&log)?;
     let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag()?;

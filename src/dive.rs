@@ -545,7 +545,7 @@ impl Dive {
         let now = self.armed.now();
         self.armed.tick(now);
         // The samples are no longer needed. They are freed before the report is made, since the report of a long dive
-        // takes as much memory as its samples.
+        // takes as much memory as the samples.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         let recordings = core::mem::take(&mut self.recordings);

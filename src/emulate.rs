@@ -208,8 +208,7 @@ impl Rehearsal<'_> {
         Ok(())
     }
 
-    /// Passes bytes from the ports to the simulated devices, and the devices' bytes that are due to the
-    /// ports.
+    /// Passes bytes from the ports to the simulated devices, and bytes of the devices to the ports when they are due.
     fn go_on(&mut self) -> Result<(), Failure> {
         let failed = |source| Failure::System { what: "emulating a device on its port", source };
         wait_for_any(self.stands.iter().filter_map(|stand| stand.port.as_ref()), WAIT_NS);

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Maximum number of differences between two reports that are listed.
+/// Maximum number of differences that are listed for two reports.
 const SHOWN: usize = 20;
 
 /// A golden report, which replays are compared with. It lacks the log's name and hash, the program's version, and

@@ -100,14 +100,14 @@ struct Unheld {
 
 impl Unheld {
     fn start() -> io::Result<Self> {
-        // The channel has no buffer, so a piece is taken only when the previous one has been written.
+        // The channel has no buffer, so a piece of output is taken only when the previous piece has been written.
         let (pieces, queue) = bounded::<Vec<u8>>(0);
         let (ended, done) = bounded(1);
         let write = move || {
             let mut stdout = Waiting::start();
             let result = queue.iter().try_for_each(|piece| stdout.write_all(&piece));
             drop(queue);
-            // The receiver may have stopped waiting for the result.
+            // The receiver may have stopped waiting for the result, so a failed send is ignored.
             ended.send(result.and_then(|()| stdout.flush())).ok();
         };
         thread::Builder::new().name("stdout".to_owned()).spawn(write)?;

@@ -130,7 +130,7 @@ impl One {
         self.health.as_ref().map(RecordingHealth::fails)
     }
 
-    /// Event if the recording has just fallen behind or caught up.
+    /// The event to report if the recording has just fallen behind or caught up.
     fn late(&mut self, unsafe_for: DurNs) -> Option<RecordingEvent> {
         let is_late = unsafe_for >= if self.is_late { SHOWN_FROM } else { ALARM_FROM };
         let has_changed = core::mem::replace(&mut self.is_late, is_late) != is_late;

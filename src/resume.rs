@@ -158,7 +158,7 @@ impl Resuming {
         let next_tick = self.recordings.iter().map(|interrupted| interrupted.recording.next_tick()).max();
         dive.armed.hold(next_tick.unwrap_or(0));
         let files = self.recordings.first().map(|first| first.recording.files.clone()).unwrap_or_default();
-        // States are saved beside one of the recordings.
+        // Saved states are beside one of the recordings only, so all recordings are searched.
         let states = self.recordings.iter().map(|of| SavedState::path(&of.recording.recording));
         let state = states.into_iter().find(|path| path.exists()).unwrap_or_default();
         Ok(Rebuild::start(silent(vehicle)?, files, state)?)

@@ -46,8 +46,8 @@ pub struct Outing {
     pub seed: u64,
     /// Chainage at which the dive starts, m.
     pub start_m: f64,
-    /// Fraction of the planned speed. The heads are in phase for this reduced speed, and the vehicle drives at it
-    /// before the first advice.
+    /// Fraction of the planned speed. The heads are in phase for this reduced speed, and the vehicle drives at this
+    /// speed before the first advice.
     pub planned_share: f64,
 }
 

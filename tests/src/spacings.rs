@@ -1,4 +1,5 @@
-//! Computes T_x, T_y and T of every sample of a dive from their definitions, by comparison with all earlier samples.
+//! Computes the spacings T_x (along the tunnel), T_y (along the wall) and T of every sample of a dive from their
+//! definitions, by comparison with all earlier samples.
 //!
 //! A *pass* over a place on the perimeter is one step of a head. Both pings of the step have a return, and the arc
 //! between them (the shorter way round) contains the place. The chainage of the pass is interpolated linearly on the

@@ -89,7 +89,8 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // The second before the kill is counted from this moment, because the kill takes effect at some time after it.
+    // The second before the kill is counted from this moment, because the kill takes effect at some time after this
+    // moment.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();

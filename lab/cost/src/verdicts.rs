@@ -52,9 +52,10 @@ pub fn inner(dive: &JudgedDive) -> impl Iterator<Item = &JudgedSection> {
 
 /// The errors of a setting, from the sections of each of its dives.
 ///
-/// The errors are the 95th percentile and the median of |D - D_true|; the metres per 100 m falsely passed, falsely
-/// failed and undecided; and the share of sections over the target that pass. Each value is the median over the dives,
-/// with the least and the largest as bounds. A dive without the sections that an error needs is left out.
+/// The errors are the 95th percentile and the median of the hole error |D - D_true|; the metres per 100 m falsely
+/// passed, falsely failed and undecided; and the share of sections over the target that pass. Each value is the median
+/// over the dives, with the least and the largest as bounds. A dive without the sections that an error needs is left
+/// out.
 pub fn errors(dives: &[Vec<Judged>], target_m: f64) -> Vec<Error> {
     let off_m = |dive: &Vec<Judged>| -> Vec<f64> {
         let off = |judged: &Judged| Some((judged.hole_m? - judged.true_hole_m).abs());

@@ -125,7 +125,7 @@ fn pattern_chart_shows_heads_circle_and_hidden_tracks() {
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
-/// In the pattern, no empty circle has a diameter larger than T, and no gap is larger than the drawn one.
+/// In the pattern, no empty circle has a diameter larger than the spacing T, and no gap is larger than the drawn one.
 #[test]
 fn no_empty_circle_is_wider_than_the_spacing_t() {
     let plans = [

@@ -1,4 +1,4 @@
-//! A second computation of D_true, which bounds the error of the first one.
+//! A second computation of the true hole D_true, which bounds the error of the first one.
 //!
 //! It uses no Voronoi vertices. For one chainage at a time, it finds the highest point of the lower envelope of
 //! distances to all samples. If a circle's centre moves, its radius grows by at most that movement. So a stretch of
@@ -30,7 +30,7 @@ pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
     2.0 * best_m
 }
 
-/// Bound on the error of D_true in a dive, m.
+/// Bound on the error of the true holes D_true in a dive, m.
 ///
 /// This bound is the sum of two parts. One is the largest difference between the two computations over stretches of
 /// section length. The other is the error that the arc lengths of two samples may add.

@@ -183,7 +183,7 @@ impl Plan {
         Self { cables, machine, disk, ending, end: BEGIN + LENGTH - DurNs(early as i64) }
     }
 
-    /// The same plan with a terminal that accepts everything or nothing.
+    /// The same plan with a terminal that accepts nothing if `stands` is set, and otherwise everything.
     #[must_use]
     pub fn with_terminal(mut self, stands: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);

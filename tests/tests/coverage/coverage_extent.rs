@@ -60,7 +60,7 @@ fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// Time at which the plane `behind_m` behind the vehicle is half the target past a section's end, seconds after the
+/// Time at which a plane, `behind_m` behind the vehicle, is past a section's end by half the target, seconds after the
 /// start.
 fn left_s(section: &SectionRow, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS

@@ -126,7 +126,7 @@ fn check_imu(path: &Path, wanted: &Wanted) {
         assert!((got.0 - least).abs() < 1e-5 && (got.1 - most).abs() < 1e-5, "{got:?}");
     };
     near(roll, wanted.roll);
-    // Pitch and yaw have the opposite sign of the autopilot's.
+    // headrace's pitch and yaw have the opposite sign of the autopilot's pitch and yaw.
     let reversed = |[least, most]: [f64; 2]| [-most, -least];
     near(pitch, reversed(wanted.pitch));
     near(yaw, reversed(wanted.yaw));

@@ -17,8 +17,8 @@ const TICK: DurNs = DurNs(20_000_000);
 /// Chainage at which dives begin; the second constant is the length of the part that the test evaluates. Both are in m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// Cases whose median hole exceeds this fraction of the predicted T must fail sections at a speed that is a tenth
-/// higher.
+/// Cases whose median hole exceeds this fraction of the predicted spacing T must fail sections at a speed that is a
+/// tenth higher.
 const NEAR: f64 = 0.95;
 /// Number of advice updates at the end of a dive that the test ignores, because the vehicle is stopping.
 const BRAKING: usize = 15;
@@ -156,9 +156,9 @@ struct Followed {
 struct Judged {
     failing: f64,
     passing: f64,
-    /// Predicted T at the driven speed, m; median of all updates.
+    /// Predicted spacing T at the driven speed, m; median of all updates.
     predicted_t_m: f64,
-    /// Ratio of the hole diameter to the predicted T: median and maximum over the sections.
+    /// Ratio of the hole diameter to the predicted spacing T: median and maximum over the sections.
     holes: [f64; 2],
 }
 
@@ -219,8 +219,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
             let settled = &dive.settled()[..dive.settled().len() - BRAKING];
             settled.iter().filter(|beat| beat.advice.will_exceed).count() as f64 / settled.len() as f64
         };
-        // If heads are apart along the hull, T has its minimum at one speed. Rounding of counter and angles can keep
-        // T above the target there.
+        // If heads are apart along the hull, the spacing T has its minimum at one speed. Rounding of counter and angles
+        // can keep T above the target there.
         let met = at.predicted_t_m <= case.target_m;
         within += usize::from(met);
         if met && forecast(&dives[0]) > 0.0 || forecast(&dives[1]) < 1.0 {

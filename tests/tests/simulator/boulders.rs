@@ -22,7 +22,7 @@ fn scene(rest: &str) -> Scene {
     scenes::scene(&format!("{SCENE}{rest}"))
 }
 
-/// Sections of the bare tunnel: chainage of the start, and D, m.
+/// Sections of the bare tunnel: chainage of the start, and hole diameter D, m.
 fn holes() -> Vec<(f64, f64)> {
     let report = scenes::report(&scene(""));
     report.sections.iter().filter_map(|section| Some((section.start_m, section.hole_m?))).collect()

@@ -1,7 +1,7 @@
 //! Holes: the cost of finding the largest hole of a section exactly.
 //!
-//! The exact search is compared with a search with tolerances, with T of the sample lattice, and with counts of empty
-//! cells.
+//! The exact search is compared with a search with tolerances, with the spacing T of the sample lattice, and with
+//! counts of empty cells.
 
 use headrace_coverage::HoleFinder;
 use headrace_monitor::run::Loop;
@@ -51,7 +51,7 @@ enum Setting {
     Exact,
     Tolerance(f64),
     Section(f64),
-    /// T_max of the paper's Eq. 16 for the driven speed.
+    /// Largest spacing T_max of the paper's Eq. 16 for the driven speed.
     Planned,
     /// The largest diagonal of the sample lattice in a section.
     Lattice,
@@ -337,7 +337,7 @@ fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) ->
     verdicts::inner(dive).map(judged).collect()
 }
 
-/// T_max of the paper's Eq. 16 at the driven speed for the configured heads, m.
+/// Largest spacing T_max of the paper's Eq. 16 at the driven speed for the configured heads, m.
 fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     let failed = |why: &str| CostError::Figure { what: "T of the plan".to_owned(), why: why.to_owned() };
     let planner = Planner::new(vehicle.inspection().map_err(|why| failed(&why))?)?;

@@ -30,7 +30,7 @@ pub(crate) struct PhaseShift {
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// T_x of a single head, m.
+    /// Distance T_x between passes of a single head, m.
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,
@@ -55,7 +55,7 @@ pub(crate) struct Sectors {
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// T_x of one continuously turning head, divided by the number of heads, m.
+    /// Distance T_x between passes of one continuously turning head, divided by the number of heads, m.
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,

@@ -68,7 +68,7 @@ pub(crate) struct Panel {
     pub sectors: bool,
     /// Whether the heads' phases are aligned.
     pub aligned: bool,
-    /// T_x of a single head, divided by the number of heads, m.
+    /// Distance T_x between passes of a single head, divided by the number of heads, m.
     pub t_x_m: f64,
     /// Samples of the stretch, in time order for each head.
     pub samples: Vec<Place>,

@@ -14,11 +14,11 @@ use super::{PaperError, STATED_SPEED_MPS};
 pub struct CombinedRow {
     /// The mode's name.
     pub mode: &'static str,
-    /// s, the number of heads.
+    /// Number of heads s.
     pub heads: u8,
-    /// T in phase shift.
+    /// Combined distance T in phase shift.
     pub phase_shift: Combined,
-    /// T in sector offset.
+    /// Combined distance T in sector offset.
     pub sector_offset: Combined,
 }
 
@@ -37,7 +37,7 @@ pub struct Combined {
 /// two pings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CombinedCell {
-    /// Recomputed from the T_x and T_y that Table 4 prints as experimental.
+    /// Recomputed from the distances T_x and T_y that Table 4 prints as experimental.
     pub from_experiment: Cell,
     /// Recomputed from the baseline at [`STATED_SPEED_MPS`].
     pub predicted: Cell,
