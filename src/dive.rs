@@ -47,8 +47,8 @@ const NOTICES: usize = 1 << 10;
 /// Metadata keys of a log. Their values are one moment on two clocks: the log's clock and UTC, both in nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
-/// Metadata keys of a live dive's log: the boot in which it was recorded, and how far the dive's clock was ahead of the
-/// host's clock, ns.
+/// Metadata keys of a live dive's log: the boot in which the log was recorded, and how far the dive's clock was ahead
+/// of the host's clock, ns.
 pub(crate) const BOOT: [&str; 2] = ["boot_id", "clock_ahead_ns"];
 /// Function that is called after every tick.
 type AfterTick<'a> = &'a mut dyn FnMut(&Loop);

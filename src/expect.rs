@@ -12,8 +12,8 @@ use crate::logging::complain;
 /// Maximum number of differences that are listed for two reports.
 const SHOWN: usize = 20;
 
-/// A golden report, which replays are compared with. It lacks the log's name and hash, the program's version, and
-/// the history of ports.
+/// A golden report, which replays are compared with. A golden report lacks the log's name and hash, the program's
+/// version, and the history of ports.
 pub(crate) struct Golden {
     expected: Value,
     allowed: Allowed,

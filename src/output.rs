@@ -92,7 +92,7 @@ fn unread() -> io::Error {
     io::Error::new(io::ErrorKind::TimedOut, "it is not read")
 }
 
-/// Writer to stdout through a separate thread. It blocks no caller for longer than [`UNREAD_FOR`].
+/// Writer to stdout through a separate thread. The writer blocks no caller for longer than [`UNREAD_FOR`].
 struct Unheld {
     pieces: Option<Sender<Vec<u8>>>,
     done: Receiver<io::Result<()>>,

@@ -259,7 +259,7 @@ impl Claimed {
     }
 }
 
-/// Whether two paths lead to the same file, or will do so once it exists.
+/// Whether two paths lead to the same file, or will do so once the file exists.
 ///
 /// Special files such as `/dev/null` have no content to lose, so they don't count.
 fn is_same(one: &Path, other: &Path) -> bool {

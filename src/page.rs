@@ -405,7 +405,7 @@ impl Served {
         None
     }
 
-    /// Opens a browser, if this machine has one and a person can see it.
+    /// Opens a browser, if this machine has one and a person can see the browser.
     pub(crate) fn open(&self) {
         let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"]
             .iter()

@@ -18,7 +18,7 @@ pub(crate) struct RecordingState {
 }
 
 impl RecordingState {
-    /// Text about failing or unsynced recordings, and whether it is an alarm. `None` if all is well.
+    /// Text about failing or unsynced recordings, and whether the text is an alarm. `None` if all is well.
     pub(crate) fn words(&self) -> Option<(String, bool)> {
         let unsafe_for = DurNs::from_secs_f64(self.unsafe_s as f64);
         match self.fails {

@@ -60,7 +60,7 @@ impl Resuming {
         let read = |found: &PathBuf| Unfinished::read(found);
         let mut recordings = found.iter().flatten().map(read).collect::<Result<Vec<_>, _>>()?;
         if recordings.iter().any(Option::is_none) {
-            // Two paths led to the same recording, or another program has just continued one.
+            // Two paths led to the same recording, or another program has just continued a recording.
             return Err(Failure::Usage(format!(
                 "run --resume: {first} can be continued only once at a time; give --record once, or the paths of the recordings"
             )));
@@ -172,7 +172,7 @@ impl Resuming {
 
 /// The recording that `--resume=PATH` names.
 ///
-/// Errors: it can't be continued, or there are several recordings.
+/// Errors: the recording can't be continued, or there are several recordings.
 fn named_recording(args: &Run, named: &Path) -> Result<Unfinished, Failure> {
     let shown = named.display();
     if args.record.len() > 1 || named.is_dir() {

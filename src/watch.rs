@@ -1,6 +1,6 @@
 //! Output during a dive, as lines or as JSON.
 //!
-//! It has the dive's state, and each missed, unsure or cleared stretch once.
+//! The output has the dive's state, and each missed, unsure or cleared stretch once.
 
 use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -19,7 +19,7 @@ use crate::recording_state::RecordingState;
 use crate::screen::Screen;
 use crate::terminal;
 
-/// Interval between state lines if they can't be overwritten.
+/// Interval between state lines if lines can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
 /// Interval between state lines that are overwritten, and between states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);

@@ -48,7 +48,7 @@ const LEAST_SCALE_M: f64 = 0.01;
 /// standard deviations are rejected. Source: the usual constants of Huber and Tukey.
 const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
-/// Number of rounds with Huber's weights before those with Tukey's, which need a good start.
+/// Number of rounds with Huber's weights before the rounds with Tukey's weights, which need a good start.
 const HUBER_ROUNDS: usize = 3;
 /// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. The constant below
 /// it is the cost of a piece that the beam grazes or misses.
@@ -123,7 +123,7 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
 /// Mount of a head that is turned about its axis and moved. The head may also turn the opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
-    // A head that faces the other way has its angles in the opposite sense.
+    // A head that faces the opposite way, such as aft, has its angles in the opposite sense.
     let yaw = if is_mirrored { math::PI } else { 0.0 };
     Mount {
         position: mount.position + Vec3::new(0.0, left_m, up_m),

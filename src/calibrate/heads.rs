@@ -195,7 +195,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
     Ok(Heads { still, place_m: [y, z], scale, median_m, heads })
 }
 
-/// Position of the vehicle, from the echosounders; without them, the centre of the section.
+/// Position of the vehicle, from the echosounders; without them, the centre of the cross-section.
 fn first_place(material: &Material<'_>, scan: &Scan) -> [f64; 2] {
     let start = material.profile.reference();
     let echoes = scan.echoes.iter().map(|echo| Echo { mount: echo.mount, range_m: echo.range_m });
@@ -289,8 +289,8 @@ impl Senses {
     /// Chooses the directions of rotation that fit best, one head at a time. Keeps the directions in the vehicle
     /// file unless others fit clearly better.
     ///
-    /// In a symmetric section, there is a second solution: the vehicle is on the other side, and all heads
-    /// turn the opposite way. This second solution is tried, too.
+    /// In a symmetric cross-section, there is a second solution: the vehicle is on the other side, and all heads turn
+    /// the opposite way. This second solution is tried, too.
     fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
         let count = scan.heads.len();
         let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;

@@ -1,6 +1,6 @@
 //! Finds the longest period in which the vehicle stood still, in steps of one second.
 //!
-//! Attitude, cable, depth and echosounders show whether it moved.
+//! Attitude, cable, depth and echosounders show whether the vehicle moved.
 
 use std::collections::BTreeMap;
 
@@ -16,8 +16,8 @@ use headrace_sensor::reading::{Level, Reading};
 /// Length of a time bin. A source's readings in a bin give one median, so noise and outliers don't count as
 /// motion.
 const BIN: DurNs = DurNs(1_000_000_000);
-/// Minimum length of a time at rest, and the longest part of it that is used, in bins. A longer part adds no
-/// information.
+/// Minimum length of a time at rest, in bins. Below it, the longest part of that time that is used: a longer part adds
+/// no information.
 const LEAST: usize = 3;
 const MOST: usize = 120;
 

@@ -24,7 +24,7 @@ const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
 const CLEAR: f64 = 25.0;
 /// Largest standard deviation at which a time offset is reported, s.
 const TOLD_S: f64 = 0.03;
-/// Amount by which a latency may seem negative before it counts as an inconsistency, s.
+/// Amount by which a latency may seem negative before the latency counts as inconsistent, s.
 const EARLY_S: f64 = 0.01;
 /// Largest share of measurements rejected at the gate at which the filter still follows the vehicle.
 const MOST_GATED: f64 = 0.2;

@@ -61,7 +61,7 @@ fn needs_vehicle(args: &Trim) -> bool {
     args.chainage.is_some() || args.drop_echoes || args.anonymise
 }
 
-/// The vehicle given or attached to the log; `None` if the options don't need it.
+/// The vehicle given or attached to the log; `None` if the options need no vehicle.
 fn vehicle(
     args: &Trim,
     given: Given,

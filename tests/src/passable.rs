@@ -110,8 +110,8 @@ impl Outcome {
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
-    /// Largest constant speed that exceeds the advice seldom enough, m/s. The fraction of updates in which it exceeds
-    /// the advice equals the fraction of sections that may fail.
+    /// Largest constant speed that exceeds the advice seldom enough, m/s. The fraction of updates in which this speed
+    /// exceeds the advice equals the fraction of sections that may fail.
     ///
     /// A swaying vehicle temporarily gets lower advice, which a constant speed can't follow.
     pub fn told_mps(&self) -> f64 {

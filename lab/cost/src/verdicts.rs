@@ -7,7 +7,7 @@ use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
 /// Length that is left out at each end of a dive, in addition to a length equal to the target, m.
 ///
-/// Sections there have neighbours on one side only. The length is that of the hull plus the distance to the
+/// Sections near the ends have neighbours on one side only. The length is that of the hull plus the distance to the
 /// next pass.
 pub const END_M: f64 = 2.0;
 

@@ -195,7 +195,7 @@ fn duration_chart_marks_the_best_mode_and_the_available_time() {
     says(&draw(inspection(VITA_2), FAST, 0.097, day, "hours"), &["required: 20.0 h", "20 h required"]);
 }
 
-/// Checks that the hours and speeds of the table are those of labels and curves, position errors included.
+/// Checks that the hours and speeds of the table equal those in labels and curves, position errors included.
 fn compare(planner: &Planner, target_m: f64, title: &str) {
     let question = Question { target_m: Some(target_m), ..Question::default() };
     let answers = planner.answers(&question, None).unwrap();

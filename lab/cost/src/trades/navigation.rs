@@ -155,7 +155,7 @@ const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }";
 
 /// The field scene with VITA 2 and four heads.
 ///
-/// The vehicle file's slack_sd_m = 0.02 is that of a taut cable.
+/// The vehicle file's slack_sd_m = 0.02 is for a taut cable.
 fn four_heads(field: &str) -> String {
     let four = field.replace("vita1.toml", "vita2-4.toml").replace("\"sonar_0\"", FOUR_HEADS);
     four.replace(SLACK, "tether_slack = { reach_m = 0.03, period_s = 30 }")

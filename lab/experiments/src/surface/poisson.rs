@@ -110,7 +110,7 @@ pub enum PoissonError {
     },
 }
 
-/// A field, and the level at which it defines the surface.
+/// A field, and the field's level on the reconstructed surface.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     grid: Grid,
