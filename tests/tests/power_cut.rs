@@ -1,7 +1,7 @@
 //! `kill -9` at random moments. Every log is readable and loses the last second at most.
 //!
-//! The log contains everything that was displayed more than a second before the kill. Its replay gives the same dive
-//! up to that moment, bit for bit.
+//! The log contains everything that was displayed more than a second before the kill. The log's replay gives the same
+//! dive up to that moment, bit for bit.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

@@ -295,8 +295,8 @@ impl Cell {
         told.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.told_navigation()))
     }
 
-    /// Navigation settings that state the slack of the cable and the noise of the unit, if the pilot knows them in
-    /// this condition.
+    /// Navigation settings that state the slack of the cable and the noise of the unit, if the pilot knows both in this
+    /// condition.
     fn told_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),

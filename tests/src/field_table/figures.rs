@@ -71,7 +71,7 @@ pub struct Figures {
     pub errors: Vec<[f64; 2]>,
     /// Number of measurements that the filter used, and sum of their normalised innovations squared, by kind of sensor.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
-    /// Advised speeds, without those near the ends of dives, m/s.
+    /// Advised speeds, without the speeds near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,
     /// Length of the vehicle's trajectory, and length of the part for which the report has sections, m.
     pub way_m: [f64; 2],

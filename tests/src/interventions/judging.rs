@@ -45,8 +45,8 @@ impl Judged {
         self.right.contains(&self.told)
     }
 
-    /// Whether the only displayed cause is nearly right: it was injected, and without it the hole exceeds the
-    /// target by at most 5 %.
+    /// Whether the only displayed cause is nearly right: the cause was injected, and without the cause the hole exceeds
+    /// the target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)

@@ -1,5 +1,5 @@
 //! A cable counter that gets stuck while the vehicle moves. The fault is reported at once. No section far over the
-//! target passes because of it, with one known exception.
+//! target passes because of the fault, with one known exception.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::time::MonoNs;

@@ -1,4 +1,4 @@
-//! The report accounts for every metre of the dive. The report of a dive without a position states this first.
+//! The report accounts for every metre of the dive. If a dive has no position, its report says so first.
 //!
 //! Each section that the vehicle or its heads have entered is judged or open, even if no head has looked at it.
 
@@ -12,7 +12,7 @@ use headrace_tests::{Folder, SCENE, VEHICLE as SHORT, instrumented};
 use crate::dives::DIVES;
 
 const VEHICLE: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// Distance of VITA 2's heads from its origin, both ahead of it and behind it, m.
+/// Distance of VITA 2's heads from the vehicle's origin, ahead and behind, m.
 const HEAD_M: f64 = 0.551;
 const START_M: f64 = 3.0;
 const SPEED_MPS: f64 = 0.11;

@@ -278,7 +278,7 @@ fn holes_of_small_sample_sets_match_a_dense_grid_search() {
             .fold(0.0, f64::max);
         let exact = wall.largest(0.0, 0.5).unwrap();
         let short_m = exact.radius_m - dense_m;
-        // A point's distance to its nearest sample differs from that of the nearest grid point by no more than the
+        // Between a point and the nearest grid point, the distance to the nearest sample changes by no more than the
         // distance between the two points.
         assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
     }

@@ -1,4 +1,5 @@
-//! Checks that `tests/tests/fuzz/entry_points` lists every file that interprets external bytes, and how it is tested.
+//! Checks that `tests/tests/fuzz/entry_points` lists every file that interprets external bytes, and how the file is
+//! tested.
 
 use std::collections::{BTreeMap, BTreeSet};
 

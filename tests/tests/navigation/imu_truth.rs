@@ -28,7 +28,7 @@ const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const GRAVITY_MPS2: f64 = 9.81;
 const SAMPLE_S: f64 = 0.0105;
-/// Number of samples between updates of the error state. As in the filter, the time between them is about 0.1 s.
+/// Number of samples between updates of the error state. As in the filter, the time between updates is about 0.1 s.
 const EPOCH: usize = 10;
 /// Number of inertial samples per second in the recording.
 const SECOND: usize = 95;

@@ -1,4 +1,5 @@
-//! The advice is right: simulated vehicles that follow it meet the target, and those that are a tenth faster miss it.
+//! The advice is right: simulated vehicles that follow the advice meet the target, and vehicles a tenth faster miss the
+//! target.
 //!
 //! Heads that are apart along the hull start in phase for the advised speed of their mode. They keep their turn times
 //! and start phases when the pilot drives at another speed.
@@ -246,8 +247,8 @@ fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// The vehicle misses sections because it is a third faster than advised. The speed for repeating them must be near the
-/// advised speed, because one screen shows both.
+/// The vehicle misses sections because it is a third faster than advised. The speed for repeating these sections must
+/// be near the advised speed, because one screen shows both speeds.
 #[test]
 fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
@@ -330,7 +331,8 @@ fn advice_compensates_lost_returns() {
                 case.what, as_before.passing
             ));
         }
-        // The speed advised for repeating sections must be near the present speed limit, because one screen shows both.
+        // The speed advised for repeating sections must be near the present speed limit, because one screen shows both
+        // speeds.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!(
                 "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",

@@ -126,8 +126,8 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which the head looks at an angle of the body frame. If the head turns back at this angle, it counts
-    /// once.
+    /// Chainages at which the head looks at an angle of the body frame. If the head turns back at this angle, this pass
+    /// counts once.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();

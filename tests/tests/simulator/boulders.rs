@@ -38,8 +38,8 @@ impl Numbers {
     }
 }
 
-/// Returns the number of hits on each boulder. Boulders are anywhere round the wall, half sunk in it. Their sizes are D
-/// times a random factor from `times`.
+/// Returns the number of hits on each boulder. Boulders are anywhere round the wall, half sunk in it. Their sizes are
+/// the hole diameter D times a random factor from `times`.
 fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usize> {
     let mut numbers = Numbers(seed);
     let perimeter_m = scene("").vehicle.tunnel.profile.perimeter_m();
