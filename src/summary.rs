@@ -14,7 +14,7 @@ use headrace_monitor::report::{
 
 use crate::terminal;
 
-/// Shortest period without data from a sensor that is reported, s.
+/// A sensor's period without data is reported if it is at least this long, s.
 const SILENT_S: f64 = 5.0;
 /// Maximum number of notes that the summary lists.
 const MOST_NOTES: usize = 20;

@@ -58,7 +58,7 @@ const MISSED_COST: f64 = 4.5;
 ///
 /// The limit is high, because echosounders are few and only they distinguish left from right.
 const MOST_ECHO_COST: f64 = 100.0;
-/// Largest change of a head's angle in one round of the fit, radians.
+/// Largest change of a head's angle in one round of the fit, radians. Larger steps are shortened.
 const MOST_STEP_RAD: f64 = 0.2;
 
 /// Input of a fit of the vehicle's position and the heads' mounts.

@@ -10,7 +10,7 @@ use headrace_geometry::frames::{Mount, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Smallest total angle of the sectors in which a head must have seen two opposite walls to be calibrated, degrees.
+/// A head is calibrated only if it has seen two opposite walls over at least this total angle, degrees.
 const LEAST_OPPOSITE_DEG: f64 = 120.0;
 /// Largest allowed median of the absolute range residuals, m. Above it, the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;

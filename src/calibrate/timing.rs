@@ -286,7 +286,8 @@ impl<'a, 'b> Runs<'a, 'b> {
 
 /// Least-squares parabola; `None` if the parabola has no minimum.
 ///
-/// Twice the log-likelihood falls by 1 within one standard deviation, so its second derivative is 2 / sd^2.
+/// Twice the log-likelihood falls by 1 within one standard deviation, so its second derivative is 2 divided by the
+/// variance.
 fn parabola(points: &[(f64, f64)], base: f64) -> Option<Curve> {
     // x is scaled by the farthest point, so that the sums have similar sizes.
     let unit = points.iter().map(|(x, _)| x.abs()).fold(0.0, f64::max);

@@ -19,7 +19,7 @@ const LENGTH_M: f64 = 130.0;
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
                        pilot_drift = { across_m = 0.5, up_m = 0.5, yaw_deg = 5 }\n";
 
-/// A run in Table 3 or 4, with its T from Table 5.
+/// A run in Table 3 or 4, with its combined distance T from Table 5.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunRow {
     /// Name of the heads' mode.
@@ -34,9 +34,9 @@ pub struct RunRow {
     pub t_y: [Pair; 4],
     /// Combined distance T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
     pub t: Option<[Pair; 3]>,
-    /// The speed at which the paper's T_x was obtained, m/s.
+    /// The speed at which the paper's distance T_x between passes was obtained, m/s.
     pub paper_speed_mps: f64,
-    /// The quantities that miss their targets (T_x, mean T_y, mean T), with reasons.
+    /// The quantities that miss their targets (distances T_x, mean T_y, mean T), with reasons.
     pub misses: Vec<String>,
 }
 
@@ -140,7 +140,7 @@ fn row(run: &Measured, layout: HeadLayout, paper: &Spacings, ours: &Spacing, tur
     row
 }
 
-/// The quantities (T_x, mean T_y, mean T) that miss their targets, with reasons.
+/// The quantities (distances T_x, mean T_y, mean T) that miss their targets, with reasons.
 fn misses(row: &RunRow, seconds: f64) -> Vec<String> {
     let mut misses = Vec::new();
     let percent = |pair: &Pair| 100.0 * pair.difference();

@@ -9,7 +9,8 @@ const POINTS: u32 = 200;
 /// Number of halvings of the interval in which a curve begins. The beginning is then known to far less than a pixel.
 const HALVINGS: u32 = 40;
 
-/// Returns a mode's curve up to the spacing `most_m`: T, m, and the largest speed for it, m/s.
+/// Returns a mode's curve up to the spacing `most_m`: pairs of a spacing T, m, and the largest speed that meets it,
+/// m/s.
 ///
 /// The curve begins at the smallest T that any speed meets, and the spacing `marked_m` is one of its points. It is empty
 /// if no speed meets `most_m`.

@@ -105,7 +105,8 @@ pub enum Condition {
     Lively,
     /// The speed of sound in the water is 4 % above the value in the vehicle file.
     WrongSound,
-    /// The mounts of all heads differ by 0.3 degrees (sd) from the vehicle file, which declares this error.
+    /// The mounts of all heads differ by 0.3 degrees (standard deviation) from the vehicle file, which declares this
+    /// error.
     Mounts,
     /// The mount of a head differs by 3 degrees from the vehicle file.
     WrongMount,

@@ -156,7 +156,8 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
 }
 
 /// Swinging finds an undeclared mount error of 3 degrees. Declared mount errors are included in the standard deviation
-/// of D and in the planned speed. `HEADRACE_MOUNT_SEEDS=10` tries all vehicles, with ten dives of each cell.
+/// of the hole diameter D and in the planned speed. `HEADRACE_MOUNT_SEEDS=10` tries all vehicles, with ten dives of
+/// each cell.
 #[test]
 fn no_section_far_over_the_target_passes_with_wrong_mounts() {
     const ALL: [&str; 7] =

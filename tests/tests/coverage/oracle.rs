@@ -337,8 +337,8 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // Ping 20 has no return. So the pings beside this ping's angle have no T_x in the next turn, and T_y of the return
-    // after ping 20 spans the gap.
+    // Ping 20 has no return. So the pings beside this ping's angle have no pass distance T_x in the next turn, and the
+    // ping distance T_y of the return after ping 20 spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

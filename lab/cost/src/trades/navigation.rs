@@ -463,8 +463,9 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
 
 /// Error of the references.
 ///
-/// One comparison is between two computations of D_true. The other is between true places and the readings of a taut
-/// cable. The readings pass through emulator, bytes and decoder, and share only the trajectory with the true places.
+/// One comparison is between two computations of the true hole D_true. The other is between true places and the
+/// readings of a taut cable. The readings pass through emulator, bytes and decoder, and share only the trajectory with
+/// the true places.
 fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostError> {
     let (mut hole_m, mut displacement_m) = (0.0_f64, 0.0_f64);
     for place in places.iter().filter(|place| place.all_knobs) {

@@ -31,9 +31,9 @@ pub struct SeveralHeadsRow {
     pub mode: &'static str,
     /// Number of heads s.
     pub heads: u8,
-    /// Distance between passes in phase shift, T_x / s.
+    /// Distance between passes of s heads in phase shift, T_x / s.
     pub phase_t_x_m: AtBothSpeeds,
-    /// Largest distance between passes in sector offset, 2 T_x / s.
+    /// Largest distance between passes of s heads in sector offset, 2 T_x / s.
     pub sector_t_x_m: AtBothSpeeds,
     /// Mean distance T_y between pings (Eq. 10).
     pub t_y_mean_m: Cell,

@@ -33,8 +33,8 @@ pub struct Combined {
     pub t_max_m: CombinedCell,
 }
 
-/// A printed T beside two recomputed ones. Like the paper, the recomputed values ignore the vehicle's advance between
-/// two pings.
+/// A printed combined distance T beside two recomputed values. Like the paper, the recomputed values ignore the
+/// vehicle's advance between two pings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CombinedCell {
     /// Recomputed from the distances T_x and T_y that Table 4 prints as experimental.
@@ -44,7 +44,7 @@ pub struct CombinedCell {
 }
 
 impl Combined {
-    /// The cells for the mean, least and largest T_y.
+    /// The cells for the mean, least and largest ping distance T_y.
     pub fn cells(&self) -> [CombinedCell; 3] {
         [self.t_mean_m, self.t_min_m, self.t_max_m]
     }
@@ -54,7 +54,7 @@ impl Combined {
 struct Columns {
     layout: HeadLayout,
     t_x: &'static str,
-    /// Columns of T_y in Table 4 and of T in Table 5, for mean, least and largest.
+    /// Columns of the ping distance T_y in Table 4 and of the combined distance T in Table 5: mean, least, largest.
     t_y_and_t: [[&'static str; 2]; 3],
 }
 

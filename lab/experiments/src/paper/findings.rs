@@ -18,7 +18,7 @@ pub(super) struct Place {
     pub(super) aside_m: f64,
 }
 
-/// The position from which Eq. 5 and 6 give a rig's printed T_ymin and T_ymax.
+/// The position from which Eq. 5 and 6 give a rig's printed ping distances T_ymin and T_ymax.
 ///
 /// The positions were found by search. The tests check every printed digit that isn't an erratum.
 pub(super) fn fitting_place(rig: Rig) -> Place {
@@ -29,7 +29,7 @@ pub(super) fn fitting_place(rig: Rig) -> Place {
     }
 }
 
-/// Whether the T_y columns of this row of Table 4 are copied from the row of mode FASTER.
+/// Whether the columns of the ping distance T_y in this row of Table 4 are copied from the row of mode FASTER.
 pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }
@@ -49,7 +49,8 @@ fn of_rows(
     Ok(Interval::common(intervals))
 }
 
-/// Perimeters that give all printed means of Tables 3 and 4, m. A mean is the perimeter divided by n.
+/// Perimeters that give all printed means of Tables 3 and 4, m. A mean is the perimeter divided by the number n of
+/// samples per turn.
 ///
 /// The first interval assumes rounding; the second one also allows truncation.
 pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
@@ -66,8 +67,8 @@ pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], Paper
     Ok([perimeter(super::Printed::rounded_from)?, perimeter(super::Printed::read_from)?])
 }
 
-/// Speeds that give all printed T_x of Table 3 except FAST's, and speeds that give all T_x / s and 2 T_x / s of Table
-/// 4, m/s.
+/// Speeds that give all pass distances T_x printed in Table 3 except FAST's, and speeds that give all T_x / s and 2 T_x
+/// / s of Table 4, m/s.
 pub(super) fn speeds_mps(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let speed = |line: &Line, column, passes: f64| {
         let period_s = baselines.of(line)?.0.turn.period_s();

@@ -178,7 +178,7 @@ fn differing_cells_refer_to_existing_notes() {
         along.into_iter().flatten().chain([r.t_y_mean_m, r.t_y_min_m, r.t_y_max_m])
     });
     for cell in cells.chain(several) {
-        // The printed 2.116 is T_x of mode SLOW with two heads.
+        // The printed 2.116 is the pass distance T_x of mode SLOW with two heads.
         let cut = cell.digits == Digits::Truncated && cell.printed.to_string() == "2.116";
         assert_eq!(cell.note.is_none(), cell.digits.rounded() || cut, "{cell:?}");
         assert!(cell.note.is_none_or(|mark| ('a'..='e').contains(&mark)));
