@@ -1,4 +1,5 @@
-//! Compares the advised speed with the largest speed that truly passes, found by simulated dives. Prints Markdown.
+//! Compares the advised speed with the largest speed at which sections truly pass, found by simulated dives. Prints
+//! Markdown.
 //!
 //! `cargo bench -p headrace_tests --bench advice` runs all parts; `-- truth`, `-- sweep` or `-- planned` runs one part:
 //! - truth: ratio of the advised speed to the largest passing speed, over `--dives N` (100) steady and swaying dives

@@ -29,7 +29,7 @@ pub(crate) trait Follower {
     fn sensor(&mut self, _id: &str, _status: &Status) {}
     /// Called for an event of a recording.
     fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
-    /// Called with the state of the recordings that is to be shown from now on.
+    /// Called with a new state of the recordings, which is shown from now on.
     fn recorded(&mut self, _state: &RecordingState) {}
     /// Called when a replay has paused, jumped or ended. `time` counts from the log's beginning. It may differ from the
     /// time of the loop's state.

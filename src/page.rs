@@ -362,8 +362,8 @@ impl Served {
         Box::new(PageFollower { span, ..self.directing_follower(dive) })
     }
 
-    /// Creates the follower that feeds the page with a replay of the dive that it has shown until now. The
-    /// replay must begin with a jump to the end of the log.
+    /// Creates the follower that feeds the page with a replay of the dive that the page has shown until now. The replay
+    /// must begin with a jump to the end of the log.
     pub(crate) fn replay_follower(&self, dive: &Loop, span: Option<(MonoNs, MonoNs)>) -> Box<dyn Follower> {
         let (now, ignored_stops) = (span.map_or(MonoNs(0), |(_, to)| to), STOPS_TO_END);
         Box::new(PageFollower { span, now, ignored_stops, ..self.directing_follower(dive) })

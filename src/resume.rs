@@ -120,7 +120,7 @@ impl Resuming {
         Ok(Self { gap, recordings: recordings.into_iter().map(stated).collect(), gone: Vec::new() })
     }
 
-    /// Data about the interruption for the dive that goes on.
+    /// Data about the interruption, for the continued dive.
     pub(crate) fn interruption(&self) -> Interruption {
         Interruption {
             gap: self.gap,

@@ -239,7 +239,7 @@ fn off_design(stretch: &WallStretchReport) -> String {
     format!("  {from} to {to}  WALL: {:.2} m {side} the design, up to {:.2} m", mean_m.abs(), most_m.abs())
 }
 
-/// Lines for the vehicle file that declare a suggested opening.
+/// Lines that declare a suggested opening in the vehicle file.
 fn declaration(opening: &SuggestedOpeningReport) -> Vec<String> {
     let SuggestedOpeningReport { name, from_m, to_m, clock_from, clock_to } = opening;
     let place = format!("{} to {}", station(*from_m), station(*to_m));

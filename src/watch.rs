@@ -196,7 +196,7 @@ impl Watch {
         self.shown = None;
     }
 
-    /// Sets the state of the recordings that is to be shown from now on.
+    /// Sets a new state of the recordings, which is shown from now on.
     pub(crate) fn recorded(&mut self, state: &RecordingState) {
         self.show_recorded(RecordingState { rebuilt_pct: self.recorded.rebuilt_pct, ..*state });
     }

@@ -11,7 +11,7 @@ use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
 use headrace_sensor::device::SensorInfo;
 
-/// Longest part of a log whose readings are held in memory, s.
+/// At most this length of a log is processed, because its readings are held in memory, s.
 const MOST_S: f64 = 1200.0;
 
 /// Time window of the readings, in seconds from the log's first message.

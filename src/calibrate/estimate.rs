@@ -74,7 +74,7 @@ pub(crate) enum NotEstimated {
         /// Total angle of the directions in which the head has seen wall, and has also seen wall in the opposite
         /// direction, degrees.
         opposite_deg: f64,
-        /// Smallest total angle of such sectors that is enough, degrees.
+        /// Smallest total angle, seen together with the opposite direction, that is enough, degrees.
         least_deg: f64,
     },
     /// The cross-section looks the same at every angle of the head about its axis.

@@ -120,7 +120,7 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
     }
 }
 
-/// Mount of a head that is turned about its axis and moved. The head may also turn the opposite way.
+/// A mount after its head is turned about the head's axis and moved. The head may also turn the opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
     // A head that faces the opposite way, such as aft, has its angles in the opposite sense.

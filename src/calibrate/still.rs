@@ -183,7 +183,7 @@ fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel>
     raw.into_values().map(channel).collect()
 }
 
-/// Up to three numbers from a reading that show motion. Unused numbers are NaN.
+/// Up to three numbers of a reading, whose changes show motion. Unused numbers are NaN.
 fn shows(
     material: &Material<'_>,
     sensor: &SensorInfo,

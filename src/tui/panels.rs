@@ -134,7 +134,7 @@ fn metres_text(metres: &Metres, columns: usize) -> String {
     let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
         let part = format!(" {part_m:.2} {what},");
-        // Room for the dots that stand for omitted figures is kept.
+        // Room is kept for the dots that stand for omitted figures.
         if text.len() + part.len() + 3 > columns {
             text += " ..";
             break;

@@ -17,10 +17,9 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// Period at the start of a dive that isn't evaluated, s. In this time, the filter learns the biases of the inertial
-/// unit.
+/// This time at the start of a dive isn't evaluated, s. The filter then learns the biases of the inertial unit.
 const SETTLES_S: f64 = 100.0;
-/// Length of the part of a dive that is evaluated, m.
+/// Length of the evaluated part of a dive, m.
 const JUDGED_M: f64 = 8.0;
 /// Fraction of the evaluated sections that must pass, as in a dive at the planned speed. None of them may pass although
 /// its true hole exceeds the target.
@@ -62,7 +61,7 @@ pub struct Outcome {
     pub falsely: usize,
     /// Largest ratio of the true hole diameter D_true to the target T among the evaluated sections.
     pub true_share: f64,
-    /// Advice updates in the part of the dive that is evaluated.
+    /// Advice updates in the evaluated part of the dive.
     pub beats: Vec<AdviceEntry>,
 }
 
@@ -82,12 +81,13 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Speed advised to a vehicle that drives at the planned speed, divided by the largest speed that truly passes.
+    /// Speed advised to a vehicle that drives at the planned speed, divided by the largest speed at which sections
+    /// truly pass.
     pub fn ratio(&self) -> f64 {
         self.over_true(self.advised_mps)
     }
 
-    /// Speed advised to a pilot who follows the advice, divided by the largest speed that truly passes.
+    /// Speed advised to a pilot who follows the advice, divided by the largest speed at which sections truly pass.
     pub fn followed_ratio(&self) -> f64 {
         self.over_true(self.followed.told_mps())
     }

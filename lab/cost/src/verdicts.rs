@@ -1,5 +1,5 @@
-//! Errors of a judging method, in the quantities that decide: the hole diameter, and the lengths falsely passed,
-//! falsely failed, or not judged.
+//! Errors of a judging method, in quantities that matter to a survey: the hole diameter, and the lengths falsely
+//! passed, falsely failed, or not judged.
 
 use crate::point::{Error, Interval, quantile};
 use headrace_coverage::Verdict;

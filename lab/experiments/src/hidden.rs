@@ -20,7 +20,7 @@ pub struct HiddenRow {
     pub heads: u8,
     /// Phase difference between adjacent heads, degrees.
     pub side_by_side_deg: f64,
-    /// Angle of a head's turn that its neighbour occludes, degrees.
+    /// Part of a head's turn in which its neighbour occludes the wall, degrees.
     pub angle_deg: f64,
     /// Arc length of wall that the neighbour occludes from the head, m.
     pub gap_m: f64,

@@ -1,4 +1,4 @@
-//! Parameters of a replay that override those of its log.
+//! Parameters of a replay, which override the parameters in its log.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;

@@ -8,7 +8,7 @@ use crate::random::Random;
 
 /// Time of the simulated clock at which dives start; the machine was switched on some time before.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
-/// Period at the start of a dive in which faults begin, ns.
+/// Faults begin within this time from the start of a dive, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
 /// Duration of a dive. It includes time to recover after the last fault.

@@ -21,7 +21,7 @@ const JUDGED_M: f64 = 10.0;
 /// Cases whose median hole exceeds this fraction of the predicted spacing T must fail sections at a speed that is a
 /// tenth higher.
 const NEAR: f64 = 0.95;
-/// Number of advice updates at the end of a dive that the test ignores, because the vehicle is stopping.
+/// The test ignores this number of advice updates at the end of a dive, because the vehicle is stopping.
 const BRAKING: usize = 15;
 /// Simulator effect: the heading oscillates by 10 degrees, as if a pilot steered.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
@@ -153,7 +153,7 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// Results in the part of a dive that the test evaluates, which excludes the ends.
+/// Results of the evaluated part of a dive, which excludes the ends.
 struct Judged {
     failing: f64,
     passing: f64,

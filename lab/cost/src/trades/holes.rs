@@ -21,7 +21,7 @@ use headrace_oracle::dive::{JudgedDive, JudgedSection, Recorded};
 use headrace_oracle::second;
 use headrace_oracle::timed;
 
-/// Tolerances of the hole search that are compared, m. The value 0.01 is a fiftieth of the target.
+/// Tolerances of the hole search, which the trade compares, m. The value 0.01 is a fiftieth of the target.
 const TOLERANCES_M: [f64; 6] = [1e-4, 1e-3, 0.01, 0.05, 0.2, 1.0];
 const QUICK_TOLERANCES_M: [f64; 2] = [0.05, 0.2];
 /// Edge lengths of the grid cells for the cell-counting method, m.

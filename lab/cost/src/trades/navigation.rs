@@ -37,7 +37,7 @@ const USUAL_HZ: u32 = 100;
 const DECIDES_M: f64 = 0.05;
 /// Resolution of the time at which the vehicle passes a section, s.
 const MOMENT_S: f64 = 0.1;
-/// Length of the part of a dive that is timed, s.
+/// Length of the timed part of a dive, s.
 const TIMED_S: f64 = 15.0;
 /// Difference between the errors of two settings below which the settings count as equal, m.
 const RESOLUTION_M: f64 = 5e-4;
