@@ -17,8 +17,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::{Compared, Outcome, Outing};
 
-/// Allowed ratio of the advised speed to the largest passing speed: at most a tenth too slow, and never too fast. The
-/// limits allow for rounding, because the search for the passing speed uses steps of 2 %.
+/// Smallest allowed ratio of the advised speed to the largest passing speed: a tenth too slow. `MOST` is the largest:
+/// never too fast. Both allow for rounding, because the search for the passing speed uses steps of 2 %.
 const LEAST: f64 = 0.899;
 const MOST: f64 = 1.005;
 

@@ -50,8 +50,8 @@ const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
 /// Number of rounds with Huber's weights before the rounds with Tukey's weights, which need a good start.
 const HUBER_ROUNDS: usize = 3;
-/// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. The constant below
-/// it is the cost of a piece that the beam grazes or misses.
+/// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. `MISSED_COST` is the
+/// cost of a piece that the beam grazes or misses.
 const MOST_COST: f64 = 9.0;
 const MISSED_COST: f64 = 4.5;
 /// Upper limit of the cost that an echosounder's range adds to the fit, in squared standard deviations.

@@ -20,8 +20,8 @@ const TOLD: f64 = 0.3;
 /// Minimum cost difference between the two senses of rotation for a decision, in squared standard deviations.
 /// Chance alone exceeds it once in 10,000 times.
 const CLEAR: f64 = 15.0;
-/// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The last constant
-/// is the number of rounds of all other fits.
+/// Number of starting angles in the search for a head's angle. `START_ROUNDS` is the number of rounds per start,
+/// `START_STRIDE` the stride of the returns, and `ROUNDS` the number of rounds of all other fits.
 const STARTS: usize = 24;
 const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;

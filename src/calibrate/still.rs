@@ -16,7 +16,7 @@ use headrace_sensor::reading::{Level, Reading};
 /// Length of a time bin. A source's readings in a bin give one median, so noise and outliers don't count as
 /// motion.
 const BIN: DurNs = DurNs(1_000_000_000);
-/// Minimum length of a time at rest, in bins. Below it, the longest part of that time that is used: a longer part adds
+/// Minimum length of a time at rest, in bins. `MOST` is the longest part of that time that is used: a longer part adds
 /// no information.
 const LEAST: usize = 3;
 const MOST: usize = 120;

@@ -12,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorKind;
 
-/// Largest time offset tried in either direction, s. Below it, the step of the coarse search, s.
+/// Largest time offset tried in either direction, s. `COARSE_S` is the step of the coarse search.
 const REACH_S: f64 = 0.2;
 const COARSE_S: f64 = 0.1;
 /// Limits of the step between the offsets tried around the best one, s.
@@ -28,7 +28,7 @@ const TOLD_S: f64 = 0.03;
 const EARLY_S: f64 = 0.01;
 /// Largest share of measurements rejected at the gate at which the filter still follows the vehicle.
 const MOST_GATED: f64 = 0.2;
-/// Minimum number of readings of a source. Below it, the longest part of a log that is used: its beginning is enough.
+/// Minimum number of readings of a source. `MOST` is the longest part of a log that is used: its beginning is enough.
 const LEAST_READINGS: usize = 50;
 const MOST: DurNs = DurNs(600_000_000_000);
 

@@ -21,7 +21,7 @@ pub(super) const ARTIST: &str = "screen";
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
 /// Codes that restore the main screen and show the cursor.
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
-/// Interval at which another thread checks whether the renderer has released the terminal. Below it, the number of
+/// Interval at which another thread checks whether the renderer has released the terminal. `STEPS` is the number of
 /// checks.
 const STEP: Duration = Duration::from_millis(25);
 const STEPS: u32 = 20;

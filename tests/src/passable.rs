@@ -26,7 +26,8 @@ const JUDGED_M: f64 = 8.0;
 const PASSING: f64 = 0.95;
 /// One evaluated section out of this many may fail.
 const FAILING: usize = 20;
-/// Speeds tried in the search for the largest passing speed, as multiples of the first speed tried.
+/// Speeds above the first speed tried in the search for the largest passing speed, as multiples of the first speed.
+/// `BELOW` has the speeds below it.
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
 

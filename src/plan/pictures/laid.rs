@@ -19,7 +19,7 @@ pub(super) struct Laid {
     pub(super) pitch_m: f64,
     /// Sample spacing T at the speed of the chart, m; `None` if there is a strip that no head sees.
     pub(super) t_m: Option<f64>,
-    /// Start and end of the stretch that all heads have passed, m.
+    /// Start of the stretch that all heads have passed, m. `to_m` is its end.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
 }

@@ -7,7 +7,7 @@ use super::truth::Truth;
 use super::wall::Wall;
 use crate::error::TruthError;
 
-/// Length of a block, and of the overlap that is searched on either side of the block, m.
+/// Length of a block, m. `BEYOND_M` is the length of the overlap that is searched on either side of the block.
 const BLOCK_M: f64 = 64.0;
 const BEYOND_M: f64 = 32.0;
 /// Longest dive that is handled as a single block, m.

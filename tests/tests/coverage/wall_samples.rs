@@ -72,13 +72,13 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
 /// Returns and sections of a dive in murk, compared with the objects that the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Number of returns from the wall, and how many of them the loop classified as doubtful.
+    /// Number of returns from the wall. The loop classified `met_doubtful` of them as doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Number of returns from objects other than the wall, and how many of them the loop accepted as wall.
+    /// Number of returns from objects other than the wall. The loop accepted `strays_wall` of them as wall.
     strays: usize,
     strays_wall: usize,
-    /// Number of passed sections, and their largest ratio of true hole to target.
+    /// Number of passed sections. `worst` is their largest ratio of true hole to target.
     passed: usize,
     worst: f64,
 }

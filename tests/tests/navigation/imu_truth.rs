@@ -34,8 +34,8 @@ const EPOCH: usize = 10;
 const SECOND: usize = 95;
 /// Usual speed of a hand, m/s. It is the prior for the velocity, which nothing measures.
 const HAND_MPS: f64 = 0.5;
-/// A unit is stationary if rate and force vary by no more than this within a second. The values are a few times the
-/// noise.
+/// A unit is stationary if its rate varies by no more than this within a second, and its force by no more than
+/// `STILL_MPS2`. Both values are a few times the noise.
 const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;

@@ -15,7 +15,7 @@ use headrace_tests::advised::{Advised, dive};
 use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
-/// Chainage at which dives begin; the second constant is the length of the part that the test evaluates. Both are in m.
+/// Chainage at which dives begin, m. `JUDGED_M` is the length of the part that the test evaluates.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
 /// Cases whose median hole exceeds this fraction of the predicted spacing T must fail sections at a speed that is a

@@ -39,7 +39,7 @@ const NS: f64 = 1e9;
 /// Speed of all scenes, m/s.
 const SPEED_MPS: f64 = 0.1;
 
-/// Target of all scenes, m. An error of a tenth of the target can change a decision; a hundredth counts as no
+/// Target of all scenes, m. An error of `DECIDES_M` can change a decision; an error of `NOTHING_M` counts as no
 /// difference.
 const TARGET_M: f64 = 0.5;
 const DECIDES_M: f64 = TARGET_M / 10.0;

@@ -149,7 +149,7 @@ fn places(inputs: &Inputs<'_>) -> Result<Vec<Place>, CostError> {
     Ok(places)
 }
 
-/// The four heads of VITA 2, and the cable slack of the shipped scene.
+/// The four heads of VITA 2. `SLACK` is the cable slack of the shipped scene.
 const FOUR_HEADS: &str = "\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }";
 

@@ -35,7 +35,7 @@ const PLACES: [[f64; 2]; 5] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0
 const WAY_BACK_MPS: f64 = 0.3;
 /// Share of the tunnel that is assumed to be inspected a second time.
 const AGAIN_SHARE: f64 = 0.1;
-/// Length, m, and number of the sections in which both references are compared.
+/// Length of the sections in which both references are compared, m. `STRETCHES` is their number.
 const STRETCH_M: f64 = 0.25;
 const STRETCHES: u32 = 4;
 /// Smallest error claimed for the oracle, m. Both references are computed to this accuracy.

@@ -31,7 +31,7 @@ pub(super) fn chainage_m(info: &SensorInfo, reading: &Reading) -> Option<f64> {
 /// come from the counter's resolution.
 pub(super) struct CableNavigation {
     middle: Yz,
-    /// The last reading, and a reading about [`SPEED_OVER_S`] earlier, each as time and chainage, m.
+    /// The last reading, as time and chainage, m. `before` is a reading about [`SPEED_OVER_S`] earlier.
     last: Option<(MonoNs, f64)>,
     before: Option<(MonoNs, f64)>,
     speed_mps: f64,
