@@ -353,7 +353,8 @@ struct Measured {
     delays: Vec<[Vec<DurNs>; 2]>,
     /// Delays of the driver to the end of the tick, and of the reference to the end of a pass of the empty loop.
     ends: Vec<[Vec<DurNs>; 2]>,
-    /// CPU time of the threads, grouped by name prefix, s.
+    /// CPU time of the threads that serve ports, s. `loop_s` and `bare_s` are the times of the loop and of the bare
+    /// read loops.
     ports_s: f64,
     loop_s: f64,
     bare_s: f64,

@@ -68,7 +68,7 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// The latest state of the recordings that the loop was told: whether one is failing.
+    /// The latest state of the recordings that the loop was told: whether a recording is failing.
     fails: bool,
 }
 

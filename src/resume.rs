@@ -209,7 +209,7 @@ fn unfinished(log: &Path) -> Result<Option<PathBuf>, Failure> {
         return Ok(Some(log.to_owned()));
     }
     let last = Unfinished::last_in(folder, &is_no_live_dive)?;
-    // A dive of another day isn't continued by a service that starts anew.
+    // A service that starts anew doesn't continue a dive of another day.
     Ok(last.filter(|recording| interruption_s(recording).is_none_or(|seconds| seconds < LONGEST_S)))
 }
 

@@ -66,7 +66,7 @@ pub(crate) struct Heads {
     pub(crate) scale: Estimate,
     /// Median of the absolute range residuals, m.
     pub(crate) median_m: f64,
-    /// The heads' estimates, by number of packet source.
+    /// The heads' estimates, in the order of their packet sources.
     pub(crate) heads: Vec<Head>,
 }
 

@@ -59,10 +59,10 @@ pub(crate) struct Still {
     pub(crate) to: MonoNs,
 }
 
-/// Values of one source, by time bin.
+/// Values of one source in each time bin.
 type Raw = (Sign, Vec<Vec<f64>>);
 
-/// Medians of one source's values, by time bin.
+/// Medians of one source's values in each time bin.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,

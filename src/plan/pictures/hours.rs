@@ -20,7 +20,7 @@ const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::
 /// The spacing T that the chart marks, and the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
-    /// Hours for the whole length, by mode.
+    /// Hours for the whole length in each mode.
     hours: Vec<Option<f64>>,
 }
 

@@ -62,14 +62,15 @@ pub struct Figures {
     pub failed_under: u32,
     /// Total inner length, which excludes the ends of dives, m.
     pub inner_m: f64,
-    /// Inner length by verdict, m: passed, failed, can't say, open.
+    /// Inner length with each verdict, m: passed, failed, can't say, open.
     pub verdicts_m: [f64; 4],
     /// Inner length with a true hole D_true within the target, m.
     pub passable_m: f64,
     /// One pair for each inner section with a bounded hole, unless the hole is centred on a boundary of the section:
     /// hole D minus true hole D_true, and the standard deviation of D, m.
     pub errors: Vec<[f64; 2]>,
-    /// Number of measurements that the filter used, and sum of their normalised innovations squared, by kind of sensor.
+    /// For each kind of sensor: number of measurements that the filter used, and sum of their normalised innovations
+    /// squared.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
     /// Advised speeds, without the speeds near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,

@@ -13,8 +13,8 @@ const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
 /// Duration of a dive. It includes time to recover after the last fault.
 const LENGTH: DurNs = DurNs(12_000_000_000);
-/// Longest durations of faults, ns. A delay on a cable is shorter than any silence timeout. A stall of the loop or
-/// recorder is long enough to fill the queues.
+/// Longest delay on a cable, ns. It is shorter than any silence timeout. `LONGEST_STALL_NS` is the longest stall of the
+/// loop or recorder, long enough to fill the queues.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;

@@ -32,7 +32,7 @@ fn silence(sensors: &str, span: &str) -> String {
 
 const ALL: &str = r#""sonar_0", "sonar_1", "sonar_2", "sonar_3""#;
 
-/// Checks that lengths by verdict add up to the coverage extent, and that the list of sections has no gaps.
+/// Checks that the lengths of all verdicts add up to the coverage extent, and that the list of sections has no gaps.
 #[track_caller]
 fn accounted_for(what: &str, report: &Report) {
     let all_m = report.summary.way_m();

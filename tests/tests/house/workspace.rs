@@ -23,7 +23,7 @@ impl Package {
     }
 }
 
-/// The workspace's packages by name.
+/// The workspace's packages. The key is the package's name.
 pub(crate) fn workspace() -> BTreeMap<String, Package> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])

@@ -27,7 +27,8 @@ struct Wanted {
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Number of accelerometer readings (specific force), and number of readings of the first pressure sensor.
+    /// Number of accelerometer readings (specific force). The gyros and the first pressure sensor have as many
+    /// readings.
     forces: usize,
     mean_force_g: f64,
     /// Number of readings of the second pressure sensor.

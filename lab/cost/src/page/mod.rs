@@ -62,7 +62,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// All files by name.
+    /// All files, each with its name and content.
     ///
     /// Errors: a figure that JSON can't represent.
     pub fn files(&self) -> Result<Vec<(String, String)>, serde_json::Error> {

@@ -237,7 +237,7 @@ struct Prepared {
     unique: Vec<(u32, Way)>,
     /// For each distinct setting, the number of simulated seeds and the errors.
     errors: Vec<(u32, Vec<Error>)>,
-    /// Dives of the first seed, by rate of the inertial unit, Hz.
+    /// Dives of the first seed, each with the rate of its inertial unit, Hz.
     first: Vec<(u32, Dived)>,
 }
 

@@ -21,9 +21,9 @@ const SIMULATED: u32 = 6;
 /// Data of Figure 15.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Footprints {
-    /// Footprints of a beam perpendicular to a wall, by the range to the wall, m.
+    /// Footprints of a beam perpendicular to a wall, as functions of the range to the wall, m.
     pub by_range: Vec<Footprint>,
-    /// Footprints on the floor, by the beam's angle from straight down, degrees.
+    /// Footprints on the floor, as functions of the beam's angle from straight down, degrees.
     pub by_angle: Vec<Footprint>,
     /// Height of the head above the floor, m.
     pub height_m: f64,

@@ -19,7 +19,7 @@ pub(crate) struct Deviation {
     pub x_m: f64,
     /// Arc length at which the ray from the reference point through the sample meets the design wall, m.
     pub arc_m: f64,
-    /// Distance of the sample beyond the design wall on that ray, m.
+    /// Distance of the sample beyond the design wall, along the ray from the reference point, m.
     pub deviation_m: f64,
 }
 
