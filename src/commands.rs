@@ -41,8 +41,8 @@ use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
 
-/// Speed of the replay after a demo that ran as fast as possible, relative to real time. At that speed the replay would
-/// end before anyone could watch it.
+/// Speed of the replay after a demo that ran as fast as possible, relative to real time. As fast as the demo, the
+/// replay would end before anyone could watch it.
 const REPLAY_SPEED: f64 = 20.0;
 /// A jump to the end of the log goes to this long after the last packet, so that the end is reached for certain.
 const BEYOND_END: DurNs = DurNs(1_000_000_000);

@@ -1,5 +1,5 @@
-//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and the change in
-//! results without each.
+//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and the change in results without
+//! each effect.
 
 use headrace_replay::effect_influence::{
     EffectInfluence, HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, measure,

@@ -131,7 +131,7 @@ fn dropped(source: &SourceReport) -> Option<String> {
     (count > 0).then_some(line)
 }
 
-/// Text about a sensor's periods without data, if they deserve a line.
+/// Text about a sensor's periods without data, if they are long enough to be reported.
 ///
 /// If a dive has no position or no sonar, another line names the silent sensors.
 fn silence(source: &SourceReport) -> Option<String> {

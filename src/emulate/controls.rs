@@ -30,7 +30,7 @@ pub(super) enum Change {
     /// The device neither hears nor answers.
     Stall,
     Resume,
-    /// The device's data arrive late by this time.
+    /// The device's data arrive late by this duration.
     Delay(DurNs),
     /// The device is switched off and on.
     Restart,

@@ -224,8 +224,8 @@ mod tests {
             written.find(text).unwrap_or_else(|| panic!("{text:?} in {written:?}"))
         };
         let [enter, leave] = [ENTER, LEAVE].map(|bytes| std::str::from_utf8(bytes).unwrap());
-        // If the renderer or the loop panics, the text appears on the main screen, after the switch back to
-        // it.
+        // If the renderer or the loop panics, the text appears on the main screen, after the terminal has switched back
+        // to this screen.
         for thread in [ARTIST, "main"] {
             let (written, same) = written(thread);
             assert!(same, "{thread}: the terminal's settings have changed");

@@ -124,7 +124,7 @@ pub struct Point {
     pub value: String,
     /// The value as a number, if the value is numeric.
     pub number: Option<f64>,
-    /// Whether this is headrace's shipped setting.
+    /// Whether the setting is headrace's shipped one.
     pub is_default: bool,
     /// Scene of the dives. Each scene has its own chart, and points of different scenes are not compared.
     pub scene: String,

@@ -71,9 +71,10 @@ pub struct SignedRankRow {
     pub what: &'static str,
     /// Whether the test is for the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
-    /// Two-sided p of the predictions against the paper's experiments; `None` if all differences are zero.
+    /// Two-sided p value of the test of the predictions against the paper's experiments; `None` if all differences are
+    /// zero.
     pub p_paper: Option<f64>,
-    /// Two-sided p of the predictions against our simulated experiments.
+    /// Two-sided p value of the test of the predictions against our simulated experiments.
     pub p_ours: Option<f64>,
 }
 

@@ -90,7 +90,7 @@ fn across(chart: &Chart<'_>, around: &Around) {
     chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
-/// Text about the plan's spacing T; empty if that is also the largest T in the chart.
+/// Text about the plan's spacing T; empty if this T is also the largest in the chart.
 fn note(shown: &Shown<'_>, around: &Around) -> String {
     let (Some(counted_m), Some(here_m)) = (around.counted_m, around.worst.and_then(|place| place.t_m)) else {
         return String::new();

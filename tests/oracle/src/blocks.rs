@@ -43,8 +43,8 @@ impl Blocks {
             let near = (begins_m - BEYOND_M)..(ends_m + BEYOND_M);
             let places =
                 truth.samples.iter().map(|sample| sample.place).filter(|[x_m, _]| near.contains(x_m));
-            // This never fails: `Wall::new` rejects only coordinates that aren't numbers or are far too large. True
-            // samples have neither fault.
+            // Building the wall never fails here: `Wall::new` rejects only coordinates that aren't numbers or are far
+            // too large. True samples have neither fault.
             Wall::new(places, truth.perimeter_m).unwrap_or_default()
         });
         // A circle with a radius of `BEYOND_M` or more may contain samples beyond this block and its overlap. Such a

@@ -27,7 +27,7 @@ impl HasPosition for Vertex {
     }
 }
 
-/// A circle on the unrolled wall that contains no samples.
+/// An empty circle on the unrolled wall: it contains no samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
     /// Centre of the circle: chainage and arc length, m.

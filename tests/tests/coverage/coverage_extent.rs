@@ -212,7 +212,7 @@ fn verdict_lengths_add_up_in_random_dives() {
     }
 }
 
-/// Short dives out and back that reach beyond a short tunnel and end at any place in a section.
+/// The dives are short, go out and back, reach beyond a short tunnel, and end at any place in a section.
 #[test]
 fn verdict_lengths_add_up_wherever_a_dive_begins_turns_and_ends() {
     let vehicle = SHORT.replace("length_m = 100", "length_m = 8");

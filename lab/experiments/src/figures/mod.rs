@@ -50,7 +50,7 @@ impl Window {
         within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, arc_m: s.arc_m }).collect()
     }
 
-    /// The heads' tracks within the window, and one step beyond it.
+    /// The heads' tracks within the window, and one step beyond the window.
     fn ways(&self, dive: &Dive) -> Vec<Way> {
         let mut ways = Vec::new();
         for samples in &dive.heads {
