@@ -109,8 +109,8 @@ fn worth_in_json(worth: &EffectInfluence) -> Value {
     })
 }
 
-/// Text about the worth of the effects: first the cheapest set of effects that gives nearly the same results, then each
-/// effect, the most expensive first.
+/// Text about the cost of each effect and its influence on the results. First comes the cheapest set of effects that
+/// keeps D and the passed share within their limits. Then comes each effect, the most expensive first.
 fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =
         worth.each.iter().flat_map(|out| &out.effects).filter(|name| !worth.spared.effects.contains(name));

@@ -21,7 +21,7 @@ pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<St
     broken
 }
 
-/// Checks one device: other devices' faults don't affect it, delays lose no frame, and the device runs again after all
+/// Checks one device: other devices' faults don't affect it, delays lose no frame, and it runs again after all
 /// faults.
 fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
