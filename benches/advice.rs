@@ -1,4 +1,5 @@
-//! Compares the advised speed with the largest speed that truly passes, found by simulated dives. Prints Markdown.
+//! Compares the advised speed with the largest speed at which sections truly pass, found by simulated dives. Prints
+//! Markdown.
 //!
 //! `cargo bench -p headrace_tests --bench advice` runs all parts; `-- truth`, `-- sweep` or `-- planned` runs one part:
 //! - truth: ratio of the advised speed to the largest passing speed, over `--dives N` (100) steady and swaying dives
@@ -7,7 +8,7 @@
 //!   at the driven speed;
 //! - planned: each shipped vehicle in each mode at 0.95 of the planned speed.
 //!
-//! D_true comes from `headrace_tests::truth`, which shares nothing with the program's coverage.
+//! The true hole D_true comes from `headrace_tests::truth`, which shares nothing with the program's coverage.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
@@ -16,8 +17,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::{Compared, Outcome, Outing};
 
-/// Allowed ratio of advised to true speed: at most a tenth too slow, and never too fast. The limits allow for
-/// rounding, because the search for the true speed uses steps of 2 %.
+/// Smallest allowed ratio of the advised speed to the largest passing speed: a tenth too slow. `MOST` is the largest:
+/// never too fast. Both allow for rounding, because the search for the passing speed uses steps of 2 %.
 const LEAST: f64 = 0.899;
 const MOST: f64 = 1.005;
 

@@ -320,7 +320,7 @@ impl Ends {
         self.twin.as_ref().map_or_else(|| self.ours.connect().clone(), |twin| twin.connect().clone())
     }
 
-    /// Writes a message to both ports and alternates which one is first.
+    /// Writes a message to both ports and alternates which port is first.
     fn write(&mut self, bytes: &[u8], ours_first: bool) {
         let [ours, twin] = &self.courses;
         let write = |stand: &mut EmulatedPort, courses: &[&Course]| {
@@ -353,7 +353,8 @@ struct Measured {
     delays: Vec<[Vec<DurNs>; 2]>,
     /// Delays of the driver to the end of the tick, and of the reference to the end of a pass of the empty loop.
     ends: Vec<[Vec<DurNs>; 2]>,
-    /// CPU time of the threads, grouped by name prefix, s.
+    /// CPU time of the threads that serve ports, s. `loop_s` and `bare_s` are the times of the loop and of the bare
+    /// read loops.
     ports_s: f64,
     loop_s: f64,
     bare_s: f64,
@@ -442,7 +443,7 @@ fn run_s(beginning: &str) -> f64 {
     tasks.flatten().map(of).sum()
 }
 
-/// Emulates the devices: passes requests of hosts to the simulation, and its messages to both ports.
+/// Emulates the devices: passes requests of hosts to the simulation, and the simulation's messages to both ports.
 fn emulate(mut simulation: Simulation, mut ends: Vec<Ends>, ending: &AtomicBool) {
     let origin = now();
     let mut is_ours_first = false;

@@ -54,8 +54,8 @@ impl Framing for Lines {
 
 /// Decodes bytes to readings; the receive time of a line is that of its first byte.
 ///
-/// The saved state includes a partial line, so that a dive can be restored in the middle of a line. It excludes
-/// settings.
+/// The saved state includes a partial line, so that a dive can be restored in the middle of a line. The saved state
+/// excludes settings.
 struct LineDecoder {
     codec: Framed<Lines, LONGEST_LINE>,
     clock: LineClock,

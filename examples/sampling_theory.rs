@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Mode FAST: steps of 0.9 degrees, 8 s per turn.
     let fast = Turn::new(0.9_f64.to_radians(), 8.0)?;
 
-    // The vehicle's position is halfway between floor and crown, and it looks along the tunnel.
+    // The vehicle's position is halfway between floor and crown, and the vehicle looks along the tunnel.
     let at = |z_m| {
         let pose = Pose { position: Point3::new(0.0, 0.0, z_m), attitude: Rot::identity() };
         Standing::new(&tunnel, &pose, &Mount { position: Vec3::zero(), rotation: Rot::identity() })

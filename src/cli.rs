@@ -28,7 +28,7 @@ pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use value_parsers::{Speed, speed, time};
 
-/// Value of `run --resume` without a path.
+/// Value of the option `--resume` of `run` if no path is given.
 pub(crate) const LAST: &str = "last";
 /// Commands of `replay --interactive`.
 pub(crate) const COMMANDS: &str =
@@ -603,7 +603,7 @@ pub(crate) struct Output {
 /// Path of a report. Its extension is .json or none; pipes and devices may have any name.
 fn report_path(path: PathBuf) -> Result<PathBuf, String> {
     let is_json = path.extension().is_none_or(|name| name.is_empty() || name.eq_ignore_ascii_case("json"));
-    // The reader of a pipe or device knows its format, whatever its name is.
+    // A pipe or device may have any name, since its reader knows the format.
     let is_special = || path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir());
     if is_json || is_special() {
         return Ok(path);

@@ -41,10 +41,10 @@ use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
 
-/// Speed of the replay after a demo that ran as fast as possible, relative to real time. At the demo's speed there
-/// would be nothing to see.
+/// Speed of the replay after a demo that ran as fast as possible, relative to real time. As fast as the demo, the
+/// replay would end before anyone could watch it.
 const REPLAY_SPEED: f64 = 20.0;
-/// Time from the last packet to the target of a jump that must reach the end of the log.
+/// A jump to the end of the log goes to this long after the last packet, so that the end is reached for certain.
 const BEYOND_END: DurNs = DurNs(1_000_000_000);
 
 /// Runs `headrace demo`.
@@ -56,7 +56,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let mut claims = Claims::reading(args.page.files(), &args.overwrite);
     claims.claim("--out", &log, Kind::Simulation)?;
     claims.claim("--out", &report_file, Kind::Report)?;
-    // The recorder writes only new logs.
+    // The recorder creates only new logs, so an earlier log is removed.
     outputs::make_way(&log)?;
     let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag()?;
@@ -99,7 +99,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     if let Some(served) = served.filter(|_| is_replayed && !is_interrupted)
         && let Err(error) = replay_demo(args, &scene, &served, &interrupted)
     {
-        // The dive itself was complete, so the exit code stays.
+        // The dive itself was complete, so the exit code stays that of the dive.
         complain(&format!("headrace: the page can't replay {}: {error}", log.display()));
     }
     Ok(exit_code(&report))
@@ -325,7 +325,7 @@ fn claim_report(output: &Output, claims: &mut Claims) -> Result<(), Failure> {
     output.report.as_ref().map_or(Ok(()), |report| claims.claim("--report", report, Kind::Report))
 }
 
-/// Checks that a replay's outputs can be written. The golden report is read, or with --bless written.
+/// Checks that a replay's outputs can be written. The golden report is an input, or with --bless an output.
 fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(), Failure> {
     let read = args.expect.iter().filter(|_| !args.bless);
     let inputs = logs.iter().chain(&given.files).chain(read).cloned().chain(args.page.files());
@@ -335,8 +335,8 @@ fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(),
     blessed.map_or(Ok(()), |golden| claims.claim("--expect", golden, Kind::Report))
 }
 
-/// Overrides the vehicle's settings by the options. The first of several targets or section lengths is the
-/// dive's own.
+/// Overrides settings of the vehicle file by the options. Of several targets or section lengths, the dive itself has
+/// the first. `other_targets` judges the others.
 fn set(args: &Replay, vehicle: &mut VehicleConfig) {
     vehicle.target.max_hole_m = args.target.first().copied().unwrap_or(vehicle.target.max_hole_m);
     vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);

@@ -40,15 +40,15 @@ use crate::watch::Watch;
 
 /// Capacity of the queue of notices to the terminal.
 ///
-/// A tick of 20 ms has only a few notices. A slot takes about 400 bytes, allocated at arming.
+/// A tick of 20 ms has only a few notices. A place in the queue takes about 400 bytes, allocated when the loop is
+/// armed.
 const NOTICES: usize = 1 << 10;
 
-/// Metadata keys of a log. The two values state the same moment on the log's clock and in UTC, in
-/// nanoseconds.
+/// Metadata keys of a log. Their values are one moment on two clocks: the log's clock and UTC, both in nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
-/// Metadata keys of a live dive's log: the boot in which it was recorded, and how far the dive's clock was ahead of the
-/// host's clock, ns.
+/// Metadata keys of a live dive's log: the boot in which the log was recorded, and how far the dive's clock was ahead
+/// of the host's clock, ns.
 pub(crate) const BOOT: [&str; 2] = ["boot_id", "clock_ahead_ns"];
 /// Function that is called after every tick.
 type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
@@ -68,7 +68,7 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Whether a recording is failing, as the loop was told most recently.
+    /// The latest state of the recordings that the loop was told: whether a recording is failing.
     fails: bool,
 }
 
@@ -541,11 +541,11 @@ impl Dive {
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
         watch.end(&self.armed);
         beside(&self.armed);
-        // This tick writes the last sections' verdicts to the recording.
+        // This tick sends the verdicts of the dive's last sections to the recording.
         let now = self.armed.now();
         self.armed.tick(now);
-        // The samples are no longer needed. They are freed now, because the report of a long dive takes as
-        // much memory.
+        // The samples are no longer needed. They are freed before the report is made, since the report of a long dive
+        // takes as much memory as the samples.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         let recordings = core::mem::take(&mut self.recordings);
@@ -569,8 +569,8 @@ impl Operator {
         }
     }
 
-    /// Tells the loop whether a recording is failing, so that other recordings and later parts of the same
-    /// one state it.
+    /// Tells the loop whether a recording is failing. The other recordings, and later parts of the failing one, then
+    /// state it.
     fn recording(&mut self, fails: bool) {
         if core::mem::replace(&mut self.fails, fails) == fails {
             return;

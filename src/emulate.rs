@@ -92,8 +92,8 @@ fn holds(path: &Path, content: &str) -> bool {
     std::fs::read(path).is_ok_and(|there| there == content.as_bytes())
 }
 
-/// Opens a port for each sensor. The port's carrier is that of `connect`, or UDP if this machine doesn't have
-/// that carrier.
+/// Opens a port for each sensor. The port has the carrier (serial, TCP, CAN, ...) that `connect` names, or UDP if this
+/// machine lacks that carrier.
 fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
     let mut stands = Vec::new();
     for ((id, asked), device) in connections(&scene.vehicle).into_iter().zip(&scene.vehicle.sensors) {
@@ -208,8 +208,7 @@ impl Rehearsal<'_> {
         Ok(())
     }
 
-    /// Passes bytes from the ports to the simulated devices, and the devices' bytes that are due to the
-    /// ports.
+    /// Passes bytes from the ports to the simulated devices, and bytes of the devices to the ports when they are due.
     fn go_on(&mut self) -> Result<(), Failure> {
         let failed = |source| Failure::System { what: "emulating a device on its port", source };
         wait_for_any(self.stands.iter().filter_map(|stand| stand.port.as_ref()), WAIT_NS);
@@ -234,7 +233,7 @@ impl Rehearsal<'_> {
         Ok(())
     }
 
-    /// Switches on the restarted devices whose time has come, with the state of a device that was just switched on.
+    /// Switches on the restarted devices whose time without power is over. A device then has the state of power-on.
     fn switch_on(&mut self) {
         let now = self.now();
         for (number, stand) in self.stands.iter_mut().enumerate() {
@@ -347,7 +346,7 @@ fn tell(id: &str, told: &str) {
     say(&format!("{id:<12} {told}"));
 }
 
-/// The delay that the key selects after `delay`.
+/// The delay that comes after `delay` when the key is pressed once more.
 fn next_delay(delay: DurNs) -> DurNs {
     DELAYS.into_iter().find(|next| *next > delay).unwrap_or(DurNs(0))
 }

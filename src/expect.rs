@@ -9,11 +9,11 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Maximum number of differences between two reports that are listed.
+/// Maximum number of differences that are listed for two reports.
 const SHOWN: usize = 20;
 
-/// A golden report, which replays are compared with. It lacks the log's name and hash, the program's version, and
-/// the history of ports.
+/// A golden report, which replays are compared with. A golden report lacks the log's name and hash, the program's
+/// version, and the history of ports.
 pub(crate) struct Golden {
     expected: Value,
     allowed: Allowed,
@@ -128,7 +128,7 @@ fn without_log(report: &Report) -> Result<Value, Failure> {
     Ok(value)
 }
 
-/// Removes the log and the ports, since a replay has no ports.
+/// Removes the log and the ports from a report. A replay has no ports to compare.
 fn drop_log(report: &mut Value) {
     if let Some(object) = report.as_object_mut() {
         object.insert("log".to_owned(), Value::Null);

@@ -1,5 +1,5 @@
-//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and the change in
-//! results without each.
+//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and the change in results without
+//! each effect.
 
 use headrace_replay::effect_influence::{
     EffectInfluence, HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, measure,
@@ -27,7 +27,7 @@ pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure>
 
 /// Lists a scene's systems, components and random streams, and the used and unused effects.
 ///
-/// Adds the worth of the effects if it was measured.
+/// Adds the worth (influence and cost) of each effect if it was measured.
 pub(crate) fn explain(scene: &Scene, worth: Option<&EffectInfluence>, as_json: bool) -> Result<u8, Failure> {
     let simulation = Simulation::new(scene)?;
     if as_json {

@@ -76,7 +76,7 @@ fn voices(files: &[PathBuf], report: &Report) -> Result<(Vec<Voice>, u64), Failu
     // Without voice notes, as in most dives, the log needn't be read again.
     if report.notes.iter().any(|note| note.voice.is_some()) {
         each_voice(files, |voice| {
-            // A voice note's recording may be in the log twice, because a page without an answer sends it
+            // A voice note's recording may be in the log twice, because a page that gets no answer sends the recording
             // again.
             if voices.iter().any(|other| other.id == voice.id) {
                 return Ok::<_, Failure>(());

@@ -1,5 +1,5 @@
-//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs neither an SQL
-//! engine nor oracles.
+//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs neither an SQL engine nor
+//! the reference computations of `headrace cost`.
 
 use std::ffi::OsStr;
 use std::io::ErrorKind;
@@ -9,7 +9,7 @@ use std::process::Command;
 use crate::cli::ExternalArguments;
 use crate::failure::{self, Failure};
 
-/// A program of `lab/`, and the package that contains it.
+/// A program of `lab/`, and the package that contains the program.
 pub(crate) struct Program {
     name: &'static str,
     package: &'static str,
@@ -22,10 +22,11 @@ pub(crate) const COST: Program = Program { name: "headrace-cost", package: "head
 
 /// Runs a program of `lab/` with `arguments` after `first`, and returns its exit code.
 ///
-/// The program is searched for next to this one, where `lab/` of the same clone builds it, and then on PATH.
+/// The program is searched for in three places: next to this one, in the build folder of `lab/` in the same clone, and
+/// on PATH.
 ///
-/// Errors: there is no such program, or it can't be started. If there is none, the text has the command that
-/// builds it.
+/// Errors: there is no such program, or it can't be started. If there is no such program, the error names the command
+/// that builds it.
 pub(crate) fn run(program: &Program, first: Option<&str>, args: &ExternalArguments) -> Result<u8, Failure> {
     let Program { name, package } = program;
     let own = std::env::current_exe().ok();

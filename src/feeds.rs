@@ -52,7 +52,7 @@ impl PacketSource for Followed<'_> {
     }
 }
 
-/// Share of a time span that has passed, 0 to 1; `None` without a span.
+/// Passed share of a time span, 0 to 1; `None` without a span.
 pub(crate) fn share(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> Option<f64> {
     let (from, to) = span?;
     let whole_s = to.since(from).as_secs_f64();

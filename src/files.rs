@@ -1,4 +1,4 @@
-//! Reads and writes files, and loads built-in and attached ones.
+//! Reads and writes files, and loads built-in and attached files.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -22,7 +22,7 @@ pub(crate) fn first_named(logs: &[PathBuf]) -> &Path {
     logs.first().map_or(Path::new(""), PathBuf::as_path)
 }
 
-/// Maximum size of a vehicle file, scene or mapping file, and of a text file named in one of them, bytes.
+/// Maximum size of a vehicle file, scene or mapping file, and of a text file named in such a file, bytes.
 const TEXT_BYTES: u64 = 16 << 20;
 /// Maximum size of a report, and of a mesh or trajectory that a scene names, bytes.
 const DATA_BYTES: u64 = 256 << 20;

@@ -17,7 +17,7 @@ pub(crate) trait Follower {
     /// Called before each call of [`notice`](Self::notice), [`tick`](Self::tick) and [`end`](Self::end), with
     /// the live messages that the result, the tick or the end of the dive causes.
     fn messages(&mut self, _told: &[LiveMessage], _dive: &Loop) {}
-    /// Called for each result of the last tick.
+    /// Called for each result of the latest tick.
     fn notice(&mut self, _notice: &Notice, _dive: &Loop) {}
     /// Called after every tick, even without packets.
     fn tick(&mut self, dive: &Loop);
@@ -29,10 +29,10 @@ pub(crate) trait Follower {
     fn sensor(&mut self, _id: &str, _status: &Status) {}
     /// Called for an event of a recording.
     fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
-    /// Called with the state of the recordings that is to be shown from now on.
+    /// Called with a new state of the recordings, which is shown from now on.
     fn recorded(&mut self, _state: &RecordingState) {}
-    /// Called when a replay has paused, jumped or ended. `time` counts from the log's beginning. The loop may hold the
-    /// state of another time.
+    /// Called when a replay has paused, jumped or ended. `time` counts from the log's beginning. It may differ from the
+    /// time of the loop's state.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
     /// Called when the state of an interrupted dive has been rebuilt from its log.
     fn rebuilt(&mut self, _dive: &Loop) {}

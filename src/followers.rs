@@ -14,7 +14,7 @@ use crate::mavlink_out::MavlinkOut;
 use crate::tui::{Mode, Start, Tui};
 use crate::watch::{Show, Watch};
 
-/// Followers of a dive that the command line requests.
+/// Followers that the command line requests for a dive.
 pub(crate) struct Followers {
     tui: bool,
     /// Address that receives MAVLink, and MAVLink system id of the vehicle.

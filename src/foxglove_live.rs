@@ -137,7 +137,7 @@ impl Foxglove {
     }
 }
 
-/// Channels of the viewers, by number of the result channel.
+/// Channels for viewers. The index is the number of the result channel.
 fn channels(context: &Arc<Context>) -> Result<Vec<Option<Arc<RawChannel>>>, foxglove::FoxgloveError> {
     let channel = |channel: headrace_replay::log::ResultChannel| {
         if channel.schema.is_empty() {

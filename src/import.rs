@@ -201,7 +201,7 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
 
 /// Kind of a file by its extension.
 ///
-/// Dataflash logs of autopilots have the same extension as Ping Viewer's logs. They are refused before any
+/// Dataflash logs of autopilots have the same extension as Ping Viewer's logs. Dataflash logs are refused before any
 /// other check.
 fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     let kind = FileKind::of(path);
@@ -219,7 +219,8 @@ fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     )
 }
 
-/// Error for a file that can't be imported. The text names the kind that the file seems to be, if it differs.
+/// Error for a file that can't be imported. The text names the kind that the file seems to be, if this isn't the
+/// expected kind.
 fn unusable(path: &Path, error: ImportError) -> Failure {
     match error {
         ImportError::Nothing { .. }

@@ -33,7 +33,7 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// Counts a request to end the program that comes now.
+    /// Counts a request to end the program that arrives now. Returns whether it is the second request.
     #[expect(clippy::disallowed_methods, reason = "how long somebody waits to ask again is wall time")]
     pub(crate) fn is_second_now(&mut self) -> bool {
         self.is_second(Instant::now())
@@ -52,8 +52,8 @@ impl Requests {
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     on(SIGHUP, &flag)?;
-    // Without a handler of SIGXFSZ, a write beyond the limit of file sizes would end a recording from a log
-    // or a simulation.
+    // Without a handler of SIGXFSZ, a write beyond the limit of file sizes would end the program. This also holds for a
+    // dive from a log or a simulation.
     on(SIGXFSZ, &Arc::default())?;
     Ok(flag)
 }

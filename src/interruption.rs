@@ -22,14 +22,14 @@ pub(crate) struct Interruption {
 }
 
 impl Interruption {
-    /// Share of the interrupted dive's log that comes before `at`, percent.
+    /// Part of the interrupted dive's log before the time `at`, percent.
     pub(crate) fn read_pct(&self, at: MonoNs) -> u8 {
         let share = share(self.span, at).unwrap_or(0.0);
         headrace_geometry::math::floor_to_i64(share * 100.0).try_into().unwrap_or(0)
     }
 }
 
-/// The parts of a dive that were recorded before it was interrupted.
+/// The parts of a dive that were recorded before the dive was interrupted.
 #[derive(Default)]
 pub(crate) struct Earlier {
     pub(crate) files: Vec<PartFile>,

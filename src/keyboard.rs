@@ -13,7 +13,7 @@ use rustix::termios::{
 use crate::failure::Failure;
 use crate::interrupt;
 
-/// Byte of Ctrl-C. The reader also gets it if standard input is closed, or the program is to end.
+/// Byte of Ctrl-C. The reader of keys also gets this byte if standard input is closed, or if the program is to end.
 pub(crate) const INTERRUPT: u8 = 0x03;
 /// Longest wait for a key, so that the end of the program is noticed.
 const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };

@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag_of_a_dive()?;
-    // The time of --for begins when the dive has begun, or goes on.
+    // The duration in --for counts from the time at which the dive begins or goes on.
     let until = Cell::new(None);
     let show = followers.show(args.output.show());
     let mut watch = Watch::new(show).live();

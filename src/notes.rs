@@ -42,8 +42,7 @@ pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
 
 /// File names for the recordings of voice notes, by the recording's id.
 ///
-/// A file is named after its note's number. If no note has the recording, it is named after the recording's
-/// id.
+/// A file is named after its note's number. If no note has the recording, the file is named after the recording's id.
 fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     let name = |(id, (_, container, _)): (&u32, &(u32, Container, usize))| {
         let is_it = |note: &&NoteJson| note.voice.as_ref().is_some_and(|voice| voice.id == *id);

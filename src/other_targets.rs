@@ -19,7 +19,7 @@ use crate::watch::Watch;
 /// Judges the dive for each combination of the requested targets and section lengths. Returns nothing if
 /// there is only one combination.
 ///
-/// The counted passes and the times at which sections are flagged depend on the target. Each combination is
+/// The passes that count, and the times at which sections are flagged, depend on the target. Each combination is
 /// therefore replayed, except the one that was played already.
 pub(crate) fn reports(
     args: &Replay,

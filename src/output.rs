@@ -17,10 +17,10 @@ use crate::terminal;
 
 /// Longest time for which a live dive waits for a reader of stdout.
 pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
-/// Length of one write, bytes. Any active reader takes this many within [`UNREAD_FOR`].
+/// Length of one write, bytes. Any active reader takes this many bytes within [`UNREAD_FOR`].
 const PIECE: usize = 1 << 10;
 
-/// Whether stdout has been given up. If so, nothing more is written to it.
+/// Whether stdout has been given up. Nothing is written to stdout after that.
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 /// Whether stdout is given up if nobody reads it.
 static NEVER_WAITS: AtomicBool = AtomicBool::new(false);
@@ -92,7 +92,7 @@ fn unread() -> io::Error {
     io::Error::new(io::ErrorKind::TimedOut, "it is not read")
 }
 
-/// Writer to stdout through a separate thread. It blocks no caller for longer than [`UNREAD_FOR`].
+/// Writer to stdout through a separate thread. The writer blocks no caller for longer than [`UNREAD_FOR`].
 struct Unheld {
     pieces: Option<Sender<Vec<u8>>>,
     done: Receiver<io::Result<()>>,
@@ -100,14 +100,14 @@ struct Unheld {
 
 impl Unheld {
     fn start() -> io::Result<Self> {
-        // The channel has no buffer, so a piece is taken only when the previous one has been written.
+        // The channel has no buffer, so a piece of output is taken only when the previous piece has been written.
         let (pieces, queue) = bounded::<Vec<u8>>(0);
         let (ended, done) = bounded(1);
         let write = move || {
             let mut stdout = Waiting::start();
             let result = queue.iter().try_for_each(|piece| stdout.write_all(&piece));
             drop(queue);
-            // The receiver may have stopped waiting for the result.
+            // The receiver may have stopped waiting for the result, so a failed send is ignored.
             ended.send(result.and_then(|()| stdout.flush())).ok();
         };
         thread::Builder::new().name("stdout".to_owned()).spawn(write)?;
@@ -161,7 +161,7 @@ pub(crate) fn put_waiting(text: &str) {
     }
 }
 
-/// Writes `text` unchanged. It consists of lines that are already printable and of codes for the terminal.
+/// Writes `text` unchanged. The text consists of lines that are already printable and of codes for the terminal.
 ///
 /// Errors are only logged and remembered (see [`lost`]). A closed pipe or a lost session doesn't end a dive.
 /// Nothing is written after stdout has been given up.
@@ -190,7 +190,7 @@ fn note(error: io::Error) {
     }
 }
 
-/// First error through which output was lost; `None` if none was.
+/// First error through which output was lost; `None` if no output was lost.
 pub(crate) fn lost() -> Option<String> {
     LOST.get().map(|error| format!("writing standard output: {error}"))
 }

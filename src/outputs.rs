@@ -101,7 +101,7 @@ fn begins(path: &Path, mark: &str) -> bool {
     begin(path).is_some_and(|text| text.starts_with(mark))
 }
 
-/// Whether a file ends with this mark. The file may have any size.
+/// Whether a file ends with the text `mark`. The file may have any size.
 fn ends(path: &Path, mark: &str) -> bool {
     let end = || {
         let mut file = std::fs::File::open(path)?;
@@ -259,7 +259,7 @@ impl Claimed {
     }
 }
 
-/// Whether two paths lead to the same file, or will do so once it exists.
+/// Whether two paths lead to the same file, or will do so once the file exists.
 ///
 /// Special files such as `/dev/null` have no content to lose, so they don't count.
 fn is_same(one: &Path, other: &Path) -> bool {

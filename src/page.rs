@@ -344,7 +344,7 @@ fn direct(directed: &Arc<Directed>) -> Direct {
         };
         let commands = directed.commands();
         if command == PlaybackCommand::Go && directed.is_at_end.load(Ordering::Relaxed) {
-            // If this command fails, so does the next one.
+            // If this jump fails, so does sending the command below, and that failure is returned.
             commands.as_ref().and_then(|commands| commands.send(PlaybackCommand::Seek(MonoNs(0))).ok());
         }
         let sent = commands.as_ref().map(|commands| commands.send(command));
@@ -363,8 +363,8 @@ impl Served {
         Box::new(PageFollower { span, ..self.directing_follower(dive) })
     }
 
-    /// Creates the follower that feeds the page with a replay of the dive that it has shown until now. The
-    /// replay must begin with a jump to the end of the log.
+    /// Creates the follower that feeds the page with a replay of the dive that the page has shown until now. The replay
+    /// must begin with a jump to the end of the log.
     pub(crate) fn replay_follower(&self, dive: &Loop, span: Option<(MonoNs, MonoNs)>) -> Box<dyn Follower> {
         let (now, ignored_stops) = (span.map_or(MonoNs(0), |(_, to)| to), STOPS_TO_END);
         Box::new(PageFollower { span, now, ignored_stops, ..self.directing_follower(dive) })
@@ -406,7 +406,7 @@ impl Served {
         None
     }
 
-    /// Opens a browser, if this machine has one and a person can see it.
+    /// Opens a browser, if this machine has one and a person can see the browser.
     pub(crate) fn open(&self) {
         let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"]
             .iter()

@@ -6,7 +6,7 @@ use tracing::span::EnteredSpan;
 
 /// A phase of a command. It lasts from its start until it is dropped.
 ///
-/// Log messages of the same thread during the phase belong to its span.
+/// Log messages of the same thread during the phase belong to the phase's span.
 pub(crate) struct Phase {
     started: Instant,
     _span: EnteredSpan,

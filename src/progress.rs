@@ -42,7 +42,7 @@ impl Progress {
 
     /// Shows progress if an update is due.
     ///
-    /// `state` is called only if an update is due. It returns the work done, as text and as a share.
+    /// `state` is called only if an update is due. It returns the finished work as text and as a share.
     pub(crate) fn at(&mut self, state: impl FnOnce() -> (String, Option<f64>)) {
         self.calls += 1;
         if !self.calls.is_multiple_of(CALLS) {

@@ -2,7 +2,7 @@
 
 use headrace_geometry::time::DurNs;
 
-/// Age of the latest sync to disk. From the first value, screens show it; from the second, it is an alarm.
+/// Age of the latest sync to disk from which screens show the age. From `ALARM_FROM` on, it is an alarm.
 pub(crate) const SHOWN_FROM: DurNs = DurNs(2_000_000_000);
 pub(crate) const ALARM_FROM: DurNs = DurNs(5_000_000_000);
 
@@ -18,7 +18,7 @@ pub(crate) struct RecordingState {
 }
 
 impl RecordingState {
-    /// Text about failing or unsynced recordings, and whether it is an alarm. `None` if all is well.
+    /// Text about failing or unsynced recordings, and whether the text is an alarm. `None` if all is well.
     pub(crate) fn words(&self) -> Option<(String, bool)> {
         let unsafe_for = DurNs::from_secs_f64(self.unsafe_s as f64);
         match self.fails {

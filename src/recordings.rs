@@ -17,10 +17,10 @@ use crate::report_output::files_report;
 #[derive(Default)]
 pub(crate) struct Recordings {
     all: Vec<One>,
-    /// Whether the dive's time is that of this machine.
+    /// Whether the dive runs on this machine's clock.
     ///
-    /// Otherwise a power cut loses nothing, even if minutes of the dive are unsynced, because the dive can be run
-    /// again.
+    /// A replayed or simulated dive loses nothing in a power cut, even if minutes of it are unsynced, because it can be
+    /// run again.
     is_live: bool,
     unsafe_for: DurNs,
 }
@@ -131,7 +131,7 @@ impl One {
         self.health.as_ref().map(RecordingHealth::fails)
     }
 
-    /// Event if the recording has just fallen behind or caught up.
+    /// The event to report if the recording has just fallen behind or caught up.
     fn late(&mut self, unsafe_for: DurNs) -> Option<RecordingEvent> {
         let is_late = unsafe_for >= if self.is_late { SHOWN_FROM } else { ALARM_FROM };
         let has_changed = core::mem::replace(&mut self.is_late, is_late) != is_late;

@@ -18,7 +18,7 @@ use crate::progress::Writing;
 
 /// Runs `headrace recover`.
 pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
-    // An error here occurs before the output is created.
+    // Errors of reading the log come before the output is created.
     let files = files_of(&args.logs)?;
     DiveLog::open(&files)?;
     Claims::reading(files.clone(), &args.overwrite).claim("-o", &args.output, Kind::Recovered)?;

@@ -17,9 +17,9 @@ use crate::failure::Failure;
 use crate::interruption::Interruption;
 use crate::outputs::SIMULATED;
 
-/// Longest interruption after which a dive is continued without being named, seconds.
+/// Longest interruption after which a dive is continued without its path on the command line, seconds.
 const LONGEST_S: f64 = 12.0 * 3600.0;
-/// Longest interruption for which UTC is believed after a reboot, seconds.
+/// Longest interruption by UTC that is believed after a reboot, seconds. UTC that shows a longer one was probably set.
 const LONGEST_BY_UTC_S: f64 = 30.0 * 86_400.0;
 /// Shortest interruption that is assumed if the clocks show none.
 const SHORTEST: DurNs = DurNs(1_000_000_000);
@@ -60,7 +60,7 @@ impl Resuming {
         let read = |found: &PathBuf| Unfinished::read(found);
         let mut recordings = found.iter().flatten().map(read).collect::<Result<Vec<_>, _>>()?;
         if recordings.iter().any(Option::is_none) {
-            // Two paths led to the same recording, or another program has just continued one.
+            // Two paths led to the same recording, or another program has just continued a recording.
             return Err(Failure::Usage(format!(
                 "run --resume: {first} can be continued only once at a time; give --record once, or the paths of the recordings"
             )));
@@ -120,7 +120,7 @@ impl Resuming {
         Ok(Self { gap, recordings: recordings.into_iter().map(stated).collect(), gone: Vec::new() })
     }
 
-    /// Data about the interruption for the dive that goes on.
+    /// Data about the interruption, for the continued dive.
     pub(crate) fn interruption(&self) -> Interruption {
         Interruption {
             gap: self.gap,
@@ -158,7 +158,7 @@ impl Resuming {
         let next_tick = self.recordings.iter().map(|interrupted| interrupted.recording.next_tick()).max();
         dive.armed.hold(next_tick.unwrap_or(0));
         let files = self.recordings.first().map(|first| first.recording.files.clone()).unwrap_or_default();
-        // States are saved beside one of the recordings.
+        // Saved states are beside one of the recordings only, so all recordings are searched.
         let states = self.recordings.iter().map(|of| SavedState::path(&of.recording.recording));
         let state = states.into_iter().find(|path| path.exists()).unwrap_or_default();
         Ok(Rebuild::start(silent(vehicle)?, files, state)?)
@@ -172,7 +172,7 @@ impl Resuming {
 
 /// The recording that `--resume=PATH` names.
 ///
-/// Errors: it can't be continued, or there are several recordings.
+/// Errors: the recording can't be continued, or there are several recordings.
 fn named_recording(args: &Run, named: &Path) -> Result<Unfinished, Failure> {
     let shown = named.display();
     if args.record.len() > 1 || named.is_dir() {
@@ -209,7 +209,7 @@ fn unfinished(log: &Path) -> Result<Option<PathBuf>, Failure> {
         return Ok(Some(log.to_owned()));
     }
     let last = Unfinished::last_in(folder, &is_no_live_dive)?;
-    // A dive of another day isn't continued by a service that starts anew.
+    // A service that starts anew doesn't continue a dive of another day.
     Ok(last.filter(|recording| interruption_s(recording).is_none_or(|seconds| seconds < LONGEST_S)))
 }
 
@@ -257,7 +257,7 @@ fn set_clock(dive: &Unfinished) -> DurNs {
     let gap = if is_same_boot {
         DurNs(host.0.cast_signed() + ahead - dive.last.0.cast_signed())
     } else {
-        // The gap is at least the time since the reboot, also if UTC was set back meanwhile.
+        // The gap is at least the time since the reboot, even if UTC was set back meanwhile.
         by_utc.filter(is_plausible).map_or(since_boot, |gap| DurNs(gap.0.max(since_boot.0)))
     };
     let gap = DurNs(gap.0.max(SHORTEST.0));

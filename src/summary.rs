@@ -14,7 +14,7 @@ use headrace_monitor::report::{
 
 use crate::terminal;
 
-/// Shortest period without data from a sensor that is reported, s.
+/// A sensor's period without data is reported if it is at least this long, s.
 const SILENT_S: f64 = 5.0;
 /// Maximum number of notes that the summary lists.
 const MOST_NOTES: usize = 20;
@@ -133,7 +133,7 @@ fn dropped(source: &SourceReport) -> Option<String> {
     (count > 0).then_some(line)
 }
 
-/// Text about a sensor's periods without data, if they deserve a line.
+/// Text about a sensor's periods without data, if they are long enough to be reported.
 ///
 /// If a dive has no position or no sonar, another line names the silent sensors.
 fn silence(source: &SourceReport) -> Option<String> {
@@ -185,7 +185,7 @@ fn outside_text(dive: &DiveReport) -> String {
     format!("NO VERDICTS: the heads were outside the tunnel{place}: check the tether's zero and length_m")
 }
 
-/// Metres of tunnel by verdict, as text.
+/// Length of tunnel with each verdict, as text.
 fn metres(judged: &OtherTargetReport) -> String {
     let OtherTargetReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
     metres_text(&Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
@@ -244,7 +244,7 @@ fn off_design(stretch: &WallStretchReport) -> String {
     format!("  {from} to {to}  WALL: {:.2} m {side} the design, up to {:.2} m", mean_m.abs(), most_m.abs())
 }
 
-/// Lines for the vehicle file that declare a suggested opening.
+/// Lines that declare a suggested opening in the vehicle file.
 fn declaration(opening: &SuggestedOpeningReport) -> Vec<String> {
     let SuggestedOpeningReport { name, from_m, to_m, clock_from, clock_to } = opening;
     let place = format!("{} to {}", station(*from_m), station(*to_m));
@@ -259,7 +259,7 @@ fn declaration(opening: &SuggestedOpeningReport) -> Vec<String> {
     ]
 }
 
-/// Line about a position gap that no fix has ended, and the gap's lower chainage. The sections of other gaps have
+/// Line about a position gap that no fix has ended, and the gap's lower chainage. Sections in all other gaps have
 /// verdicts.
 fn without_position(gap: &PositionGapReport, report: &Report) -> Option<(f64, String)> {
     let (from_m, to_m, back_to_m) = (gap.from_m?, gap.to_m?, gap.back_to_m?);
@@ -299,8 +299,8 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Lines about the effect of smoothing: metres by verdict, and a line for each series of neighbouring sections with the
-/// same change.
+/// Lines about the effect of smoothing: the length with each verdict, and a line for each series of neighbouring
+/// sections with the same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(

@@ -1,6 +1,6 @@
 //! Output during a dive, as lines or as JSON.
 //!
-//! It has the dive's state, and each missed, unsure or cleared stretch once.
+//! The output has the dive's state, and each missed, unsure or cleared stretch once.
 
 use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -20,12 +20,12 @@ use crate::screen::Screen;
 use crate::sensor_lines::SensorLines;
 use crate::terminal;
 
-/// Interval between state lines if they can't be overwritten.
+/// Interval between state lines if lines can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
 /// Interval between state lines that are overwritten, and between states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
-/// Minimum time after the last state line before a changed lamp colour gives a new line. It applies if lines
-/// can't be overwritten.
+/// Minimum time from a state line to the next one if the lamp's colour changes. It applies if lines can't be
+/// overwritten.
 const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
 /// Kind of output during a dive.
@@ -206,7 +206,7 @@ impl Watch {
         self.shown = None;
     }
 
-    /// Sets the state of the recordings that is to be shown from now on.
+    /// Sets a new state of the recordings, which is shown from now on.
     pub(crate) fn recorded(&mut self, state: &RecordingState) {
         self.show_recorded(RecordingState { rebuilt_pct: self.recorded.rebuilt_pct, ..*state });
     }

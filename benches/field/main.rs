@@ -11,8 +11,8 @@
 //! - `--json FILE`: where to write all figures (target/field.json)
 //! - `--csv docs/why/field.csv`: rewrites the documented table, whose rows combine all places
 //!
-//! D_true comes from `headrace_tests::truth`, which shares no code with the program's coverage. All other figures
-//! come from the report.
+//! The true hole D_true comes from `headrace_tests::truth`, which shares no code with the program's coverage. All other
+//! figures come from the report.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// Folders and files whose content decides results, relative to this package's folder.
+/// Folders and files whose content affects results, relative to this package's folder.
 const SOURCES: [&str; 6] =
     ["../../core", "../../replay/player", "../../plugins", "../../Cargo.toml", "src", "../Cargo.toml"];
 

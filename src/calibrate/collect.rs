@@ -11,7 +11,7 @@ use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
 use headrace_sensor::device::SensorInfo;
 
-/// Longest part of a log whose readings are held in memory, s.
+/// At most this length of a log is processed, because its readings are held in memory, s.
 const MOST_S: f64 = 1200.0;
 
 /// Time window of the readings, in seconds from the log's first message.
@@ -64,7 +64,7 @@ pub(crate) struct Collected {
     pub(crate) to: MonoNs,
     /// Beginning and end of the time that the vehicle spent at the water's surface.
     pub(crate) at_surface: Option<[MonoNs; 2]>,
-    /// Sensors of the vehicle file, by number of their packet source.
+    /// Sensors of the vehicle file. The index is the number of the packet source.
     pub(crate) sensors: Vec<SensorInfo>,
     /// Readings of the requested part and of the time at the surface, in order.
     pub(crate) events: Vec<Event>,
@@ -145,7 +145,7 @@ pub(crate) struct Material<'a> {
     pub(crate) site: Site,
     /// Measurement noise of the sensors.
     pub(crate) settings: Settings,
-    /// The sensors of the vehicle file, by number of their packet source.
+    /// Sensors of the vehicle file. The index is the number of the packet source.
     pub(crate) sensors: &'a [SensorInfo],
     /// All readings, in the order in which the loop processed them.
     pub(crate) events: &'a [Event],

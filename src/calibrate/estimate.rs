@@ -71,10 +71,10 @@ pub(crate) enum NotEstimated {
          turn; at least {least_deg:.0} are needed"
     )]
     LittleWall {
-        /// Total angle of the sectors in which the head has seen wall both there and in the opposite direction,
-        /// degrees.
+        /// Total angle of the directions in which the head has seen wall, and has also seen wall in the opposite
+        /// direction, degrees.
         opposite_deg: f64,
-        /// Smallest total angle of such sectors that is enough, degrees.
+        /// Smallest total angle, seen together with the opposite direction, that is enough, degrees.
         least_deg: f64,
     },
     /// The cross-section looks the same at every angle of the head about its axis.
@@ -222,7 +222,7 @@ pub(crate) enum NotEstimated {
 
 /// Median of some numbers, which are sorted by this function; `None` if there are no numbers.
 ///
-/// For an even count, it is the upper of the two in the middle.
+/// For an even count, the result is the larger of the two middle numbers.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()

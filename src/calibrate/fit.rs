@@ -1,8 +1,8 @@
 //! Robust least-squares fit of the vehicle's position and the heads' mounts to the design profile.
 //!
-//! The method is Gauss-Newton. Each round is a recursive fit: [`Factors`] start with the prior, then include
-//! one return after the other. If the returns don't determine an unknown, it keeps the vehicle file's value
-//! and uncertainty.
+//! The method is Gauss-Newton. Each round is a recursive fit: [`Factors`] start with the prior, then include one return
+//! after the other. If the returns don't determine an unknown, the unknown keeps the vehicle file's value and
+//! uncertainty.
 
 use crate::calibrate::estimate::median;
 use crate::calibrate::scan::{EchoScan, HeadScan, Return};
@@ -25,7 +25,7 @@ pub(crate) const COMMON: usize = 6;
 /// position, m.
 pub(crate) const OWN: usize = 3;
 
-/// Standard deviation of the prior of the vehicle's position, m: the vehicle may be anywhere in the section.
+/// Standard deviation of the prior of the vehicle's position, m: the vehicle may be anywhere in the cross-section.
 const PLACE_SD_M: f64 = 10.0;
 /// Standard deviation of the roll and pitch errors of an inertial unit at rest, radians.
 ///
@@ -48,17 +48,17 @@ const LEAST_SCALE_M: f64 = 0.01;
 /// standard deviations are rejected. Source: the usual constants of Huber and Tukey.
 const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
-/// Number of rounds with Huber's weights before those with Tukey's, which need a good start.
+/// Number of rounds with Huber's weights before the rounds with Tukey's weights, which need a good start.
 const HUBER_ROUNDS: usize = 3;
-/// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. The second
-/// value is the cost of a piece that the beam grazes or misses.
+/// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. `MISSED_COST` is the
+/// cost of a piece that the beam grazes or misses.
 const MOST_COST: f64 = 9.0;
 const MISSED_COST: f64 = 4.5;
 /// Upper limit of the cost that an echosounder's range adds to the fit, in squared standard deviations.
 ///
 /// The limit is high, because echosounders are few and only they distinguish left from right.
 const MOST_ECHO_COST: f64 = 100.0;
-/// Largest change of a head's angle in one round of the fit, radians.
+/// Largest change of a head's angle in one round of the fit, radians. Larger steps are shortened.
 const MOST_STEP_RAD: f64 = 0.2;
 
 /// Input of a fit of the vehicle's position and the heads' mounts.
@@ -120,10 +120,10 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
     }
 }
 
-/// Mount of a head that is turned about its axis and moved. The head may also turn the opposite way.
+/// A mount after its head is turned about the head's axis and moved. The head may also turn the opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
-    // A head that faces the other way has its angles in the opposite sense.
+    // A head that faces the opposite way, such as aft, has its angles in the opposite sense.
     let yaw = if is_mirrored { math::PI } else { 0.0 };
     Mount {
         position: mount.position + Vec3::new(0.0, left_m, up_m),

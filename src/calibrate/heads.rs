@@ -10,18 +10,18 @@ use headrace_geometry::frames::{Mount, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::head::MAX_HEADS;
 
-/// Smallest total angle of the sectors in which a head must have seen two opposite walls to be calibrated, degrees.
+/// A head is calibrated only if it has seen two opposite walls over at least this total angle, degrees.
 const LEAST_OPPOSITE_DEG: f64 = 120.0;
 /// Largest allowed median of the absolute range residuals, m. Above it, the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
-/// An estimate is reported only if its standard deviation is at most this share of the one assumed for the file's
-/// value.
+/// An estimate is reported only if its standard deviation is at most this share of the standard deviation assumed for
+/// the file's value.
 const TOLD: f64 = 0.3;
 /// Minimum cost difference between the two senses of rotation for a decision, in squared standard deviations.
 /// Chance alone exceeds it once in 10,000 times.
 const CLEAR: f64 = 15.0;
-/// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The last value is
-/// the number of rounds of all other fits.
+/// Number of starting angles in the search for a head's angle. `START_ROUNDS` is the number of rounds per start,
+/// `START_STRIDE` the stride of the returns, and `ROUNDS` the number of rounds of all other fits.
 const STARTS: usize = 24;
 const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;
@@ -66,7 +66,7 @@ pub(crate) struct Heads {
     pub(crate) scale: Estimate,
     /// Median of the absolute range residuals, m.
     pub(crate) median_m: f64,
-    /// The heads' estimates, by number of packet source.
+    /// The heads' estimates, in the order of their packet sources.
     pub(crate) heads: Vec<Head>,
 }
 
@@ -119,13 +119,13 @@ fn check_evidence(head: &HeadScan) -> Result<(), NotEstimated> {
     Ok(())
 }
 
-/// Reason to report if no head can be calibrated: the one with the longest missing time, or else the first one.
+/// Reason to report if no head can be calibrated: the reason with the longest missing time, or else the first reason.
 fn hardest(refused: &[(&HeadScan, NotEstimated)]) -> Option<NotEstimated> {
     let missing_s = |why: &NotEstimated| match why {
         NotEstimated::PartOfTurn { missing_s, .. } => *missing_s,
         _ => 0.0,
     };
-    // Of equal reasons, `max_by` returns the last one. The reversed order makes that the first.
+    // `max_by` returns the last of several equal reasons. In the reversed list, that is the first reason.
     refused.iter().rev().map(|(_, why)| *why).max_by(|a, b| missing_s(a).total_cmp(&missing_s(b)))
 }
 
@@ -195,7 +195,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
     Ok(Heads { still, place_m: [y, z], scale, median_m, heads })
 }
 
-/// Position of the vehicle, from the echosounders; without them, the centre of the section.
+/// Position of the vehicle, from the echosounders; without them, the centre of the cross-section.
 fn first_place(material: &Material<'_>, scan: &Scan) -> [f64; 2] {
     let start = material.profile.reference();
     let echoes = scan.echoes.iter().map(|echo| Echo { mount: echo.mount, range_m: echo.range_m });
@@ -289,8 +289,8 @@ impl Senses {
     /// Chooses the directions of rotation that fit best, one head at a time. Keeps the directions in the vehicle
     /// file unless others fit clearly better.
     ///
-    /// In a symmetric section, there is a second solution: the vehicle is on the other side, and all heads
-    /// turn the opposite way. This second solution is tried, too.
+    /// In a symmetric cross-section, there is a second solution: the vehicle is on the other side, and all heads turn
+    /// the opposite way. This second solution is tried, too.
     fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
         let count = scan.heads.len();
         let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;

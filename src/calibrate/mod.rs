@@ -1,8 +1,8 @@
 //! `headrace calibrate`: replays a log and estimates sensors' mounts, zeros and latencies for the vehicle
 //! file.
 //!
-//! [`mod@collect`] runs a log through the loop and keeps its readings. Pure estimators process these after
-//! the dive; they allocate, so the loop doesn't use them. If a log is insufficient, they return the reason.
+//! [`mod@collect`] runs a log through the loop and keeps its readings. Estimators process the readings after the dive.
+//! They allocate memory, so the loop doesn't use them. If a log is insufficient, an estimator returns the reason.
 //! Derivation: `docs/how-to/calibrate.md`.
 
 pub(crate) mod collect;

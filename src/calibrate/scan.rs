@@ -74,9 +74,10 @@ impl HeadScan {
         self.seen().iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
     }
 
-    /// Total angle of the sectors in which the head has seen wall both there and in the opposite direction, radians.
+    /// Total angle of the directions in which the head has seen wall, and has also seen wall in the opposite direction,
+    /// radians.
     ///
-    /// If only one side is seen, errors that all ranges share shift the estimated position and turn the estimated
+    /// If only one side is seen, an error common to all ranges shifts the estimated position and turns the estimated
     /// angle. With opposite walls these effects cancel.
     pub(crate) fn opposite_rad(&self) -> f64 {
         let seen = self.seen();
@@ -85,7 +86,7 @@ impl HeadScan {
         2.0 * pairs as f64 * SAME_WALL_RAD
     }
 
-    /// Whether the head has seen wall, by sector.
+    /// For each sector, whether the head has seen wall in it.
     fn seen(&self) -> [bool; SECTORS] {
         let mut seen = [false; SECTORS];
         for one in &self.returns {
@@ -96,7 +97,7 @@ impl HeadScan {
         seen
     }
 
-    /// Drops returns beyond the limit per piece of wall, and weights the rest.
+    /// Drops returns beyond the limit per piece of wall, and weights the remaining returns.
     fn thin(&mut self) {
         let mut counts = [0_usize; SECTORS];
         for one in &self.returns {
@@ -156,7 +157,7 @@ fn attitudes(material: &Material<'_>, still: &Still) -> Vec<(MonoNs, Rot<Tunnel,
     material.during(still.from, still.to).filter_map(attitude).collect()
 }
 
-/// Heads that detected the wall, by source.
+/// Heads that detected the wall, in the order of their sources.
 fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunnel, Body>)]) -> Vec<HeadScan> {
     let mut heads: BTreeMap<usize, HeadScan> = BTreeMap::new();
     for (event, sensor) in material.during(still.from, still.to) {
@@ -182,7 +183,7 @@ fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunne
     heads.into_values().collect()
 }
 
-/// Echosounders that detected the wall, by source.
+/// Echosounders that detected the wall, in the order of their sources.
 fn echoes(material: &Material<'_>, still: &Still) -> Vec<EchoScan> {
     let mut heard: BTreeMap<usize, (Mount, Vec<f64>)> = BTreeMap::new();
     for (event, sensor) in material.during(still.from, still.to) {

@@ -1,6 +1,6 @@
 //! Finds the longest period in which the vehicle stood still, in steps of one second.
 //!
-//! Attitude, cable, depth and echosounders show whether it moved.
+//! Attitude, cable, depth and echosounders show whether the vehicle moved.
 
 use std::collections::BTreeMap;
 
@@ -16,8 +16,8 @@ use headrace_sensor::reading::{Level, Reading};
 /// Length of a time bin. A source's readings in a bin give one median, so noise and outliers don't count as
 /// motion.
 const BIN: DurNs = DurNs(1_000_000_000);
-/// Minimum length of a time at rest, and the longest part of it that is used, in bins. A longer part adds no
-/// information.
+/// Minimum length of a time at rest, in bins. `MOST` is the longest part of that time that is used: a longer part adds
+/// no information.
 const LEAST: usize = 3;
 const MOST: usize = 120;
 
@@ -59,10 +59,10 @@ pub(crate) struct Still {
     pub(crate) to: MonoNs,
 }
 
-/// Values of one source, by time bin.
+/// Values of one source in each time bin.
 type Raw = (Sign, Vec<Vec<f64>>);
 
-/// Medians of one source's values, by time bin.
+/// Medians of one source's values in each time bin.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,
@@ -183,7 +183,7 @@ fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel>
     raw.into_values().map(channel).collect()
 }
 
-/// Up to three numbers from a reading that show motion. Unused numbers are NaN.
+/// Up to three numbers of a reading, whose changes show motion. Unused numbers are NaN.
 fn shows(
     material: &Material<'_>,
     sensor: &SensorInfo,

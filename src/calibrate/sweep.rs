@@ -3,8 +3,8 @@
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
 
-/// A head turns all the way round if at most this share of its steps goes against its sense of rotation. Pings out of
-/// order cause a few such steps. A head that sweeps a sector makes as many steps one way as the other.
+/// A head counts as turning all the way round if at most this share of its steps goes against its sense of rotation.
+/// Pings out of order cause a few such steps. A head that sweeps a sector makes as many steps one way as the other.
 const MOST_BACK: f64 = 0.1;
 
 /// Angle swept by a head, from the angles of its pings in order of time.

@@ -10,7 +10,7 @@ use crate::calibrate::zero::Zero;
 
 /// Largest relative error of the ranges' scale at which the other estimates are valid.
 ///
-/// It is three times the error of tabulated speeds of sound.
+/// The limit is three times the error of tabulated speeds of sound.
 const MOST_SCALE: f64 = 0.01;
 
 /// Value of a quantity in the vehicle file and as estimated, in the quantity's unit.
@@ -96,7 +96,7 @@ impl Table {
 
     /// If ranges don't fit the profile's size, lists the speed of sound and removes all other lines.
     ///
-    /// The other values were then fitted to the wrong wall, so the file must keep its own.
+    /// The other values were then fitted to the wrong wall, so the file must keep its own values.
     fn scale(&mut self, vehicle: &VehicleConfig, findings: &Findings) {
         let Ok(heads) = &findings.heads else { return };
         let Estimate { value, sd } = heads.scale;
@@ -219,8 +219,8 @@ impl Table {
             let id = id(vehicle, zero.source);
             let found = zero.found;
             self.number(&id, ("chainage at zero", "m", 3), *file_m, Ok(found));
-            // The line is always listed: a surveyed position is better than the file's value, whatever
-            // uncertainty the cable's slack leaves.
+            // The line is always listed: a surveyed position is better than the file's value, even with the uncertainty
+            // that the cable's slack leaves.
             self.line(&sensor(&id), format!("zero_at_m = {}", number(found.value, 3)));
         }
     }

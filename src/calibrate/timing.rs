@@ -12,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorKind;
 
-/// Largest time offset tried in either direction, and the step of the coarse search, s.
+/// Largest time offset tried in either direction, s. `COARSE_S` is the step of the coarse search.
 const REACH_S: f64 = 0.2;
 const COARSE_S: f64 = 0.1;
 /// Limits of the step between the offsets tried around the best one, s.
@@ -24,12 +24,11 @@ const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
 const CLEAR: f64 = 25.0;
 /// Largest standard deviation at which a time offset is reported, s.
 const TOLD_S: f64 = 0.03;
-/// Amount by which a latency may seem negative before it counts as an inconsistency, s.
+/// Amount by which a latency may seem negative before the latency counts as inconsistent, s.
 const EARLY_S: f64 = 0.01;
 /// Largest share of measurements rejected at the gate at which the filter still follows the vehicle.
 const MOST_GATED: f64 = 0.2;
-/// Minimum number of readings of a source, and the longest part of a log that is used. The beginning of a log
-/// is enough.
+/// Minimum number of readings of a source. `MOST` is the longest part of a log that is used: its beginning is enough.
 const LEAST_READINGS: usize = 50;
 const MOST: DurNs = DurNs(600_000_000_000);
 
@@ -175,8 +174,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.later.get(source).copied().unwrap_or(false)
     }
 
-    /// Returns the time offset. It is an error if the offset means that the device answers each request only after the
-    /// next request.
+    /// Returns the time offset, or an error if the device would then answer each request only after the next request.
     fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, NotEstimated> {
         let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));
@@ -288,7 +286,8 @@ impl<'a, 'b> Runs<'a, 'b> {
 
 /// Least-squares parabola; `None` if the parabola has no minimum.
 ///
-/// Twice the log-likelihood falls by 1 within one standard deviation, so its second derivative is 2 / sd^2.
+/// Twice the log-likelihood falls by 1 within one standard deviation, so its second derivative is 2 divided by the
+/// variance.
 fn parabola(points: &[(f64, f64)], base: f64) -> Option<Curve> {
     // x is scaled by the farthest point, so that the sums have similar sizes.
     let unit = points.iter().map(|(x, _)| x.abs()).fold(0.0, f64::max);

@@ -15,7 +15,7 @@ pub(super) struct Cable {
     /// A speed, m/s, followed by the standard deviation of a hole's diameter and the largest measured hole
     /// that passes at this speed, m.
     ///
-    /// The speed is the planned one. Without a planned speed it is the largest that meets the target.
+    /// The speed is the planned speed, or else the largest speed that meets the target.
     at_speed: Option<[f64; 3]>,
     /// Keys about the cable that the vehicle file doesn't set.
     missing: Vec<String>,

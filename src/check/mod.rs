@@ -116,7 +116,7 @@ fn all(errors: &ConfigErrors) -> Vec<Found> {
 }
 
 impl Readable {
-    /// Checks a vehicle, and adds the findings about it. `name` and `text` are those of its file.
+    /// Checks a vehicle, and adds the findings about it. `name` and `text` are the name and text of the vehicle's file.
     fn new(vehicle: VehicleConfig, (name, text): (&str, &str), found: &mut Vec<Found>) -> Self {
         // The files that the vehicle file names have been read already.
         let named = |file: &str| vehicle.attachments.iter().find(|(attached, _)| attached == file);
@@ -138,7 +138,7 @@ impl Readable {
         vehicle_file::log(name, &vehicle);
         let mut findings = vehicle.findings();
         findings.extend(too_many(&vehicle));
-        // If the vehicle has errors, findings about its plan would only repeat them.
+        // If the vehicle has errors, findings about its plan would only repeat these errors.
         if findings.iter().all(|finding| finding.grade != Grade::Error) {
             findings.extend(outlook.iter().flat_map(|outlook| outlook.findings(&vehicle)));
         }

@@ -185,7 +185,7 @@ pub(super) fn layout(text: &str) -> Result<HeadLayout, String> {
     known.map(|(_, layout)| *layout).ok_or_else(|| "expected phase_shift or sector_offset".to_owned())
 }
 
-/// Parser of a kind of foreign log, by the name of the kind.
+/// Parser that finds a kind of foreign log by its name.
 pub(crate) fn file_kind() -> impl TypedValueParser<Value = FileKind> {
     let value = |kind: FileKind| PossibleValue::new(kind.name()).help(kind.summary());
     PossibleValuesParser::new(FileKind::ALL.map(value))

@@ -30,7 +30,7 @@ pub(super) enum Change {
     /// The device neither hears nor answers.
     Stall,
     Resume,
-    /// The device's data arrive late by this time.
+    /// The device's data arrive late by this duration.
     Delay(DurNs),
     /// The device is switched off and on.
     Restart,
@@ -82,7 +82,7 @@ fn read_lines(to: Sender<Input>) {
     });
 }
 
-/// Parses a command. `ids` are those of the devices, by number.
+/// Parses a command. `ids` are the ids of the devices, in the order of their numbers.
 pub(super) fn order(line: &str, ids: &[&str]) -> Result<Order, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let device = |id: &str| {

@@ -172,7 +172,8 @@ impl Drop for Stand {
     }
 }
 
-/// A name for a serial port that can be part of a `connect`; `None` if the folder's name has other characters.
+/// A name by which `connect` can refer to a serial port; `None` if the folder's name has characters that `connect`
+/// can't have.
 fn lasting_name(folder: &Path, id: &str) -> Option<String> {
     let folder = folder.canonicalize().ok()?.join(PORTS);
     std::fs::create_dir_all(&folder).ok()?;

@@ -104,7 +104,7 @@ impl Case {
     }
 }
 
-/// Whether the name of a tunnel is that of a polyline file.
+/// Whether a tunnel's name is the name of a polyline file.
 fn is_file(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "csv")
 }

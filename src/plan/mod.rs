@@ -65,7 +65,7 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
         let speed_mps = best.speed_mps?;
         Some((number, if asked { speed_mps } else { printed_mps(speed_mps) }))
     });
-    // Occlusion is reported even if no mode meets the target, so any speed will do.
+    // Occlusion doesn't depend on the speed, and is reported even if no mode meets the target. So any speed will do.
     let (mode, speed_mps) = shown.unwrap_or((0, ANY_SPEED_MPS));
     let briefing = planner.briefing(mode, speed_mps)?;
     let footprints_m = planner.footprints_m()?;

@@ -304,7 +304,7 @@ fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
             starts.join("; ")
         ));
     }
-    // Pairs of heads with equal distances have the same rule, which is printed once.
+    // Pairs of heads at equal distances have the same rule for equal start angles. Each rule is printed once.
     let mut said = Vec::new();
     for rule in &briefing.hull_rules {
         let text = format!(

@@ -9,10 +9,10 @@ use crate::failure::Failure;
 use crate::keyboard::{INTERRUPT, Keyboard};
 use crate::output::aside;
 
-/// Length of a jump in time: by the left or right arrow key, and by the up or down arrow key.
+/// Length of a jump in time by the left or right arrow key. `FAR` is the length by the up or down arrow key.
 const STEP: DurNs = DurNs::from_millis(10_000);
 const FAR: DurNs = DurNs::from_millis(60_000);
-/// Slowest and fastest speed of playback, relative to real time. Beyond the fastest, playback is unlimited.
+/// Slowest speed of playback, relative to real time. Beyond `FASTEST`, playback is unlimited.
 const SLOWEST: f64 = 0.125;
 const FASTEST: f64 = 1024.0;
 
@@ -100,7 +100,7 @@ impl Hand {
     }
 }
 
-/// Keys that some bytes represent. Unknown ones are ignored. A terminal sends all bytes of a key at once.
+/// Keys that some bytes represent. Unknown keys are ignored. A terminal sends all bytes of a key at once.
 fn keys(mut bytes: &[u8]) -> Vec<Key> {
     let arrows = [(b'A', Key::Up), (b'B', Key::Down), (b'C', Key::Right), (b'D', Key::Left)];
     let mut keys = Vec::new();

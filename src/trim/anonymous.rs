@@ -13,7 +13,7 @@ use crate::files;
 
 /// Metadata keys that are kept, because their values don't identify anyone.
 const KEPT_KEYS: [&str; 4] = [FORMAT_KEY, "version", "import_format", TRIMMED];
-/// Log times after this one, the beginning of the year 2000, are UTC. Earlier ones are those of a monotonic
+/// Log times after this time, the beginning of the year 2000, are UTC. Earlier log times are those of a monotonic
 /// clock.
 const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
 

@@ -62,7 +62,7 @@ fn needs_vehicle(args: &Trim) -> bool {
     args.chainage.is_some() || args.drop_echoes || args.anonymise
 }
 
-/// The vehicle given or attached to the log; `None` if the options don't need it.
+/// The vehicle given or attached to the log; `None` if the options need no vehicle.
 fn vehicle(
     args: &Trim,
     given: Given,
@@ -202,7 +202,7 @@ fn write(
         header: &header,
         change: &mut change,
         voices: !args.anonymise,
-        // Alerts and notes contain names of people, so an anonymised log doesn't have the results on this topic.
+        // Alerts and notes contain names of people, so an anonymised log leaves out the topic of alerts and notes.
         results: &|topic| !args.anonymise || !topic.ends_with("/alerts"),
     };
     let mut file = AtomicFile::create(&args.output).map_err(failed)?;

@@ -43,7 +43,7 @@ pub(super) struct ScreenFrame {
     pub(super) alerts: Vec<AlertRow>,
     /// Number of alerts that aren't in the list.
     pub(super) alerts_hidden: usize,
-    /// Text about the recordings, and whether it is an alarm.
+    /// Text about the recordings, and whether the text is an alarm.
     pub(super) recording: Option<(String, bool)>,
     pub(super) wall: WallNews,
     /// Messages since the last frame, oldest first.
@@ -60,7 +60,7 @@ pub(super) struct SensorRow {
     pub(super) why: String,
 }
 
-/// Builds the frames, and keeps the state that is needed between them.
+/// Builds the frames, and keeps the state that is needed between frames.
 pub(super) struct FrameBuilder {
     vehicle: String,
     told: VecDeque<PilotLine>,
@@ -100,7 +100,7 @@ impl FrameBuilder {
         }
     }
 
-    /// Adds the lines of live messages, except those that tell nothing beyond the other lines.
+    /// Adds the lines of live messages, except messages that only repeat other lines.
     pub(super) fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told.iter().filter(|one| one.adds_line()) {
             self.tell(message_line(one, &dive.mission().profile, dive.head_descriptions()));

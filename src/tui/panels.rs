@@ -90,7 +90,7 @@ pub(super) fn is_now(shot: &ScreenFrame) -> bool {
     !matches!(shot.state.condition(), Condition::Old(_) | Condition::NoData)
 }
 
-/// Draws the vehicle's position with its error, and the metres of wall by verdict.
+/// Draws the vehicle's position with its error, and the length of wall with each verdict.
 pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
@@ -119,8 +119,8 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
-/// Text with the metres by verdict: failed, unsure and uninspected metres first. Dots stand for omitted
-/// figures.
+/// Text with the length of each verdict in metres: failed, unsure and uninspected lengths come first. Dots stand for
+/// omitted figures.
 fn metres_text(metres: &Metres, columns: usize) -> String {
     let Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let missed = verdict_words(Verdict::Fail).to_uppercase();
@@ -134,7 +134,7 @@ fn metres_text(metres: &Metres, columns: usize) -> String {
     let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
         let part = format!(" {part_m:.2} {what},");
-        // Room for the dots that stand for omitted figures is kept.
+        // Room is kept for the dots that stand for omitted figures.
         if text.len() + part.len() + 3 > columns {
             text += " ..";
             break;
@@ -230,7 +230,7 @@ pub(super) fn sensor_rows(sensors: usize, columns: usize) -> usize {
 
 /// Draws the sensors' lamps with rate and age.
 ///
-/// Faulty sensors come first. Each has a row of its own with a reason, as long as there is room.
+/// Faulty sensors come first. Each faulty sensor has a row of its own with a reason, as long as there is room.
 pub(super) fn sensors(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut Rows<'_>) {
     let unwell = shot.sensors.iter().filter(|sensor| sensor.state != SensorState::Ok).count();
     let columns = usize::from(rows.width());

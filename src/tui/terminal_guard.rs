@@ -21,7 +21,8 @@ pub(super) const ARTIST: &str = "screen";
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
 /// Codes that restore the main screen and show the cursor.
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
-/// Another thread checks so many times, at this interval, whether the renderer has released the terminal.
+/// Interval at which another thread checks whether the renderer has released the terminal. `STEPS` is the number of
+/// checks.
 const STEP: Duration = Duration::from_millis(25);
 const STEPS: u32 = 20;
 
@@ -125,7 +126,7 @@ pub(super) fn restore_from_elsewhere() {
         thread::sleep(STEP);
     }
     restore_settings();
-    // If the terminal reads nothing, writing blocks, so the wait for it is limited.
+    // If the terminal reads nothing, writing blocks, so the wait for the writing thread is limited.
     let writing = thread::spawn(restore);
     for _ in 0..STEPS {
         if writing.is_finished() {
@@ -223,8 +224,8 @@ mod tests {
             written.find(text).unwrap_or_else(|| panic!("{text:?} in {written:?}"))
         };
         let [enter, leave] = [ENTER, LEAVE].map(|bytes| std::str::from_utf8(bytes).unwrap());
-        // If the renderer or the loop panics, the text appears on the main screen, after the switch back to
-        // it.
+        // If the renderer or the loop panics, the text appears on the main screen, after the terminal has switched back
+        // to this screen.
         for thread in [ARTIST, "main"] {
             let (written, same) = written(thread);
             assert!(same, "{thread}: the terminal's settings have changed");

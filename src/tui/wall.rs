@@ -105,7 +105,7 @@ impl Cell {
     }
 }
 
-/// Data about the wall within a frame.
+/// Data about the wall in a frame of the screen.
 pub(super) struct WallNews {
     pub(super) section_m: f64,
     pub(super) count: usize,
@@ -160,7 +160,7 @@ pub(super) struct Wall {
 pub(super) struct Strip {
     /// The columns, each with the worst of its sections; `None` beyond the tunnel's end.
     pub(super) columns: Vec<Option<Cell>>,
-    /// Chainage at which the first column begins, and length of a column, m.
+    /// Chainage at which the first column begins, m. `column_m` is the length of a column.
     pub(super) from_m: f64,
     pub(super) column_m: f64,
     /// Column at which the vehicle is, and whether it moves to the right.

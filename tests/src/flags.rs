@@ -20,7 +20,7 @@ use headrace_oracle::wall::Wall;
 pub const EVERY: DurNs = DurNs(100_000_000);
 /// Number of rays cast in all directions round a head.
 const RAYS: u32 = 48;
-/// Number of parts into which a section is divided for the search for its earliest fail.
+/// Number of parts into which a section is divided for the search for the section's earliest fail.
 pub const PARTS: u32 = 16;
 /// Tolerance of the chainage from which all heads have passed the wall, m. The program updates this chainage five times
 /// a second, and takes the farthest wall as the reach of a tilted head.

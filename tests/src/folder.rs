@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::short_dive::{SCENE, VEHICLE};
 
-/// Longest duration of a live dive that a test repeats until the report is as expected, s.
+/// A test repeats a live dive until its report is as expected. The dive then lasts at most this long, s.
 const LONG_S: u32 = 100;
 
 /// The program under test, ready for arguments.

@@ -54,7 +54,7 @@ pub struct Dive {
     pub report: Report,
     /// Cross-section of the tunnel in the loop's configuration.
     pub profile: Profile,
-    /// Mount of each head, by number of the head.
+    /// Mount of each head. The index is the head's number.
     pub mounts: Vec<Mount>,
     /// Range of each head at the site's speed of sound, m.
     pub ranges_m: Vec<f64>,

@@ -164,7 +164,7 @@ pub struct Viewer {
     socket: WebSocket<TcpStream>,
     /// First message that the server sent.
     pub hello: Value,
-    /// Sections of the wall by number.
+    /// Sections of the wall. The key is the section's number.
     pub sections: BTreeMap<i32, SeenSection>,
     /// Number of wall samples received.
     pub samples: u64,

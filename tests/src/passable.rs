@@ -17,17 +17,17 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// Period at the start of a dive that isn't evaluated, s. In this time, the filter learns the biases of the inertial
-/// unit.
+/// This time at the start of a dive isn't evaluated, s. The filter then learns the biases of the inertial unit.
 const SETTLES_S: f64 = 100.0;
-/// Length of the part of a dive that is evaluated, m.
+/// Length of the evaluated part of a dive, m.
 const JUDGED_M: f64 = 8.0;
 /// Fraction of the evaluated sections that must pass, as in a dive at the planned speed. None of them may pass although
 /// its true hole exceeds the target.
 const PASSING: f64 = 0.95;
 /// One evaluated section out of this many may fail.
 const FAILING: usize = 20;
-/// Speeds tried in the search for the largest passing speed, as multiples of the first speed tried.
+/// Speeds above the first speed tried in the search for the largest passing speed, as multiples of the first speed.
+/// `BELOW` has the speeds below it.
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
 
@@ -46,8 +46,8 @@ pub struct Outing {
     pub seed: u64,
     /// Chainage at which the dive starts, m.
     pub start_m: f64,
-    /// Fraction of the planned speed. The heads are in phase for this reduced speed, and the vehicle drives at it
-    /// before the first advice.
+    /// Fraction of the planned speed. The heads are in phase for this reduced speed, and the vehicle drives at this
+    /// speed before the first advice.
     pub planned_share: f64,
 }
 
@@ -62,7 +62,7 @@ pub struct Outcome {
     pub falsely: usize,
     /// Largest ratio of the true hole diameter D_true to the target T among the evaluated sections.
     pub true_share: f64,
-    /// Advice updates in the part of the dive that is evaluated.
+    /// Advice updates in the evaluated part of the dive.
     pub beats: Vec<AdviceEntry>,
 }
 
@@ -82,12 +82,13 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Speed advised to a vehicle that drives at the planned speed, divided by the largest speed that truly passes.
+    /// Speed advised to a vehicle that drives at the planned speed, divided by the largest speed at which sections
+    /// truly pass.
     pub fn ratio(&self) -> f64 {
         self.over_true(self.advised_mps)
     }
 
-    /// Speed advised to a pilot who follows the advice, divided by the largest speed that truly passes.
+    /// Speed advised to a pilot who follows the advice, divided by the largest speed at which sections truly pass.
     pub fn followed_ratio(&self) -> f64 {
         self.over_true(self.followed.told_mps())
     }
@@ -110,8 +111,8 @@ impl Outcome {
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
-    /// Largest constant speed that exceeds the advice seldom enough, m/s. The fraction of updates in which it exceeds
-    /// the advice equals the fraction of sections that may fail.
+    /// Largest constant speed that exceeds the advice seldom enough, m/s. The fraction of updates in which this speed
+    /// exceeds the advice equals the fraction of sections that may fail.
     ///
     /// A swaying vehicle temporarily gets lower advice, which a constant speed can't follow.
     pub fn told_mps(&self) -> f64 {

@@ -17,7 +17,7 @@ use rustix::termios::{Winsize, tcsetwinsize};
 
 use crate::folder::{Folder, program};
 
-/// Longest wait for expected output, as a number of steps.
+/// Longest wait for expected output, as a number of steps of `STEP`.
 const STEPS: u32 = 1200;
 const STEP: Duration = Duration::from_millis(100);
 

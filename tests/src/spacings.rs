@@ -1,4 +1,5 @@
-//! Computes T_x, T_y and T of every sample of a dive from their definitions, by comparison with all earlier samples.
+//! Computes the spacings T_x (along the tunnel), T_y (along the wall) and T of every sample of a dive from their
+//! definitions, by comparison with all earlier samples.
 //!
 //! A *pass* over a place on the perimeter is one step of a head. Both pings of the step have a return, and the arc
 //! between them (the shorter way round) contains the place. The chainage of the pass is interpolated linearly on the
@@ -18,11 +19,12 @@ const ROUNDING: f64 = 1e-9;
 pub struct Spacing {
     /// Chainage of the sample, m.
     pub x_m: f64,
-    /// T_x: distance in chainage to the nearest earlier pass. Two values: without and with the end points of series.
+    /// T_x: distance in chainage to the nearest earlier pass. Two values: without and with the end points of series of
+    /// steps.
     pub t_x_m: [Option<f64>; 2],
     /// T_y: distance to the previous sample of the same head.
     pub t_y_m: Option<f64>,
-    /// Spacing T from T_x and T_y. Two values: without and with the end points of series.
+    /// Spacing T from T_x and T_y. Two values: without and with the end points of series of steps.
     pub t_m: [Option<f64>; 2],
 }
 

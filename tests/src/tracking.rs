@@ -40,7 +40,7 @@ pub struct Epoch {
     pub at: MonoNs,
     /// Factors of the covariance of the filter's estimate.
     pub factors: Box<Factors<ERRORS>>,
-    /// Corrections that turn the filter's estimate into the truth. Only those of the pose are known.
+    /// Corrections that turn the filter's estimate into the truth. Only the corrections of the pose are known.
     pub errors: Errors,
 }
 

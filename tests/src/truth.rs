@@ -1,4 +1,4 @@
-//! Dives with D_true for each section: wrappers of `headrace_oracle` for tests.
+//! Dives with the true hole D_true of each section: wrappers of `headrace_oracle` for tests.
 
 use headrace_monitor::run::Loop;
 use headrace_simulator::Scene;

@@ -74,8 +74,8 @@ fn allocations(work: impl FnOnce()) -> u64 {
     COUNTED.with(|counted| counted.replace(None)).unwrap()
 }
 
-/// The vehicle goes forward, is too fast over a stretch, and goes back over it and forward again, so that flags are
-/// raised and cleared. All heads are silent for a while.
+/// The vehicle goes forward, is too fast over a stretch, and goes back over this stretch and forward again, so that
+/// flags are raised and cleared. All heads are silent for a while.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n
 [[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n

@@ -1,7 +1,7 @@
 //! `kill -9` at random moments. Every log is readable and loses the last second at most.
 //!
-//! The log contains everything that was displayed more than a second before the kill. Its replay gives the same dive
-//! up to that moment, bit for bit.
+//! The log contains everything that was displayed more than a second before the kill. The log's replay gives the same
+//! dive up to that moment, bit for bit.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -89,7 +89,8 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // The second before the kill is counted from this moment, because the kill takes effect at some time after it.
+    // The second before the kill is counted from this moment, because the kill takes effect at some time after this
+    // moment.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();

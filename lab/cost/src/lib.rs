@@ -1,9 +1,9 @@
-//! The cost of accuracy: headrace's errors against its time, setting by setting.
+//! The cost of accuracy: headrace's errors and computing time, setting by setting.
 //!
 //! A trade is a question ("what does a finer target cost?") answered by points. A point is a setting with its error
-//! against independent values and its cost. Errors are stated in the quantities that decide: the hole D of a section,
-//! and metres falsely passed. `trades/` has a file for each trade. `headrace_oracle` provides the independent values
-//! and the simulated dives.
+//! against independent values and its cost. Errors are stated in quantities that matter to a survey: the hole diameter
+//! D of a section, and the length falsely passed. `trades/` has a file for each trade. `headrace_oracle` provides the
+//! independent values and the simulated dives.
 
 pub mod draw;
 pub mod effort;

@@ -29,8 +29,8 @@ impl Interval {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         let count = i32::try_from(sorted.len()).ok()?;
-        // Probability that at most `below` of all values lie under the median. Each value does so with probability one
-        // half.
+        // Probability that at most `below` of all values lie under the median. Each value lies under the median with
+        // probability one half.
         let (mut ways, mut below, mut cut) = (1.0, 1.0, 0_usize);
         let all = (0..count).fold(1.0, |all, _| all * 2.0);
         for k in 1..=count / 2 {
@@ -124,7 +124,7 @@ pub struct Point {
     pub value: String,
     /// The value as a number, if the value is numeric.
     pub number: Option<f64>,
-    /// Whether this is headrace's shipped setting.
+    /// Whether the setting is headrace's shipped one.
     pub is_default: bool,
     /// Scene of the dives. Each scene has its own chart, and points of different scenes are not compared.
     pub scene: String,

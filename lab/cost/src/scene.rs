@@ -8,7 +8,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::effort::Effort;
 use crate::error::CostError;
 
-/// Files built into the program, by name.
+/// Files built into the program, each with its name and text.
 pub const FILES: [(&str, &str); 11] = [
     ("vita1.toml", include_str!("../../../deploy/vehicles/vita1.toml")),
     ("vita2-2.toml", include_str!("../../../deploy/vehicles/vita2-2.toml")),

@@ -1,5 +1,5 @@
-//! Errors of a judging method, in the quantities that decide: the hole, and metres falsely passed, falsely failed, or
-//! not judged.
+//! Errors of a judging method, in quantities that matter to a survey: the hole diameter, and the lengths falsely
+//! passed, falsely failed, or not judged.
 
 use crate::point::{Error, Interval, quantile};
 use headrace_coverage::Verdict;
@@ -7,7 +7,7 @@ use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
 /// Length that is left out at each end of a dive, in addition to a length equal to the target, m.
 ///
-/// Sections there have neighbours on one side only. The length is that of the hull plus the distance to the
+/// Sections near the ends have neighbours on one side only. The length is that of the hull plus the distance to the
 /// next pass.
 pub const END_M: f64 = 2.0;
 
@@ -16,9 +16,9 @@ pub const END_M: f64 = 2.0;
 pub struct Judged {
     /// Length of the section, m.
     pub length_m: f64,
-    /// D as judged, m; `None` if D is unknown, or only bounded from below.
+    /// Hole diameter D as judged, m; `None` if D is unknown, or only bounded from below.
     pub hole_m: Option<f64>,
-    /// Whether the section is within the target; `None` if undecided.
+    /// Whether the section's hole is within the target; `None` if the verdict is undecided.
     pub passes: Option<bool>,
     /// D_true: the true diameter of the section's largest hole, m.
     pub true_hole_m: f64,
@@ -52,9 +52,10 @@ pub fn inner(dive: &JudgedDive) -> impl Iterator<Item = &JudgedSection> {
 
 /// The errors of a setting, from the sections of each of its dives.
 ///
-/// The errors are the 95th percentile and the median of |D - D_true|; the metres per 100 m falsely passed, falsely
-/// failed and undecided; and the share of sections over the target that pass. Each value is the median over the dives,
-/// with the least and the largest as bounds. A dive without the sections that an error needs is left out.
+/// The errors are the 95th percentile and the median of the hole error |D - D_true|; the metres per 100 m falsely
+/// passed, falsely failed and undecided; and the share of sections over the target that pass. Each value is the median
+/// over the dives, with the least and the largest as bounds. A dive without the sections that an error needs is left
+/// out.
 pub fn errors(dives: &[Vec<Judged>], target_m: f64) -> Vec<Error> {
     let off_m = |dive: &Vec<Judged>| -> Vec<f64> {
         let off = |judged: &Judged| Some((judged.hole_m? - judged.true_hole_m).abs());

@@ -63,7 +63,8 @@ pub(crate) fn steps(trade: &Trade, scene: &str) -> Vec<String> {
     lines
 }
 
-/// Text for a scene in which no setting has a smaller error than the default, or the difference changes no decision.
+/// Text for a scene in which no setting has a smaller error than the default, or in which the difference changes no
+/// decision.
 fn no_step(default: &Point, resolution: f64) -> String {
     let by = default.errors.first().filter(|_| resolution > 0.0);
     let by =

@@ -30,7 +30,7 @@ fn ideal() -> JudgedDive {
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.1\n\
          [effects]\nmotion_within_turn = {}\nocclusion = {}\n";
 
-/// Median of |D - D_true|, m, and metres per 100 m that falsely fail.
+/// Median of the hole error |D - D_true|, m, and metres per 100 m that falsely fail.
 fn wrong(dive: &JudgedDive, judged: impl Fn(Judged) -> Judged) -> [f64; 2] {
     let sections: Vec<Judged> = inner(dive).map(|section| judged(Judged::of(section))).collect();
     assert!(sections.len() > 8, "{} sections", sections.len());
@@ -91,7 +91,7 @@ fn cost_page_in_docs_matches_its_data() {
     }
 }
 
-/// Among sections whose D_true is over the target, the shipped defaults may pass only a small share.
+/// Among sections whose true hole D_true is over the target, the shipped defaults may pass only a small share.
 #[test]
 fn shipped_defaults_falsely_pass_few_sections() {
     let text = std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap();

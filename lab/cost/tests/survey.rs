@@ -25,7 +25,7 @@ fn true_holes_of_a_survey_stay_within_the_planned_target() {
             |name: &str| point.errors.iter().find(|error| error.name == name).unwrap().interval.middle;
         let hours = figure("there") + figure("back") + figure("again");
         assert!((point.cost.middle - hours).abs() < 1e-9, "{point:?}");
-        // The simulated dive's largest hole is at most the planned T.
+        // The simulated dive's largest hole is at most the planned spacing T.
         let hole_m = point.errors.iter().find(|error| error.name.starts_with("largest D_true"));
         if let Some(hole_m) = hole_m.filter(|_| !point.method.contains(" m off")) {
             assert!(hole_m.interval.middle <= point.error(), "{point:?}");

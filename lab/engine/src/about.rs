@@ -24,7 +24,7 @@ pub struct About {
     pub day: Option<i32>,
 }
 
-/// Facts about all dives, by the log's path.
+/// Facts about all dives. The key is the log's path.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Abouts(BTreeMap<String, About>);
 

@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::maker::Maker;
 use crate::provider::{Asked, ReplayExec, ReplayTable, Replayed};
 
-/// Prefix of this program's nodes among those of Ballista.
+/// Prefix that tells encoded plan nodes of this program from Ballista's own nodes.
 const OURS: &[u8] = b"headrace ";
 /// Time without a heartbeat after which an executor counts as lost, s. A busy executor sends a heartbeat every 5 s.
 const LOST_AFTER_S: u64 = 15;

@@ -13,7 +13,7 @@ pub enum Error {
     Place {
         /// Text of the invalid folder or URL.
         place: String,
-        /// The reason why it is invalid.
+        /// The reason why the folder or URL is invalid.
         why: String,
     },
     /// The place contains no log.

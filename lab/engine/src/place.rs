@@ -15,7 +15,7 @@ use url::Url;
 
 use crate::error::{Error, of_file};
 
-/// Highest number of a recording part that is recognised in a file name.
+/// Highest part number that is recognised in the file name of a recording's part.
 const MOST_PARTS: u32 = 999;
 
 /// A folder of logs, on this machine or in an object store.

@@ -9,9 +9,9 @@ use crate::spacing::{Spacing, spacing};
 use crate::wilcoxon::{self, Options};
 use crate::{ExperimentError, Progress};
 
-/// Tolerance of T_x relative to the paper's experiment.
+/// Tolerance of the distance T_x between passes, relative to the paper's experiment.
 const T_X_SHARE: f64 = 0.02;
-/// Tolerance of the mean T_y and the mean T relative to the paper's experiment.
+/// Tolerance of the mean ping distance T_y and of the mean T, relative to the paper's experiment.
 const MEAN_SHARE: f64 = 0.03;
 /// Length of each simulated run, m, as in the paper.
 const LENGTH_M: f64 = 130.0;
@@ -19,7 +19,7 @@ const LENGTH_M: f64 = 130.0;
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
                        pilot_drift = { across_m = 0.5, up_m = 0.5, yaw_deg = 5 }\n";
 
-/// A run in Table 3 or 4, with its T from Table 5.
+/// A run in Table 3 or 4, with its combined distance T from Table 5.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunRow {
     /// Name of the heads' mode.
@@ -28,15 +28,15 @@ pub struct RunRow {
     pub heads: u8,
     /// Whether the heads are in the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
-    /// T_x, m.
+    /// Distance T_x between passes, m.
     pub t_x: Pair,
-    /// T_y: mean, standard deviation, least, largest, m.
+    /// Distance T_y between pings: mean, standard deviation, least, largest, m.
     pub t_y: [Pair; 4],
-    /// T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
+    /// Combined distance T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
     pub t: Option<[Pair; 3]>,
-    /// The speed at which the paper's T_x was obtained, m/s.
+    /// The speed at which the paper's distance T_x between passes was obtained, m/s.
     pub paper_speed_mps: f64,
-    /// The quantities that miss their targets (T_x, mean T_y, mean T), with reasons.
+    /// The quantities that miss their targets (distances T_x, mean T_y, mean T), with reasons.
     pub misses: Vec<String>,
 }
 
@@ -71,9 +71,10 @@ pub struct SignedRankRow {
     pub what: &'static str,
     /// Whether the test is for the sector-offset layout instead of the phase-shift layout.
     pub sectors: bool,
-    /// Two-sided p of the predictions against the paper's experiments; `None` if all differences are zero.
+    /// Two-sided p value of the test of the predictions against the paper's experiments; `None` if all differences are
+    /// zero.
     pub p_paper: Option<f64>,
-    /// Two-sided p of the predictions against our simulated experiments.
+    /// Two-sided p value of the test of the predictions against our simulated experiments.
     pub p_ours: Option<f64>,
 }
 
@@ -140,7 +141,7 @@ fn row(run: &Measured, layout: HeadLayout, paper: &Spacings, ours: &Spacing, tur
     row
 }
 
-/// The quantities (T_x, mean T_y, mean T) that miss their targets, with reasons.
+/// The quantities (distances T_x, mean T_y, mean T) that miss their targets, with reasons.
 fn misses(row: &RunRow, seconds: f64) -> Vec<String> {
     let mut misses = Vec::new();
     let percent = |pair: &Pair| 100.0 * pair.difference();

@@ -20,11 +20,11 @@ pub struct HiddenRow {
     pub heads: u8,
     /// Phase difference between adjacent heads, degrees.
     pub side_by_side_deg: f64,
-    /// Angle of a head's turn that its neighbour occludes, degrees.
+    /// Part of a head's turn in which its neighbour occludes the wall, degrees.
     pub angle_deg: f64,
     /// Arc length of wall that the neighbour occludes from the head, m.
     pub gap_m: f64,
-    /// T_x / s without occlusion, m.
+    /// Distance between passes without occlusion, m: T_x of one head divided by the number of heads.
     pub t_x_m: f64,
     /// The largest distance between passes on any line, as a multiple of `t_x_m`.
     pub times: f64,
@@ -36,7 +36,7 @@ pub struct HiddenRow {
 /// neighbours half a turn apart.
 ///
 /// In the first arrangement of quarter turns, the occluded forward and aft heads follow each other on either wall after
-/// half a turn. In the second, they follow each other after a quarter turn.
+/// half a turn. In the second arrangement, the same heads follow each other after a quarter turn.
 const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"), (4, "[0, 90, 90, 0]")];
 
 /// Simulates all layouts in MEDIUM, as in Figure 13.

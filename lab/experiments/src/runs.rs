@@ -54,7 +54,7 @@ pub(crate) struct Sample {
 pub(crate) struct Dive {
     /// The tunnel's profile.
     pub profile: Profile,
-    /// All pings with an echo, by head, in time order.
+    /// All pings with an echo: a list for each head, in time order.
     pub heads: Vec<Vec<Sample>>,
     /// Angle between consecutive pings of a head, radians.
     pub step_rad: f64,
@@ -62,7 +62,7 @@ pub(crate) struct Dive {
     pub ping_period_s: f64,
 }
 
-/// The shipped vehicle files by name.
+/// Returns the shipped vehicle file with this name.
 fn vehicle(name: &str) -> Result<Vec<u8>, String> {
     let text = match name {
         "vita1.toml" => include_str!("../../../deploy/vehicles/vita1.toml"),

@@ -27,14 +27,14 @@ pub(crate) enum Zeros {
 pub(crate) struct Options {
     /// Treatment of zeros.
     pub zeros: Zeros,
-    /// Continuity correction: whether the normal approximation moves W+ by a half towards its mean.
+    /// Continuity correction: whether the normal approximation moves the rank sum W+ by a half towards its mean.
     pub continuity: bool,
 }
 
 /// Distribution from which p is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Method {
-    /// The exact distribution of W+ over all choices of signs.
+    /// The exact distribution of the rank sum W+ over all choices of signs.
     Exact,
     /// A normal distribution.
     Normal,
@@ -51,11 +51,11 @@ pub(crate) struct SignedRank {
     pub used: usize,
     /// Number of zero differences.
     pub zeros: usize,
-    /// Probability of a W+ at least as far from its mean as the measured one, on either side.
+    /// Probability of a rank sum W+ at least as far from its mean as the measured one, on either side.
     pub p_two_sided: f64,
-    /// Probability of a W+ at least as large as the measured one; small if differences tend to be positive.
+    /// Probability of a rank sum W+ at least as large as the measured one; small if differences tend to be positive.
     pub p_greater: f64,
-    /// Probability of a W+ at most as large as the measured one; small if differences tend to be negative.
+    /// Probability of a rank sum W+ at most as large as the measured one; small if differences tend to be negative.
     pub p_less: f64,
     /// Distribution from which p was computed.
     pub method: Method,
@@ -136,25 +136,26 @@ fn ranks_of(sorted: &[f64]) -> Vec<f64> {
     let mut ranks = Vec::with_capacity(sorted.len());
     for tie in sorted.chunk_by(|a, b| a.abs() >= b.abs()) {
         let before = ranks.len();
-        // The shared rank is the mean of the ranks before + 1 to before + length.
+        // The shared rank is the mean of the ranks from `before` + 1 to `before` + the length of the tie.
         let rank = before as f64 + f64::midpoint(tie.len() as f64, 1.0);
         ranks.extend(tie.iter().map(|_| rank));
     }
     ranks
 }
 
-/// Two-sided, upper and lower p of W+, among all 2^n choices of signs.
+/// Two-sided, upper and lower p of the rank sum W+, among all 2^n choices of signs.
 fn exact(n: usize, w_plus: f64) -> [f64; 3] {
     let counts = sign_choices(n);
     let total: f64 = counts.iter().sum();
-    // Without ties W+ is a whole number.
+    // Without ties the rank sum W+ is a whole number.
     let w = crate::index(math::round_to_i64(w_plus));
     let less = counts.iter().take(w + 1).sum::<f64>() / total;
     let greater = counts.iter().skip(w).sum::<f64>() / total;
     [(2.0 * less.min(greater)).min(1.0), greater, less]
 }
 
-/// Number of sign choices for each W+ from 0 to n (n + 1) / 2. Exact: 2^50 is below 2^53.
+/// Number of sign choices for each rank sum W+ from 0 to n (n + 1) / 2. The numbers are exact in an f64: 2^50 is below
+/// 2^53.
 fn sign_choices(n: usize) -> Vec<f64> {
     let mut counts = vec![0.0; n * (n + 1) / 2 + 1];
     counts[0] = 1.0;
@@ -166,7 +167,7 @@ fn sign_choices(n: usize) -> Vec<f64> {
     counts
 }
 
-/// The p values of a normal distribution. W+ is a sum of ranks, each included with probability one half.
+/// The p values of a normal distribution. The rank sum W+ has each rank included with probability one half.
 fn normal(ranks: impl Iterator<Item = f64>, w_plus: f64, continuity: bool) -> [f64; 3] {
     let (sum, squares) = ranks.fold((0.0, 0.0), |(sum, squares), rank| (sum + rank, squares + rank * rank));
     let (off, sd) = (w_plus - sum / 2.0, math::sqrt(squares / 4.0));

@@ -117,7 +117,7 @@ impl Failure {
     }
 }
 
-/// The log that an error concerns, and the byte in it.
+/// The log that an error concerns, and the byte position in the log.
 fn place_in_log(error: &LogError) -> (Option<String>, Option<String>) {
     match error {
         LogError::Open { path, .. } | LogError::NotAPart { path } => (Some(path.display().to_string()), None),

@@ -10,7 +10,8 @@ use pyo3::{Py, PyRef, Python, pyclass, pymethods};
 
 use crate::errors::Failure;
 
-/// Maximum number of messages that are read ahead without the interpreter's lock, and maximum number of their bytes.
+/// Maximum number of messages that are read ahead without the interpreter's lock. `AHEAD_BYTES` is the maximum number
+/// of their bytes.
 const AHEAD: usize = 512;
 const AHEAD_BYTES: usize = 1 << 20;
 

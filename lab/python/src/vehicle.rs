@@ -11,7 +11,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::errors::Failure;
 
-/// Maximum size of a text file and of a data file, bytes.
+/// Maximum size of a text file, bytes. `DATA_BYTES` is the maximum size of a data file.
 const TEXT_BYTES: u64 = 16 << 20;
 const DATA_BYTES: u64 = 256 << 20;
 

@@ -1,4 +1,4 @@
-//! Parameters of a replay that override those of its log.
+//! Parameters of a replay, which override the parameters in its log.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -30,7 +30,7 @@ pub struct Parameters {
     pub sound_speed_mps: Option<f64>,
     /// Text of a vehicle file that replaces the log's.
     pub vehicle: Option<String>,
-    /// Text of the files that `vehicle` names, by name. Other files are taken from the log.
+    /// Texts of the files that `vehicle` names. The key is the file's name. Other files are taken from the log.
     pub vehicle_files: BTreeMap<String, String>,
     /// Judge along the smoothed trajectory.
     pub smooth: bool,

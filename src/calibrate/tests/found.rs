@@ -87,7 +87,7 @@ fn estimated_mount_has_the_beam_directions_of_the_true_head() {
 #[test]
 fn mirrored_tunnel_gives_mirrored_estimates() {
     for (name, profile) in profiles() {
-        // There is no noise, because the noise isn't mirrored.
+        // The stand has no noise, because noise would not be mirrored.
         let wrong =
             [Wrong { angle_deg: 3.0, left_m: 0.02, up_m: 0.01, is_mirrored: false }, Wrong::default()];
         let stand = Stand { noise_m: 0.0, ..Stand::new(profile, &wrong, 5) };

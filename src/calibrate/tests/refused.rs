@@ -50,7 +50,7 @@ fn calibration_from_part_of_a_turn_is_refused_and_states_the_missing_seconds() {
     }
 }
 
-/// The hull hides one side from the first head, so none of its returns has an opposite one. The other head is calibrated.
+/// The hull hides one side from the first head, so it has no returns from opposite walls. The other head is calibrated.
 #[test]
 fn head_that_sees_one_side_only_is_refused() {
     let stand = Stand::new(shapes::ceran().unwrap(), &[Wrong::default(); 2], 1);
@@ -74,7 +74,7 @@ fn head_that_sees_one_side_only_is_refused() {
     });
 }
 
-/// Section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
+/// Cross-section and returns are symmetric. The two sides can't be distinguished without echosounders, or if the
 /// vehicle is in the centre.
 #[test]
 fn sense_of_rotation_in_a_symmetric_section_needs_echosounders_and_a_vehicle_off_the_centre() {

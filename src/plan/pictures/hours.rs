@@ -12,7 +12,7 @@ use super::modes::{self, Mode};
 use super::shown::Shown;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
-/// Number of values of T at which the fastest mode is determined.
+/// Number of values of the spacing T at which the fastest mode is determined.
 const LEAST: u32 = 300;
 /// Style of the band under the mode that takes the least time.
 const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
@@ -20,7 +20,7 @@ const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::
 /// The spacing T that the chart marks, and the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
-    /// Hours for the whole length, by mode.
+    /// Hours for the whole length in each mode.
     hours: Vec<Option<f64>>,
 }
 
@@ -64,7 +64,7 @@ fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
         Some(target_m) => target_m,
         None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
     };
-    // Without a finite T, the chart has text in place of curves, so the end of its axis has no effect.
+    // Without a finite spacing T, the chart has text in place of curves, so the end of its axis has no effect.
     let t_m = if t_m.is_finite() { t_m } else { 1.0 };
     let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
@@ -80,7 +80,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     if most_h > 0.0 {
         return Ok([2.2 * sought.t_m, (1.15 * most_h).min(4.0 * least_h).max(1.3 * asked_h)]);
     }
-    // If no mode meets the target, the x axis extends to the largest T of any mode at the speed shown.
+    // If no mode meets the target, the x axis extends to the largest spacing T of any mode at the speed shown.
     let mut reached_m = 0.0_f64;
     for mode in modes.iter().filter(|mode| !mode.blind) {
         reached_m = reached_m.max(shown.planner.t_max_m(mode.number, shown.speed_mps)?);
@@ -95,7 +95,7 @@ fn legend(chart: &Chart<'_>) {
     chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL);
 }
 
-/// Points of a mode's curve: T, m, and the hours for the whole length at the largest speed that meets T.
+/// Points of a mode's curve: the spacing T, m, and the hours for the whole length at the largest speed that meets T.
 pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64, marked_m: f64) -> Vec<[f64; 2]> {
     let length_m = shown.planner.inspection().length_m;
     let points = advised::curve(shown.planner, mode.number, most_m, Some(marked_m));
@@ -114,8 +114,8 @@ fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     (1..=LEAST).filter_map(point).collect()
 }
 
-/// Draws the marked T as a vertical line, and the requested time as a horizontal one. Returns the label of
-/// the time.
+/// Draws the marked spacing T as a vertical line, and the requested time as a horizontal one. Returns the label of the
+/// time.
 fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Option<Label> {
     chart.upright(sought.t_m, &look::TARGET);
     if let Some(asked_mps) = shown.asked_mps() {

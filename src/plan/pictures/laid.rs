@@ -19,7 +19,7 @@ pub(super) struct Laid {
     pub(super) pitch_m: f64,
     /// Sample spacing T at the speed of the chart, m; `None` if there is a strip that no head sees.
     pub(super) t_m: Option<f64>,
-    /// Start and end of the stretch that all heads have passed, m.
+    /// Start of the stretch that all heads have passed, m. `to_m` is its end.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
 }
@@ -64,7 +64,7 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
 
 /// Chainages between which all heads have samples: from the largest first chainage of a head to the smallest last one.
 ///
-/// If they span less than a turn, returns the ends of the whole pattern.
+/// If these chainages span less than a turn, returns the ends of the whole pattern.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
     let of = |head: usize| samples.iter().filter(move |sample| sample.head == head).map(|sample| sample.x_m);
     let firsts = (0..heads).map(|head| of(head).fold(f64::INFINITY, f64::min));

@@ -52,8 +52,8 @@ fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {
     Chart::new(canvas, FRAME, &x, &y)
 }
 
-/// Draws the circle of diameter T, clipped to the chart. The axes differ in scale, so the circle becomes an
-/// ellipse.
+/// Draws the circle whose diameter is the spacing T, clipped to the chart. The axes differ in scale, so the circle
+/// becomes an ellipse.
 fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     let (middle, corner) = (chart.px(centre), chart.px([centre[0] + t_m / 2.0, centre[1] + t_m / 2.0]));
     chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T);

@@ -31,7 +31,7 @@ struct Around {
     unseen_m: Option<f64>,
 }
 
-/// Draws the spacings along the perimeter: T_y around the wall, T_x along the tunnel, T of both, the target,
+/// Draws the spacings along the perimeter: T_y around the wall, T_x along the tunnel, T computed from both, the target,
 /// and the strips that only some heads see.
 pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
@@ -90,7 +90,7 @@ fn across(chart: &Chart<'_>, around: &Around) {
     chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
-/// Text about the plan's spacing T; empty if that is also the largest T in the chart.
+/// Text about the plan's spacing T; empty if this T is also the largest in the chart.
 fn note(shown: &Shown<'_>, around: &Around) -> String {
     let (Some(counted_m), Some(here_m)) = (around.counted_m, around.worst.and_then(|place| place.t_m)) else {
         return String::new();

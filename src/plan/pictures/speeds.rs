@@ -62,7 +62,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     let asked_m = here.zip(shown.asked_mps()).and_then(|((_, points), asked_mps)| {
         points.iter().find(|[v_mps, _]| *v_mps >= asked_mps).map(|[_, t_m]| 1.25 * t_m)
     });
-    // Without a target, the axis extends to larger T, so that all modes can be compared.
+    // Without a target, the axis extends to larger spacings T, so that all modes can be compared.
     let wide = if shown.question.target_m.is_none() { 4.0 } else { 1.0 };
     let target_m = shown.question.target_m.map(|target_m| 2.6 * target_m);
     let least_m = if at_rest_m.is_finite() { 1.5 * at_rest_m } else { 0.0 };
@@ -76,7 +76,7 @@ fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     curves.iter().flat_map(|(_, points)| points).map(|[_, t_m]| *t_m).fold(0.0, f64::max)
 }
 
-/// Points of a mode's curve: the largest speed that meets T, m/s, and T, m.
+/// Points of a mode's curve: the largest speed that meets the spacing T, m/s, and T, m.
 pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64) -> Vec<[f64; 2]> {
     let points = advised::curve(shown.planner, mode.number, most_m, shown.question.target_m);
     points.into_iter().map(|[t_m, v_mps]| [v_mps, t_m]).collect()
@@ -85,7 +85,7 @@ pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64) -> Vec<[f64; 2]
 /// The spacing T without position errors at each speed of the axis: speed, m/s, and T, m.
 fn spacings(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>, SamplingError> {
     let point = |k: u32| {
-        // T is undefined at rest, so the first speed is very low.
+        // The spacing T is undefined at rest, so the first speed is very low.
         let v_mps = most_mps * f64::from(k).max(0.01) / f64::from(SPEEDS);
         Ok([v_mps, shown.planner.t_max_m(mode.number, v_mps)?])
     };

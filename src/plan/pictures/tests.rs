@@ -125,7 +125,7 @@ fn pattern_chart_shows_heads_circle_and_hidden_tracks() {
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
-/// In the pattern, no empty circle has a diameter larger than T, and no gap is larger than the drawn one.
+/// In the pattern, no empty circle has a diameter larger than the spacing T, and no gap is larger than the drawn one.
 #[test]
 fn no_empty_circle_is_wider_than_the_spacing_t() {
     let plans = [
@@ -148,7 +148,7 @@ fn no_empty_circle_is_wider_than_the_spacing_t() {
         let worst_m = wall::unseen_m(&planner).or(wall::worst(&planner, &places).map(|place| place.arc_m));
         let shown_m = empty_m(worst_m.unwrap());
         assert!(around_m.max(shown_m) <= 1.001 * t_m, "{arguments}: {around_m} {shown_m} of {t_m}");
-        // With a steep helix the largest gap is smaller than the diagonal of T_x and T_y.
+        // With a steep helix the largest gap is clearly smaller than the spacing T.
         assert!(shown_m > 0.75 * t_m, "{arguments}: {shown_m} of {t_m}");
         assert!(shown_m > 0.97 * around_m, "{arguments}: {shown_m} of {around_m} elsewhere");
     }
@@ -195,7 +195,7 @@ fn duration_chart_marks_the_best_mode_and_the_available_time() {
     says(&draw(inspection(VITA_2), FAST, 0.097, day, "hours"), &["required: 20.0 h", "20 h required"]);
 }
 
-/// Checks that the hours and speeds of the table are those of labels and curves, position errors included.
+/// Checks that the hours and speeds of the table equal those in labels and curves, position errors included.
 fn compare(planner: &Planner, target_m: f64, title: &str) {
     let question = Question { target_m: Some(target_m), ..Question::default() };
     let answers = planner.answers(&question, None).unwrap();
@@ -250,7 +250,7 @@ fn duration_chart_without_a_target_uses_the_spacing_at_the_requested_speed() {
 
 #[test]
 fn charts_label_modes_that_miss_the_target() {
-    // In the corners, the angular step of the mode FASTEST alone gives a larger T than this target.
+    // In the corners, the angular step of the mode FASTEST alone gives a larger spacing T than this target.
     let coarse = Question { target_m: Some(0.4), ..TARGET };
     for name in ["speeds", "hours"] {
         let svg = draw(inspection(VITA_2), FAST, 0.08, coarse, name);

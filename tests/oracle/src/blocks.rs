@@ -7,7 +7,7 @@ use super::truth::Truth;
 use super::wall::Wall;
 use crate::error::TruthError;
 
-/// Length of a block, and of the overlap that is searched on either side of the block, m.
+/// Length of a block, m. `BEYOND_M` is the length of the overlap that is searched on either side of the block.
 const BLOCK_M: f64 = 64.0;
 const BEYOND_M: f64 = 32.0;
 /// Longest dive that is handled as a single block, m.
@@ -43,8 +43,8 @@ impl Blocks {
             let near = (begins_m - BEYOND_M)..(ends_m + BEYOND_M);
             let places =
                 truth.samples.iter().map(|sample| sample.place).filter(|[x_m, _]| near.contains(x_m));
-            // This never fails: `Wall::new` rejects only coordinates that aren't numbers or are far too large. True
-            // samples have neither fault.
+            // Building the wall never fails here: `Wall::new` rejects only coordinates that aren't numbers or are far
+            // too large. True samples have neither fault.
             Wall::new(places, truth.perimeter_m).unwrap_or_default()
         });
         // A circle with a radius of `BEYOND_M` or more may contain samples beyond this block and its overlap. Such a

@@ -1,4 +1,4 @@
-//! Simulates a dive once, replays it with any settings, and compares the reported sections with D_true.
+//! Simulates a dive once, replays it with any settings, and compares the reported sections with the true holes D_true.
 //!
 //! The estimated chainage may have a constant offset (slack, wheel scale). Section bounds are in estimated chainage,
 //! because a pilot goes back to an estimated chainage. For the comparison, the bounds of each section are shifted by
@@ -102,7 +102,7 @@ pub struct Recorded {
     /// True trajectory of the vehicle.
     pub scenery: Scenery,
     wall: Blocks,
-    /// Cache of D_true by the bits of the stretch's bounds.
+    /// Cache of the true holes D_true, by the bits of the stretch's bounds.
     holes_m: RefCell<BTreeMap<[u64; 2], f64>>,
 }
 
@@ -174,7 +174,7 @@ impl Recorded {
         ends.map_or(0.0, |((first, ..), (last, ..))| last.since(*first).as_secs_f64())
     }
 
-    /// D_true of a stretch of true chainage, m; infinite without samples.
+    /// True hole D_true of a stretch of true chainage, m; infinite without samples.
     pub fn true_hole_m(&self, from_m: f64, to_m: f64) -> f64 {
         let key = [from_m.to_bits(), to_m.to_bits()];
         *self.holes_m.borrow_mut().entry(key).or_insert_with(|| self.wall.hole_m(&self.truth, from_m, to_m))

@@ -1,4 +1,4 @@
-//! A second computation of D_true, which bounds the error of the first one.
+//! A second computation of the true hole D_true, which bounds the error of the first one.
 //!
 //! It uses no Voronoi vertices. For one chainage at a time, it finds the highest point of the lower envelope of
 //! distances to all samples. If a circle's centre moves, its radius grows by at most that movement. So a stretch of
@@ -12,8 +12,8 @@ use crate::error::TruthError;
 /// Stretches of chainage with at most this half length aren't halved again, m.
 const FINEST_M: f64 = 2e-10;
 
-/// D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and infinite
-/// without samples.
+/// Hole diameter D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and
+/// infinite without samples.
 pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
     let radius_m = |x_m: f64| wall.largest_on(x_m).map_or(f64::INFINITY, |circle| circle.radius_m);
     let mut best_m = radius_m(from_m).max(radius_m(to_m));
@@ -30,7 +30,7 @@ pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
     2.0 * best_m
 }
 
-/// Bound on the error of D_true in a dive, m.
+/// Bound on the error of the true holes D_true in a dive, m.
 ///
 /// This bound is the sum of two parts. One is the largest difference between the two computations over stretches of
 /// section length. The other is the error that the arc lengths of two samples may add.

@@ -27,7 +27,7 @@ impl HasPosition for Vertex {
     }
 }
 
-/// A circle on the unrolled wall that contains no samples.
+/// An empty circle on the unrolled wall: it contains no samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
     /// Centre of the circle: chainage and arc length, m.
@@ -86,7 +86,8 @@ impl Wall {
         Some(best)
     }
 
-    /// D of a stretch between two chainages, m: the diameter of its largest empty circle, infinite without samples.
+    /// Hole diameter D of a stretch between two chainages, m: that of its largest empty circle; infinite without
+    /// samples.
     pub fn hole_m(&self, from_m: f64, to_m: f64) -> f64 {
         self.largest(from_m, to_m).map_or(f64::INFINITY, |circle| 2.0 * circle.radius_m)
     }

@@ -105,7 +105,8 @@ pub enum Condition {
     Lively,
     /// The speed of sound in the water is 4 % above the value in the vehicle file.
     WrongSound,
-    /// The mounts of all heads differ by 0.3 degrees (sd) from the vehicle file, which declares this error.
+    /// The mounts of all heads differ by 0.3 degrees (standard deviation) from the vehicle file, which declares this
+    /// error.
     Mounts,
     /// The mount of a head differs by 3 degrees from the vehicle file.
     WrongMount,
@@ -220,7 +221,7 @@ const MEMS_TOLD: &str = "gyro_noise_degps_rthz = 0.007\naccel_noise_mps2_rthz = 
      gyro_bias_time_s = 300\naccel_bias_mps2 = 0.02\naccel_bias_time_s = 300\n";
 const STEEL: &str = "magnetic_disturbance = { per_100m = 4, up_to_deg = 10, length_m = 6 }\n";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
-/// Cable slack settings of the vehicle file, for a taut and for a hanging cable.
+/// Cable slack settings of the vehicle file for a taut cable. `HANGS` has those for a hanging cable.
 const TAUT: &str = "slack_sd_m = 0.003\nslack_time_s = 10\n";
 const MOUNTS: &str = "mount_sd_deg = 0.3\n";
 const HANGS: &str = "slack_sd_m = 0.06\nslack_time_s = 10\n";
@@ -295,8 +296,8 @@ impl Cell {
         told.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.told_navigation()))
     }
 
-    /// Navigation settings that state the slack of the cable and the noise of the unit, if the pilot knows them in
-    /// this condition.
+    /// Navigation settings that state the slack of the cable and the noise of the unit, if the pilot knows both in this
+    /// condition.
     fn told_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),

@@ -48,30 +48,31 @@ pub struct Figures {
     pub dives: u32,
     /// Number of sections, including sections at the ends of dives.
     pub sections: u32,
-    /// Number of sections with D_true over the target.
+    /// Number of sections with a true hole D_true over the target.
     pub over: u32,
-    /// Number of passed sections with D_true over the target.
+    /// Number of passed sections with a true hole D_true over the target.
     pub passed_over: u32,
-    /// Number of passed sections with D_true over 1.1 times the target.
+    /// Number of passed sections with a true hole D_true over 1.1 times the target.
     pub passed_far: u32,
-    /// List of the passed sections with D_true over the target.
+    /// List of the passed sections with a true hole D_true over the target.
     pub falsely: Vec<FalsePass>,
-    /// Number of sections with D_true below 0.9 times the target.
+    /// Number of sections with a true hole D_true below 0.9 times the target.
     pub under: u32,
-    /// Number of failed sections with D_true below 0.9 times the target.
+    /// Number of failed sections with a true hole D_true below 0.9 times the target.
     pub failed_under: u32,
     /// Total inner length, which excludes the ends of dives, m.
     pub inner_m: f64,
-    /// Inner length by verdict, m: passed, failed, can't say, open.
+    /// Inner length with each verdict, m: passed, failed, can't say, open.
     pub verdicts_m: [f64; 4],
-    /// Inner length with D_true within the target, m.
+    /// Inner length with a true hole D_true within the target, m.
     pub passable_m: f64,
-    /// One pair for each inner section with a bounded hole, unless the hole is centred on a boundary of the section: D
-    /// minus D_true, and the standard deviation of D, m.
+    /// One pair for each inner section with a bounded hole, unless the hole is centred on a boundary of the section:
+    /// hole D minus true hole D_true, and the standard deviation of D, m.
     pub errors: Vec<[f64; 2]>,
-    /// Number of measurements that the filter used, and sum of their normalised innovations squared, by kind of sensor.
+    /// For each kind of sensor: number of measurements that the filter used, and sum of their normalised innovations
+    /// squared.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
-    /// Advised speeds, without those near the ends of dives, m/s.
+    /// Advised speeds, without the speeds near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,
     /// Length of the vehicle's trajectory, and length of the part for which the report has sections, m.
     pub way_m: [f64; 2],
@@ -160,8 +161,8 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle centred on a section's boundary belongs to the neighbouring section's hole. To include it
-        // here would count that hole twice.
+        // A circle centred on a section's boundary belongs to the neighbouring section's hole. If the circle counted
+        // here, that hole would count twice.
         let is_own = section
             .report
             .hole_x_m
@@ -212,12 +213,12 @@ impl Figures {
         self.verdicts_m[verdict] / self.inner_m
     }
 
-    /// Fraction of the inner length with D_true within the target, 0 to 1.
+    /// Fraction of the inner length with a true hole D_true within the target, 0 to 1.
     pub fn passable(&self) -> f64 {
         self.passable_m / self.inner_m
     }
 
-    /// Root mean square of the errors of D, each divided by its standard deviation.
+    /// Root mean square of the errors of the hole diameter D, each divided by its standard deviation.
     pub fn ratio_rms(&self) -> f64 {
         if self.errors.is_empty() {
             f64::NAN
@@ -226,18 +227,18 @@ impl Figures {
         }
     }
 
-    /// Fraction of the errors of D that are within this many standard deviations.
+    /// Fraction of the errors of the hole diameter D that are within this many standard deviations.
     pub fn within(&self, sigmas: f64) -> f64 {
         let within = self.errors.iter().filter(|[error_m, sd_m]| error_m.abs() <= sigmas * sd_m).count();
         within as f64 / self.errors.len() as f64
     }
 
-    /// Root mean square of the errors of D, m.
+    /// Root mean square of the errors of the hole diameter D, m.
     pub fn error_m(&self) -> f64 {
         rms(self.errors.iter().map(|[error_m, _]| *error_m))
     }
 
-    /// Median of the reported standard deviations of D, m.
+    /// Median of the reported standard deviations of the hole diameter D, m.
     pub fn sd_m(&self) -> f64 {
         median(self.errors.iter().map(|[_, sd_m]| *sd_m))
     }
@@ -253,12 +254,12 @@ impl Figures {
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Among sections with D_true over the target, the fraction that passed.
+    /// Among sections with a true hole D_true over the target, the fraction that passed.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Among sections with D_true below 0.9 times the target, the fraction that failed.
+    /// Among sections with a true hole D_true below 0.9 times the target, the fraction that failed.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }

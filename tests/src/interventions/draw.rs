@@ -51,7 +51,7 @@ plugin = "tether_hid"
 counts_per_metre = 2000
 "#;
 
-/// A cause of failed sections that is injected into a dive.
+/// A cause that is injected into a dive, so that sections fail.
 #[expect(missing_docs, reason = "the variants name their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Injected {

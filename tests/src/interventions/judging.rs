@@ -15,7 +15,8 @@ const JOIN_M: f64 = 0.5;
 /// A hole up to this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
-/// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of them.
+/// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of these
+/// sets.
 pub type Right = Vec<Vec<Cause>>;
 
 /// A failed section with true and displayed causes.
@@ -44,8 +45,8 @@ impl Judged {
         self.right.contains(&self.told)
     }
 
-    /// Whether the only displayed cause is nearly right: it was injected, and without it the hole exceeds the
-    /// target by at most 5 %.
+    /// Whether the only displayed cause is nearly right: the cause was injected, and without the cause the hole exceeds
+    /// the target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
@@ -105,7 +106,8 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let is_inner = |section: &&SectionRow| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
-    // The target may be changed here: holes don't depend on it. All later reports use it for their verdicts.
+    // The target may be changed here: holes don't depend on it. All later reports use the new target for their
+    // verdicts.
     let all = report(&drawn, &|_| true);
     let without: Vec<Report> = match kinds {
         [_, _] => (0..2).map(|k| report(&drawn, &|other| other != k)).collect(),

@@ -73,8 +73,8 @@ impl Device {
         self.was_broken
     }
 
-    /// Handles the machine's bytes, measures, sends, and delivers the parts that are due. A `quiet` device sends
-    /// nothing new.
+    /// Handles the bytes from the machine, measures, sends, and delivers the parts of frames that are due. A `quiet`
+    /// device sends nothing new.
     pub fn step(&mut self, now: MonoNs, quiet: bool) {
         self.connection(now);
         let mut out = Vec::new();

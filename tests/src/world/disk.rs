@@ -16,7 +16,7 @@ use crate::random::Random;
 
 /// Smallest unit that a power cut leaves intact, bytes.
 const SECTOR_BYTES: usize = 512;
-/// Linux error numbers EIO (input or output error) and ENOSPC (no space left on device).
+/// Linux error number for an input or output error. `ENOSPC` means no space left on the device.
 const EIO: i32 = 5;
 const ENOSPC: i32 = 28;
 

@@ -208,7 +208,7 @@ impl World {
         }
     }
 
-    /// The same world with a terminal that accepts everything or nothing.
+    /// The same world with a terminal that accepts nothing if `stands` is set, and otherwise everything.
     #[must_use]
     pub fn with_terminal(mut self, stands: bool) -> Self {
         self.plan = self.plan.with_terminal(stands);

@@ -8,13 +8,13 @@ use crate::random::Random;
 
 /// Time of the simulated clock at which dives start; the machine was switched on some time before.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
-/// Period at the start of a dive in which faults begin, ns.
+/// Faults begin within this time from the start of a dive, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
 /// Duration of a dive. It includes time to recover after the last fault.
 const LENGTH: DurNs = DurNs(12_000_000_000);
-/// Longest durations of faults, ns. A delay on a cable is shorter than any silence timeout. A stall of the loop or
-/// recorder is long enough to fill the queues.
+/// Longest delay on a cable, ns. It is shorter than any silence timeout. `LONGEST_STALL_NS` is the longest stall of the
+/// loop or recorder, long enough to fill the queues.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;
@@ -275,7 +275,7 @@ impl Plan {
         plan
     }
 
-    /// The same plan with a terminal that accepts everything or nothing.
+    /// The same plan with a terminal that accepts nothing if `stands` is set, and otherwise everything.
     #[must_use]
     pub fn with_terminal(mut self, stands: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);

@@ -5,7 +5,7 @@
 pub enum Sabotage {
     /// Every hundredth frame of a device without faults is lost on its way.
     CableLoses,
-    /// When the connection of one device breaks, that of another device breaks, too.
+    /// When the connection of one device breaks, the connection of another device breaks, too.
     NeighbourBreaks,
     /// Every fortieth write to the disk is dropped but reported as done.
     DiskForgets,

@@ -117,7 +117,7 @@ fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     )
 }
 
-/// The displayed position is that of the vehicle's origin. Heads are mounted ahead of it and behind it.
+/// The displayed position is that of the vehicle's origin. Heads are mounted ahead of this origin and behind it.
 #[test]
 fn following_the_go_back_advice_clears_every_missed_section() {
     let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();

@@ -12,7 +12,7 @@ const RENEW: &str = "HEADRACE_RENEW_README";
 /// The part of the demonstration's piped output that the README shows.
 ///
 /// It consists of the line with the missed section, the state after it, the line that clears the section, and the
-/// summary with the metres by verdict.
+/// summary with the length of each verdict.
 fn excerpt(stdout: &str) -> String {
     let lines: Vec<&str> = stdout.lines().collect();
     let missed = lines.iter().position(|line| line.contains("MISSED: ")).unwrap();

@@ -105,7 +105,7 @@ fn wrong_report_violates_the_schema() {
 const UNITS: [(&str, &str); 13] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),
-    // Keys of the vehicle file.
+    // These two keys are also keys of the vehicle file.
     ("clock_from", "hours"),
     ("clock_to", "hours"),
     ("_deg", "degrees"),

@@ -11,8 +11,7 @@ const QUICK: [(&str, &[&str]); 2] =
 /// Duration of the rehearsal in the tutorial and in the test, s.
 const REHEARSAL_S: [&str; 2] = ["300", "3"];
 
-/// Interval at which the test looks for the rehearsal's vehicle file, and number of tries. Together they take one
-/// minute.
+/// Interval at which the test looks for the rehearsal's vehicle file. `WAITS` tries take one minute.
 const WAIT: Duration = Duration::from_millis(50);
 const WAITS: usize = 1200;
 

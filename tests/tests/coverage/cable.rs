@@ -1,5 +1,5 @@
 //! A cable counter that gets stuck while the vehicle moves. The fault is reported at once. No section far over the
-//! target passes because of it, with one known exception.
+//! target passes because of the fault, with one known exception.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::time::MonoNs;
@@ -19,8 +19,9 @@ const DIVES: u64 = 24;
 const EDGE_MPS: f64 = 0.118;
 const LENGTH_M: f64 = 14.0;
 const DOUBTED_WITHIN_S: f64 = 2.0;
-/// Known number of sections that pass with D_true over 1.1 T; the goal is zero. Such a section has samples from before
-/// and after the moment when the counter is first doubted. The reported standard deviation of its hole is too small.
+/// Known number of sections that pass with a true hole over 1.1 times the target T; the goal is zero. Such a section
+/// has samples from before and after the moment when the counter is first doubted. The reported standard deviation of
+/// its hole is too small.
 const KNOWN_FAR: usize = 1;
 
 /// A simulated dive during which the cable counter is stuck.

@@ -44,10 +44,11 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
 struct Wrong {
     /// Largest error of the displayed speed while there is a fix, m/s.
     speed_mps: f64,
-    /// Number of sections that pass with a true hole over 1.1 T, and number that fail with a true hole below 0.9 T.
+    /// Number of sections that pass with a true hole over 1.1 times the target. `failed` counts sections that fail with
+    /// a true hole below 0.9 times the target.
     passed: usize,
     failed: usize,
-    /// Number of sections with the verdict `cannot_say`, and number of all sections.
+    /// Number of sections with the verdict `cannot_say`. `sections` is the number of all sections.
     cannot_say: usize,
     sections: usize,
 }

@@ -1,4 +1,4 @@
-//! The report accounts for every metre of the dive. The report of a dive without a position states this first.
+//! The report accounts for every metre of the dive. If a dive has no position, its report says so first.
 //!
 //! Each section that the vehicle or its heads have entered is judged or open, even if no head has looked at it.
 
@@ -12,7 +12,7 @@ use headrace_tests::{Folder, SCENE, VEHICLE as SHORT, instrumented};
 use crate::dives::DIVES;
 
 const VEHICLE: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// Distance of VITA 2's heads from its origin, both ahead of it and behind it, m.
+/// Distance of VITA 2's heads from the vehicle's origin, ahead and behind, m.
 const HEAD_M: f64 = 0.551;
 const START_M: f64 = 3.0;
 const SPEED_MPS: f64 = 0.11;
@@ -32,7 +32,7 @@ fn silence(sensors: &str, span: &str) -> String {
 
 const ALL: &str = r#""sonar_0", "sonar_1", "sonar_2", "sonar_3""#;
 
-/// Checks that lengths by verdict add up to the coverage extent, and that the list of sections has no gaps.
+/// Checks that the lengths of all verdicts add up to the coverage extent, and that the list of sections has no gaps.
 #[track_caller]
 fn accounted_for(what: &str, report: &Report) {
     let all_m = report.summary.way_m();
@@ -60,7 +60,7 @@ fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// Time at which the plane `behind_m` behind the vehicle is half the target past a section's end, seconds after the
+/// Time at which a plane, `behind_m` behind the vehicle, is past a section's end by half the target, seconds after the
 /// start.
 fn left_s(section: &SectionRow, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
@@ -212,7 +212,7 @@ fn verdict_lengths_add_up_in_random_dives() {
     }
 }
 
-/// Short dives out and back that reach beyond a short tunnel and end at any place in a section.
+/// The dives are short, go out and back, reach beyond a short tunnel, and end at any place in a section.
 #[test]
 fn lengths_of_all_verdicts_add_up_in_dives_out_and_back() {
     let vehicle = SHORT.replace("length_m = 100", "length_m = 8");

@@ -11,7 +11,7 @@ use headrace_tests::random_dives::Draw;
 const SEEDS: u64 = 60;
 const LENGTH_M: f64 = 7.0;
 
-/// Largest allowed share of passes among the sections with D_true over T.
+/// Largest allowed share of passes among the sections with a true hole over the target T.
 const MOST_OVER: f64 = 0.025;
 
 /// A random cell of the field table (vehicle, condition, place and speed), near the portal or far from it. The expected

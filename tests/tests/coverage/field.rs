@@ -85,8 +85,9 @@ fn no_section_far_over_the_target_passes_with_fish_and_second_echoes() {
     assert!(f64::from(failed_under) <= 0.005 * f64::from(under), "{sum:?}");
 }
 
-/// On walls as rough as the vehicle file allows, the reported standard deviation of D is neither too small nor too
-/// large. An echosounder sees the same bump for seconds. The filter must not take the bump for a change of position.
+/// On walls as rough as the vehicle file allows, the reported standard deviation of the hole diameter D is neither too
+/// small nor too large. An echosounder sees the same bump for seconds. The filter must not take the bump for a change
+/// of position.
 #[test]
 fn reported_sd_of_d_is_right_on_rough_walls() {
     for name in ["vita2-4", "pipe", "bluerov2"] {
@@ -155,7 +156,8 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
 }
 
 /// Swinging finds an undeclared mount error of 3 degrees. Declared mount errors are included in the standard deviation
-/// of D and in the planned speed. `HEADRACE_MOUNT_SEEDS=10` tries all vehicles, with ten dives of each cell.
+/// of the hole diameter D and in the planned speed. `HEADRACE_MOUNT_SEEDS=10` tries all vehicles, with ten dives of
+/// each cell.
 #[test]
 fn no_section_far_over_the_target_passes_with_wrong_mounts() {
     const ALL: [&str; 7] =

@@ -11,7 +11,7 @@ use headrace_tests::truth::{self, JudgedDive};
 const PARKED_S: u32 = 3600;
 /// Number of times that the vehicle goes back and forth.
 const ROUNDS: usize = 100;
-/// Chainages between which the vehicle goes back and forth, m.
+/// Chainage from which the vehicle goes back and forth, up to `TO_M`, m.
 const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
 /// Chainage of the end of the dive, m.

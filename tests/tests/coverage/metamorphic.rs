@@ -27,7 +27,7 @@ struct Beside<'a> {
     there: &'a Dive,
     /// Chainage offset of the second dive, m.
     along_m: f64,
-    /// Maps arc lengths of the second dive to those of the first.
+    /// Maps arc lengths of the second dive to arc lengths of the first dive.
     around: &'a dyn Fn(f64) -> f64,
 }
 

@@ -70,8 +70,8 @@ fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed and this diameter is at most the upper bound of its hole. The bound may come from the
-/// samples of some visits only. The oracle uses the samples of all visits, which can only make the hole smaller.
+/// Whether a section passed and this diameter is at most the upper bound of the section's hole. The bound may come from
+/// the samples of some visits only. The oracle uses the samples of all visits, which can only make the hole smaller.
 fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
@@ -174,8 +174,8 @@ fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
 
 /// Whether a section has samples that deviate from the design by more than a tenth of the radius.
 ///
-/// Such a return is stored only after the next returns of its head. So later samples of other heads may be stored
-/// before it, and count as earlier passes.
+/// A return that deviates so far is stored only after the next returns of its head. So later samples of other heads may
+/// be stored before it, and count as earlier passes.
 fn has_run(section: &SectionRow, perimeter_m: f64) -> bool {
     let extremes_m = section.deviation.map(|deviation| [deviation.inmost_m, deviation.outmost_m]);
     extremes_m.into_iter().flatten().any(|off_m| off_m.abs() > 0.1 * perimeter_m / TAU)
@@ -223,7 +223,7 @@ fn spacings_of_every_section_match_their_definitions() {
     assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without end points of series");
 }
 
-// Tests of the oracle itself.
+// Places in rows and columns, for tests of the oracle itself. `at` returns the place of a row and column.
 
 fn lattice(rows: u32, columns: u32, at: impl Fn(f64, f64) -> Place) -> Vec<Place> {
     let row = |i| (0..columns).map(move |j| (f64::from(i), f64::from(j)));
@@ -278,7 +278,7 @@ fn holes_of_small_sample_sets_match_a_dense_grid_search() {
             .fold(0.0, f64::max);
         let exact = wall.largest(0.0, 0.5).unwrap();
         let short_m = exact.radius_m - dense_m;
-        // A point's distance to its nearest sample differs from that of the nearest grid point by no more than the
+        // Between a point and the nearest grid point, the distance to the nearest sample changes by no more than the
         // distance between the two points.
         assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
     }
@@ -337,8 +337,8 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // Ping 20 has no return. So the pings beside its angle have no T_x in the next turn, and T_y of the return after it
-    // spans the gap.
+    // Ping 20 has no return. So the pings beside this ping's angle have no pass distance T_x in the next turn, and the
+    // ping distance T_y of the return after ping 20 spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

@@ -77,8 +77,8 @@ fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
     assert!(100 * over <= passed, "{over} of {passed}");
 }
 
-/// A stuck head repeats one angle and one range; a head without returns keeps turning. For both, the advised speed is
-/// that with a silent head, the cause is a silent or stalled head, and an alert names the head.
+/// A stuck head repeats one angle and one range; a head without returns keeps turning. In both cases, the advised speed
+/// is the speed for a silent head, the cause is a silent or stalled head, and an alert names the head.
 #[test]
 fn head_without_returns_is_reported_as_silent() {
     let deaf = "stuck_range = { range_m = 0.3, from_s = 90, sensors = [\"sonar_1\"] }\n";

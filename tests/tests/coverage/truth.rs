@@ -1,4 +1,4 @@
-//! Checks the D_true oracle against other computations.
+//! Checks the oracle of true holes, D_true, against other computations.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;

@@ -71,7 +71,7 @@ fn driving_back_revokes_no_pass() {
     assert!(lost.is_empty(), "{lost:?}");
 }
 
-/// The vehicle is too fast on both visits, and the slack of the cable differs between them.
+/// The vehicle is too fast on both visits, and the slack of the cable differs between the visits.
 #[test]
 fn no_section_far_over_the_target_passes_after_two_visits_with_different_slack() {
     let (mut over, mut wrong, mut passed) = (0, 0, 0);

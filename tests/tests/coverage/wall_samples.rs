@@ -1,4 +1,5 @@
-//! Only returns that are accepted as wall fill holes. They are compared with the objects that the beams truly met.
+//! Only returns that are accepted as wall fill holes. The test compares these returns with the objects that the beams
+//! truly met.
 //!
 //! Cases are stuck and noisy heads, murk, boulders and caves.
 
@@ -21,7 +22,7 @@ const CREEP: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[tr
     speed_mps = 0.03\n[effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.005 }\n";
 const DRIFT: &str = "pilot_drift = { across_m = 0.2, up_m = 0.1, yaw_deg = 6, period_s = 15 }\n";
 
-/// A vehicle in a pipe of 1 m radius. It has this many heads, which alternately look forward and aft.
+/// A vehicle in a pipe of 1 m radius. The vehicle has `heads` heads, which alternately look forward and aft.
 fn pipe(heads: usize) -> String {
     let mut text = "target_m = 0.25\n[tunnel]\nprofile = \"circle\"\nradius_m = 1\nlength_m = 30\n[water]\n\
         sound_speed_mps = 1447\n[navigation]\nslack_time_s = 10\n[heads]\nplanned_speed_mps = 0.03\n"
@@ -50,8 +51,8 @@ fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
     alerts
 }
 
-/// Difference between the range of each ping and the true range of the object that its beam met, m. The order is that
-/// of the loop; `None` if one of the two ranges is missing.
+/// Difference between the range of each ping and the true range of the object that its beam met, m. The list is in the
+/// loop's order; `None` if one of the two ranges is missing.
 fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
     let scene = scenes::scene_from(scene, &|_| Ok(vehicle.as_bytes().to_vec()));
     let mut simulation = Simulation::with_truth(&scene).unwrap();
@@ -71,13 +72,13 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
 /// Returns and sections of a dive in murk, compared with the objects that the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Number of returns from the wall, and how many of them the loop classified as doubtful.
+    /// Number of returns from the wall. The loop classified `met_doubtful` of them as doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Number of returns from objects other than the wall, and how many of them the loop accepted as wall.
+    /// Number of returns from objects other than the wall. The loop accepted `strays_wall` of them as wall.
     strays: usize,
     strays_wall: usize,
-    /// Number of passed sections, and their largest ratio of true hole to target.
+    /// Number of passed sections. `worst` is their largest ratio of true hole to target.
     passed: usize,
     worst: f64,
 }

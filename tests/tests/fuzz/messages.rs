@@ -1,4 +1,4 @@
-//! Messages of a log that may be broken.
+//! Messages of a log, which may be broken.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;

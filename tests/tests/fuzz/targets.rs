@@ -89,7 +89,7 @@ impl Surroundings {
         Self { vehicle: read(VEHICLE), vehicles }
     }
 
-    /// One [`Taker`] for each sensor. It states the stream that contains the sensor's data. In tables and ROS
+    /// One [`Taker`] for each sensor. The taker states the stream that contains the sensor's data. In tables and ROS
     /// recordings this is the stream with the sensor's name, and in other files the only stream.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {

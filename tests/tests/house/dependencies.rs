@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::workspace::root;
 
-/// Names of the libraries in other languages that the program links.
+/// Names of linked libraries that are written in other languages.
 const FOREIGN_LIBRARIES: [&str; 4] = ["hidapi", "lz4", "ring_core_0_17_14_", "zstd"];
 /// Crates that are never built for a supported system, because only web pages need them.
 const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];

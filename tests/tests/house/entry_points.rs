@@ -1,4 +1,5 @@
-//! Checks that `tests/tests/fuzz/entry_points` lists every file that interprets external bytes, and how it is tested.
+//! Checks that `tests/tests/fuzz/entry_points` lists every file that interprets external bytes, and how the file is
+//! tested.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,7 +19,7 @@ const SIGNS: [&str; 9] = [
     "postcard::take_from",
     "from_utf8(",
 ];
-/// Files that interpret only text of this program, or texts of a file that is listed.
+/// Files that interpret only text of this program, or text of a listed file.
 const OWN_TEXT: [&str; 14] = [
     "core/sampling/src/advice/answer.rs",
     "plugins/dashboard/src/assets.rs",

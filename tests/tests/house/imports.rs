@@ -71,7 +71,7 @@ pub(crate) fn imports(text: &str) -> Imports {
                     }
                 }
             }
-            // A module in a macro definition, whose name is an argument.
+            // A module whose name is an argument of a macro definition.
             [Word("mod"), Mark('$'), Word(name), Mark('{'), ..] => {
                 around.push((name, depth));
                 depth += 1;

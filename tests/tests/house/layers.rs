@@ -11,7 +11,7 @@ const CORE: [&str; 8] =
 /// Crates of the core that the crate of a device may use.
 const FOR_DEVICES: [&str; 1] = ["sensor"];
 
-/// Crates that the ports crate may use; it connects devices with the loop.
+/// Crates that the ports crate may use. The ports crate connects devices with the loop.
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
 /// Crates of `replay/` and plugins that each crate in `replay/` may use in addition to the core.

@@ -11,7 +11,7 @@ pub(crate) use headrace_tests::root;
 pub(crate) struct Package {
     /// Folder of the package, relative to the root.
     pub(crate) place: PathBuf,
-    /// Packages of this workspace on which the package depends, without those for its tests only.
+    /// Packages of this workspace on which the package depends, without packages that only its tests need.
     pub(crate) needs: Vec<String>,
     /// Root files of the package's libraries, programs, tests and benches.
     pub(crate) targets: Vec<PathBuf>,
@@ -23,7 +23,7 @@ impl Package {
     }
 }
 
-/// The workspace's packages by name.
+/// The workspace's packages. The key is the package's name.
 pub(crate) fn workspace() -> BTreeMap<String, Package> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])

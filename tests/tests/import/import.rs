@@ -66,8 +66,8 @@ struct Telemetry {
 
 #[test]
 fn bluerov_telemetry_becomes_a_log_that_replays() {
-    // The counts come from `oracles/tlog.py`. `attitude` is the number of ATTITUDE and RAW_IMU messages, `depth` that
-    // of SCALED_PRESSURE2 messages.
+    // The counts come from `oracles/tlog.py`. `attitude` is the number of ATTITUDE and RAW_IMU messages, and `depth`
+    // the number of SCALED_PRESSURE2 messages.
     let trimmed = Telemetry { entries: 6499 - 4, attitude: 776 + 81, depth: 188 };
     let full_length = Telemetry { entries: 35_916 - 4, attitude: 5245 + 528, depth: 635 };
     for (path, wanted) in recordings::both(TELEMETRY, trimmed, full_length) {

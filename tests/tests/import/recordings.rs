@@ -27,7 +27,8 @@ struct Wanted {
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Number of accelerometer readings (specific force), and number of readings of the first pressure sensor.
+    /// Number of accelerometer readings (specific force). The gyros and the first pressure sensor have as many
+    /// readings.
     forces: usize,
     mean_force_g: f64,
     /// Number of readings of the second pressure sensor.
@@ -126,7 +127,7 @@ fn check_imu(path: &Path, wanted: &Wanted) {
         assert!((got.0 - least).abs() < 1e-5 && (got.1 - most).abs() < 1e-5, "{got:?}");
     };
     near(roll, wanted.roll);
-    // Pitch and yaw have the opposite sign of the autopilot's.
+    // headrace's pitch and yaw have the opposite sign of the autopilot's pitch and yaw.
     let reversed = |[least, most]: [f64; 2]| [-most, -least];
     near(pitch, reversed(wanted.pitch));
     near(yaw, reversed(wanted.yaw));

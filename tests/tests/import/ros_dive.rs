@@ -118,7 +118,7 @@ impl Translator {
             }
             id if id.starts_with("ping") => {
                 let mm = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
-                // An echosounder assumes a speed of sound of 1500 m/s, but in this water it is 1447 m/s.
+                // An echosounder assumes a speed of sound of 1500 m/s, but the speed in this water is 1447 m/s.
                 let range_m = if mm == 0 { f64::INFINITY } else { f64::from(mm) / 1000.0 * 1447.0 / 1500.0 };
                 let cdr = stamped.number([0]).f32(0.4).f32(0.3).f32(100.0).f32(range_m);
                 Some((format!("/{id}"), "sensor_msgs/msg/Range", cdr))

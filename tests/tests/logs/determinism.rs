@@ -11,7 +11,7 @@ const TICKS_MS: [&str; 6] = ["1", "5", "20", "100", "777", "60000"];
 
 /// Runs `work` while `threads` threads keep the cores busy.
 fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
-    /// Ends the busy threads when it is dropped, even if `work` panics.
+    /// Ends the busy threads when this value is dropped, even if `work` panics.
     struct Stop<'a>(&'a AtomicBool);
     impl Drop for Stop<'_> {
         fn drop(&mut self) {

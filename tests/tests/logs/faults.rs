@@ -68,7 +68,7 @@ fn single_failed_sync_is_reported_and_loses_nothing() {
     assert!(code == Some(3) && told.contains("Input/output error") && told.contains("no message"), "{told}");
     assert!(folder.path("log.part002.mcap").exists());
     all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
-    // Both parts of the recording replay under its name and give the same dive as the original log.
+    // Both parts of the recording replay under the recording's name and give the same dive as the original log.
     assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
     assert_eq!(folder.replay("recovered.mcap", &[]).1["digest"], digest.as_str());
 }

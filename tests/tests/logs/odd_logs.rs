@@ -34,7 +34,7 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years after those of most messages"#);
 
-    // The result is the same if the messages of the other clock come first, because the majority decides.
+    // The result is the same if the messages with times of the other clock come first, because the majority decides.
     for message in &mut messages {
         message.log_time = match message.channel.topic.as_str() {
             "/raw/depth" => message.log_time - UTC_OF_OUR_ZERO_NS,

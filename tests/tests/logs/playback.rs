@@ -63,8 +63,8 @@ impl Outcome {
     }
 }
 
-/// A headrace log replays its packets in the order in which the live loop consumed them. This order can differ from
-/// that of the receive times. A log without ticks replays in time order.
+/// A headrace log replays its packets in the order in which the live loop consumed them. This order can differ from the
+/// order of the receive times. A log without ticks replays in time order.
 #[test]
 fn headrace_logs_replay_in_recorded_order_but_other_logs_in_order_of_time() {
     let folder = Folder::new();

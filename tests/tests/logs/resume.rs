@@ -76,7 +76,7 @@ struct Interrupted {
     before: Vec<Packet>,
     /// Packets after the interruption.
     after: Vec<Packet>,
-    /// Expected state: that of a dive that has consumed all these packets.
+    /// Expected state of a dive that has consumed the packets before and after the interruption.
     expected: Vec<u8>,
     digest: u64,
 }
@@ -99,8 +99,8 @@ impl Interrupted {
         Self { scene, log, before, after, expected, digest }
     }
 
-    /// Continues the dive. `held` packets arrive while it is rebuilt, and `waiting` packets are in the rings when it
-    /// goes on.
+    /// Continues the dive. `held` packets arrive while the dive is rebuilt, and `waiting` packets are in the rings when
+    /// the dive goes on.
     fn resume(&self, held: usize, waiting: usize, saved: &Path) -> (Loop, Rebuilt) {
         let unfinished = Unfinished::read(&self.log).unwrap().unwrap();
         assert_eq!(unfinished.files, std::slice::from_ref(&self.log));

@@ -102,8 +102,8 @@ fn filter_is_accurate_and_consistent_in_field_dives() {
 /// Checks the filter's errors. Lateral and vertical errors are at most 5 cm, and the lateral error is at most a third
 /// of that without the filter.
 ///
-/// Averaged over the dives, the error of the displacement during a turn must be below 3 cm or 2 % of T_x, whichever is
-/// larger.
+/// Averaged over the dives, the error of the displacement during a turn must be below 3 cm or 2 % of the distance T_x
+/// per turn, whichever is larger.
 fn accuracy(all: &[Dives]) {
     let ours: Vec<Figures> = all.iter().map(|dives| figures(&dives.filter)).collect();
     let theirs: Vec<Figures> = all.iter().map(|dives| dives.without).collect();
@@ -130,8 +130,8 @@ fn accuracy(all: &[Dives]) {
     assert!(mean_of(&ours, |f| f.turn_m) < limit_m, "{:.4} m a turn", mean_of(&ours, |f| f.turn_m));
 }
 
-/// Checks the NEES of the pose. Its average over the dives must be within the 95 % bounds in three of four epochs. Its
-/// mean over all epochs must be at most 6.9; the ideal is 6.
+/// Checks the NEES (normalised estimation error squared) of the pose. Its average over the dives must be within the 95
+/// % bounds in three of four epochs. Its mean over all epochs must be at most 6.9; the ideal is 6.
 fn consistent_estimates(all: &[Dives]) {
     let epochs = all.iter().map(|dives| dives.filter.epochs.len()).min().unwrap();
     let runs = all.len() as f64;
@@ -155,7 +155,7 @@ fn consistent_estimates(all: &[Dives]) {
     assert!(within > 0.75 && mean < 6.9, "{within}, {mean}");
 }
 
-/// Checks the NIS of each kind of sensor.
+/// Checks the NIS (normalised innovation squared) of each kind of sensor.
 ///
 /// The mean must be within 0.2 of one, because the filter learns the noise. The average over ten seconds and all dives
 /// must be within the 95 % bounds at least a third of the time. A sensor with less noise than assumed may be below the
@@ -207,8 +207,8 @@ fn add_to_bins(bins: &mut [(f64, u64)], track: &Track, source: usize) {
     }
 }
 
-/// Checks that D is within two standard deviations of its true value in a share of `least` to 0.99 of the sections. The
-/// true value is D with the same returns at their true places.
+/// Checks that the hole diameter D is within two standard deviations of its true value in a share of `least` to 0.99 of
+/// the sections. The true value is D with the same returns at their true places.
 fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
     let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
@@ -234,8 +234,8 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
 }
 
-/// Each sensor is silent for a while in some dives, and until the end in another. The errors must stay within their
-/// reported bounds.
+/// Each sensor is silent for a while in some dives, and until the end in another dive. The errors must stay within
+/// their reported bounds.
 #[test]
 fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
     for (name, sources) in [

@@ -72,7 +72,7 @@ fn errors(track: &Track) -> Errors {
 }
 
 /// In some attitudes, the beams look along the tunnel and only graze the wall. Few of them then measure the position,
-/// and its error exceeds the filter's standard deviation.
+/// and the position error exceeds the filter's standard deviation.
 #[test]
 fn fix_is_accurate_beyond_90_degrees_of_pitch_and_at_180_degrees_of_yaw() {
     let way = way();

@@ -28,14 +28,14 @@ const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const GRAVITY_MPS2: f64 = 9.81;
 const SAMPLE_S: f64 = 0.0105;
-/// Number of samples between updates of the error state. As in the filter, the time between them is about 0.1 s.
+/// Number of samples between updates of the error state. As in the filter, the time between updates is about 0.1 s.
 const EPOCH: usize = 10;
 /// Number of inertial samples per second in the recording.
 const SECOND: usize = 95;
 /// Usual speed of a hand, m/s. It is the prior for the velocity, which nothing measures.
 const HAND_MPS: f64 = 0.5;
-/// A unit is stationary if rate and force vary by no more than this within a second. The values are a few times the
-/// noise.
+/// A unit is stationary if its rate varies by no more than this within a second, and its force by no more than
+/// `STILL_MPS2`. Both values are a few times the noise.
 const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;

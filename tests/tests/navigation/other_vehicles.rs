@@ -44,7 +44,8 @@ fn autopilot_sensors_and_a_velocity_log_are_fused() {
             assert_eq!(source[nothing], 0, "{id}: {source}");
         }
     }
-    // Devices without noise agree if axes, lever arm and delay are right. With one axis reversed, the NIS would be
+    // Devices without noise agree if axes, lever arm and delay are right. With one axis reversed, the NIS (normalised
+    // innovation squared) would be
     // 0.08.
     let dvl = &source(&report, "dvl")["navigation"];
     println!("velocity log: {dvl}");

@@ -72,8 +72,8 @@ struct Dives {
 /// Dives with a configured slack time of 8 s. The model then assumes that a quarter of the slack remains after a turn.
 ///
 /// A smoother depends more on its model than a filter does. The filter also works with a slack time of 15 s, so that
-/// more than half of the slack remains. But with the smoother, D is then within two standard deviations in only 88.9 %
-/// of the sections.
+/// more than half of the slack remains. But with the smoother, the hole diameter D is then within two standard
+/// deviations in only 88.9 % of the sections.
 fn dives(seed: u64) -> Dives {
     let scene = field_with(seed, 65.0, &SETTINGS.replace("slack_time_s = 15", "slack_time_s = 8"), "");
     let smoothed = smoothed(&scene, &Silence::default());
@@ -91,8 +91,8 @@ fn dives(seed: u64) -> Dives {
 
 /// Smoothed errors must be consistent and no larger than the filter's.
 ///
-/// The NEES of a pose must be near 6, and D must be within two standard deviations of the truth in 90 to 99 % of the
-/// sections.
+/// The NEES of a pose must be near 6, and the hole diameter D must be within two standard deviations of the truth in 90
+/// to 99 % of the sections.
 #[test]
 fn smoothing_reduces_errors_and_stays_consistent() {
     let all: Vec<Dives> = std::thread::scope(|scope| {

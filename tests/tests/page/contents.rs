@@ -91,8 +91,8 @@ fn viewer_state_at_the_end_equals_the_report() {
     }
 }
 
-/// Data that a paused viewer has: metres by verdict, missed stretches, verdicts of the sections, and stretches to go
-/// back to.
+/// Data that a paused viewer has: length of each verdict, missed stretches, verdicts of the sections, and stretches to
+/// go back to.
 fn seen(viewer: &Viewer) -> Value {
     let state = &viewer.state;
     let verdicts: Vec<_> = viewer.sections.iter().map(|(index, section)| (index, section.verdict)).collect();

@@ -16,7 +16,7 @@ fn stalled_and_flooding_viewers_do_not_change_results() {
     let bare = folder.headrace(&["demo", "--speed", "max", "--out", "bare"]);
     assert_eq!(bare.code, Some(0), "{}", bare.stderr);
     let serving = Serving::start(&folder, &["demo", ANY, "--no-open", "--speed", "400x", "--out", "watched"]);
-    // This viewer is connected, but never reads.
+    // These viewers are connected, but never read.
     let _stalled: Vec<Viewer> = (0..8).map(|_| Viewer::connect(&serving, "", &[]).unwrap()).collect();
     let mut flooding = Viewer::connect(&serving, "", &[]).unwrap();
     while flooding.send_raw(Message::Text("x".repeat(4000).into())).is_ok() {}

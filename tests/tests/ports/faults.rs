@@ -29,7 +29,7 @@ const OF_A_BUSY_MACHINE: [&str; 3] = [
     "silent: the line is open, but no frame has arrived yet",
 ];
 
-/// Distinct statuses of a sensor as text, except "running" and those due to a busy machine.
+/// Distinct statuses of a sensor as text, except "running" and statuses due to a busy machine.
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {

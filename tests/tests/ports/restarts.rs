@@ -29,7 +29,7 @@ fn random(n: u64) -> u64 {
     word ^ (word >> 27)
 }
 
-/// Starts the dive. Returns the process once it shows that the dive has begun or goes on.
+/// Starts the dive. Returns the process once the process shows that the dive has begun or goes on.
 fn start(folder: &Folder, vehicle: &str, (how, logs): (&str, &[&str])) -> (Child, Duration) {
     let begun = wall_clock();
     let mut run = headrace()
@@ -54,7 +54,8 @@ fn with_verdict(report: &Value, verdict: &str) -> BTreeSet<String> {
     these.map(|section| format!("{:9.3}", section["start_m"].as_f64().unwrap())).collect()
 }
 
-/// Kills and resumes a dive with these recordings. Checks that its report is that of a replay, and returns the folder.
+/// Kills and resumes a dive with these recordings. Checks that the dive's report equals the report of a replay, and
+/// returns the folder.
 fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     let folder = Folder::new();
     folder.write("scene.toml", scene(20.0 + restarts as f64));
@@ -91,7 +92,7 @@ fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     );
     assert_eq!(live["log"]["parts"].as_array().unwrap().len() as u64, restarts + 1);
 
-    // A kill may leave one recording longer than the other. The report is that of the longer one.
+    // A kill may leave one recording longer than the other. The report belongs to the longer recording.
     let recording = live["log"]["path"].as_str().unwrap();
     let answer = folder.headrace(&["replay", recording, "--report", "replayed.json"]);
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);

@@ -230,7 +230,7 @@ fn unavailable_required_sensor_ends_the_dive() {
     "#);
 }
 
-/// A device whose HID reports are too short, like those of a counter by another maker.
+/// A device whose HID reports are too short, like the reports of another maker's counter.
 struct Short;
 
 impl Fault for Short {

@@ -143,8 +143,8 @@ fn wake_until(driver: &mut dyn Driver, at: MonoNs, wire: &mut dyn Wire) {
     }
 }
 
-/// Draws the delay of one part of a stream. It is usually that of a good line, and sometimes that of a serial bridge,
-/// of a slow network, or of a network that fails for seconds.
+/// Draws the delay of one part of a stream. The delay is usually typical of a good line, and sometimes of a serial
+/// bridge, of a slow network, or of a network that fails for seconds.
 fn delay(random: &mut Random) -> DurNs {
     let ms = [1, 1, 3, 20, 66, 66, 120, 250, 1500, 4000];
     DurNs::from_millis(ms[random.below(ms.len())])

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use headrace_geometry::math;
 use headrace_tests::random::Random;
 
-/// Number of random cases of each subject in ordinary tests; the second constant is the seed of the first case.
+/// Number of random cases of each subject in ordinary tests. `SEED_OF_FEW` is the seed of the first case.
 const FEW: u64 = 3000;
 const SEED_OF_FEW: u64 = 20_260_901;
 /// Default number of cases in a long run, for all subjects together.

@@ -45,15 +45,15 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 let (h, noise) = (row(case), case.of_any_size(-10, 10).abs());
                 let before = p.variance_along(&h);
                 let gain = p.measure(&h, noise);
-                // The innovation variance is the sum of both variances. The variance after the measurement is
-                // v noise / (v + noise).
+                // The innovation variance is the sum of the variances of state and noise. After the measurement, the
+                // state's variance v becomes v noise / (v + noise).
                 let (sum, left) = (before + noise, before / (1.0 + before / noise));
                 let after = p.variance_along(&h);
                 let size: f64 = (0..N).map(|i| h[i] * h[i] * p.variance(i)).sum();
                 if (gain.variance / sum - 1.0).abs() > SHARE {
                     return Err(format!("innovation {} is not {sum}", gain.variance));
                 }
-                // The tolerance depends on the terms of h P h^T, because these can be large and cancel.
+                // The tolerance depends on the terms of the variance h P h^T, because these can be large and cancel.
                 if (after - left).abs() > SHARE * left + SHARE * size {
                     return Err(format!(
                         "{after:e} is left, not {left:e}; before {before:e}, noise {noise:e}"

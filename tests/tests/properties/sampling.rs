@@ -71,7 +71,8 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("step {last} of {theta:e} at {h}: {tangent} is not the footprint {footprint}"));
     }
 
-    // At the speed that is computed for a target, the spacing T equals the target, even if T_y is close to the target.
+    // At the speed that is computed for a target, the spacing T equals the target, even if the ping distance T_y is
+    // close to the target.
     let target = case.between(0.1, 3.0);
     let t_y = target * (1.0 - case.power_of_ten(-15.0, 0.0));
     let (gap_s, ping_s) = (case.between(0.1, 30.0), case.between(0.001, 0.1));

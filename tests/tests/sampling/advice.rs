@@ -1,4 +1,5 @@
-//! The advice is right: simulated vehicles that follow it meet the target, and those that are a tenth faster miss it.
+//! The advice is right: simulated vehicles that follow the advice meet the target, and vehicles a tenth faster miss the
+//! target.
 //!
 //! Heads that are apart along the hull start in phase for the advised speed of their mode. They keep their turn times
 //! and start phases when the pilot drives at another speed.
@@ -14,13 +15,13 @@ use headrace_tests::advised::{Advised, dive};
 use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
-/// Chainage at which dives begin; the second constant is the length of the part that the test evaluates. Both are in m.
+/// Chainage at which dives begin, m. `JUDGED_M` is the length of the part that the test evaluates.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// Cases whose median hole exceeds this fraction of the predicted T must fail sections at a speed that is a tenth
-/// higher.
+/// Cases whose median hole exceeds this fraction of the predicted spacing T must fail sections at a speed that is a
+/// tenth higher.
 const NEAR: f64 = 0.95;
-/// Number of advice updates at the end of a dive that the test ignores, because the vehicle is stopping.
+/// The test ignores this number of advice updates at the end of a dive, because the vehicle is stopping.
 const BRAKING: usize = 15;
 /// Simulator effect: the heading oscillates by 10 degrees, as if a pilot steered.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
@@ -152,13 +153,13 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// Results in the part of a dive that the test evaluates, which excludes the ends.
+/// Results of the evaluated part of a dive, which excludes the ends.
 struct Judged {
     failing: f64,
     passing: f64,
-    /// Predicted T at the driven speed, m; median of all updates.
+    /// Predicted spacing T at the driven speed, m; median of all updates.
     predicted_t_m: f64,
-    /// Ratio of the hole diameter to the predicted T: median and maximum over the sections.
+    /// Ratio of the hole diameter to the predicted spacing T: median and maximum over the sections.
     holes: [f64; 2],
 }
 
@@ -219,8 +220,8 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
             let settled = &dive.settled()[..dive.settled().len() - BRAKING];
             settled.iter().filter(|beat| beat.advice.will_exceed).count() as f64 / settled.len() as f64
         };
-        // If heads are apart along the hull, T has its minimum at one speed. Rounding of counter and angles can keep
-        // T above the target there.
+        // If heads are apart along the hull, the spacing T has its minimum at one speed. Rounding of counter and angles
+        // can keep T above the target there.
         let met = at.predicted_t_m <= case.target_m;
         within += usize::from(met);
         if met && forecast(&dives[0]) > 0.0 || forecast(&dives[1]) < 1.0 {
@@ -246,8 +247,8 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// The vehicle misses sections because it is a third faster than advised. The speed for repeating them must be near the
-/// advised speed, because one screen shows both.
+/// The vehicle misses sections because it is a third faster than advised. The speed for repeating these sections must
+/// be near the advised speed, because one screen shows both speeds.
 #[test]
 fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
@@ -330,7 +331,8 @@ fn advice_compensates_lost_returns() {
                 case.what, as_before.passing
             ));
         }
-        // The speed advised for repeating sections must be near the present speed limit, because one screen shows both.
+        // The speed advised for repeating sections must be near the present speed limit, because one screen shows both
+        // speeds.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!(
                 "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",

@@ -126,8 +126,8 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which the head looks at an angle of the body frame. If the head turns back at this angle, it counts
-    /// once.
+    /// Chainages at which the head looks at an angle of the body frame. If the head turns back at this angle, this pass
+    /// counts once.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();
@@ -276,7 +276,8 @@ fn sector_heads_stay_in_phase_and_their_pass_distances_alternate() {
 }
 
 /// The cases are steps of 2.4 degrees in sectors of 90 degrees, and steps of 0.9 degrees in sectors of 120 degrees. The
-/// last step of a sector is shorter, and makes the sweep longer than 2 T / s.
+/// last step of a sector is shorter, and makes the sweep longer than twice the turn time divided by the number of
+/// heads.
 #[test]
 fn heads_in_sectors_not_divisible_by_the_angular_step_are_in_phase_within_two_pings() {
     for (steps, heads, turn_s) in [(150, 4, 4.8), (400, 3, 8.0)] {
@@ -322,7 +323,7 @@ fn pass_gaps_above_the_planned_speed_differ_by_the_phase_errors() {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
             // Delay of a head at position x along the hull, in addition to its planned phase, in turns: x / (v T) - x /
-            // (v' T).
+            // (v' T), with planned speed v, driven speed v' and turn time T.
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {

@@ -105,7 +105,7 @@ fn wall_steps_near_90_degrees_match_the_oracle() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// If T_y is close to the target, a formula that subtracts their squares would lose digits.
+/// If the ping distance T_y is close to the target, a formula that subtracts the squares of both would lose digits.
 #[test]
 fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);

@@ -22,7 +22,7 @@ fn scene(rest: &str) -> Scene {
     scenes::scene(&format!("{SCENE}{rest}"))
 }
 
-/// Sections of the bare tunnel: chainage of the start, and D, m.
+/// Sections of the bare tunnel: chainage of the start, and hole diameter D, m.
 fn holes() -> Vec<(f64, f64)> {
     let report = scenes::report(&scene(""));
     report.sections.iter().filter_map(|section| Some((section.start_m, section.hole_m?))).collect()
@@ -38,8 +38,8 @@ impl Numbers {
     }
 }
 
-/// Returns the number of hits on each boulder. Boulders are anywhere round the wall, half sunk in it. Their sizes are D
-/// times a random factor from `times`.
+/// Returns the number of hits on each boulder. Boulders are anywhere round the wall, half sunk in it. Their sizes are
+/// the hole diameter D times a random factor from `times`.
 fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usize> {
     let mut numbers = Numbers(seed);
     let perimeter_m = scene("").vehicle.tunnel.profile.perimeter_m();

@@ -125,8 +125,8 @@ fn only_named_effects_have_systems_components_and_streams() {
     assert_eq!(effect["systems"].as_array().unwrap().len(), 1);
     assert_eq!(effect["components"][0]["sensors"], serde_json::json!(["sonar_1"]));
     assert_eq!(effect["streams"], serde_json::json!(["sonar_1"]));
-    // Without the effect, a base system aims a head from the pose at the start of each turn. The effect replaces this
-    // system.
+    // Without the effect `motion_within_turn`, a base system aims a head from the pose at the start of each turn. The
+    // effect replaces this system.
     let moving = explained(&folder, "motion_within_turn = {}");
     assert_eq!(moving["base"].as_array().unwrap().len(), base - 1);
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));
@@ -327,8 +327,8 @@ fn random_draws_of_two_effects_are_independent() {
     let stray = touched("outliers = { share = 0.3, sensors = [\"sonar_0\"] }");
     assert!(lost.len() > 500 && (share(&lost) - 0.3).abs() < 0.1 && (share(&stray) - 0.3).abs() < 0.1);
     let both: Vec<bool> = lost.iter().zip(&stray).map(|(a, b)| *a && *b).collect();
-    // If both effects shared a random stream, the overlap would be the whole smaller set. With separate streams, the
-    // overlap is 0.09 to within five standard deviations.
+    // If both effects shared a random stream, the overlap would be the whole smaller set of pings. With separate
+    // streams, the overlap is 0.09 to within five standard deviations.
     let sd = (0.09_f64 * 0.91 / both.len() as f64).sqrt();
     assert!((share(&both) - 0.09).abs() < 5.0 * sd + 0.01, "{}", share(&both));
 }

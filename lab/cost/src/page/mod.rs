@@ -46,7 +46,7 @@ impl Bars {
 pub struct Results {
     /// Version of this format.
     pub cost_version: u32,
-    /// Name and version of the program that measured.
+    /// Name and version of the program that made the measurements.
     pub program: String,
     /// The machine: processor, cores, debug or release.
     pub machine: String,
@@ -62,7 +62,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// All files by name.
+    /// All files, each with its name and content.
     ///
     /// Errors: a figure that JSON can't represent.
     pub fn files(&self) -> Result<Vec<(String, String)>, serde_json::Error> {

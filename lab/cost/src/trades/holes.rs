@@ -1,7 +1,7 @@
 //! Holes: the cost of finding the largest hole of a section exactly.
 //!
-//! The exact search is compared with a search with tolerances, with T of the sample lattice, and with counts of empty
-//! cells.
+//! The exact search is compared with a search with tolerances, with the spacing T of the sample lattice, and with
+//! counts of empty cells.
 
 use headrace_coverage::HoleFinder;
 use headrace_monitor::run::Loop;
@@ -21,7 +21,7 @@ use headrace_oracle::dive::{JudgedDive, JudgedSection, Recorded};
 use headrace_oracle::second;
 use headrace_oracle::timed;
 
-/// Compared tolerances of the hole search, m; 0.01 is a fiftieth of the target.
+/// Tolerances of the hole search, which the trade compares, m. The value 0.01 is a fiftieth of the target.
 const TOLERANCES_M: [f64; 6] = [1e-4, 1e-3, 0.01, 0.05, 0.2, 1.0];
 const QUICK_TOLERANCES_M: [f64; 2] = [0.05, 0.2];
 /// Edge lengths of the grid cells for the cell-counting method, m.
@@ -39,7 +39,7 @@ const NS: f64 = 1e9;
 /// Speed of all scenes, m/s.
 const SPEED_MPS: f64 = 0.1;
 
-/// Target of all scenes, m. An error of a tenth of the target can change a decision; a hundredth counts as no
+/// Target of all scenes, m. An error of `DECIDES_M` can change a decision; an error of `NOTHING_M` counts as no
 /// difference.
 const TARGET_M: f64 = 0.5;
 const DECIDES_M: f64 = TARGET_M / 10.0;
@@ -51,7 +51,7 @@ enum Setting {
     Exact,
     Tolerance(f64),
     Section(f64),
-    /// T_max of the paper's Eq. 16 for the driven speed.
+    /// Largest spacing T_max of the paper's Eq. 16 for the driven speed.
     Planned,
     /// The largest diagonal of the sample lattice in a section.
     Lattice,
@@ -337,7 +337,7 @@ fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) ->
     verdicts::inner(dive).map(judged).collect()
 }
 
-/// T_max of the paper's Eq. 16 at the driven speed for the configured heads, m.
+/// Largest spacing T_max of the paper's Eq. 16 at the driven speed for the configured heads, m.
 fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     let failed = |why: &str| CostError::Figure { what: "T of the plan".to_owned(), why: why.to_owned() };
     let planner = Planner::new(vehicle.inspection().map_err(|why| failed(&why))?)?;

@@ -23,8 +23,8 @@ use crate::words::number;
 use headrace_oracle::dive::{Recorded, armed};
 use headrace_oracle::{TruthError, timed};
 
-/// Two reference settings: the densest ring of rays, recast after the smallest movement, and a ring with a sixth fewer
-/// rays.
+/// Reference setting: the densest ring of rays, recast after the smallest movement. `AS_FINE` is a second reference, a
+/// ring with a sixth fewer rays.
 const FINEST: Looks = Looks { ring: 3600, anew_m: Some(0.001) };
 const AS_FINE: Looks = Looks { ring: 3000, anew_m: Some(0.001) };
 /// Difference up to which two speeds count as equal, m/s.

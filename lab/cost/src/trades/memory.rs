@@ -13,12 +13,12 @@ use headrace_oracle::timed;
 
 /// Number of arguments for which each mathematical function is compared.
 const ARGUMENTS: u32 = 100_000;
-/// Length of a tunnel, and the perimeter of its wall, m.
+/// Length of a tunnel, m. `PERIMETER_M` is the perimeter of its wall.
 const LENGTH_M: f64 = 7000.0;
 const PERIMETER_M: f64 = 28.0;
 /// Number of samples per metre of tunnel.
 const PER_M: u32 = 1_000;
-/// Length of tunnel whose samples stay unpacked, and length whose samples are packed, m.
+/// Length of tunnel whose samples stay unpacked, m. `PACKED_M` is the length whose samples are packed.
 const OPEN_M: u32 = 20;
 const PACKED_M: u32 = 160;
 /// Bytes of a sample before packing: its chainage, arc length, step, visit and head number.

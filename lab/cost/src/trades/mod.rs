@@ -17,7 +17,7 @@ use crate::scene::Inputs;
 /// Measures a trade; passes status messages to the second argument.
 pub type Measure = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Trade, CostError>;
 
-/// Makes a table of properties that are not a choice.
+/// Makes a table of the costs of properties that are not a choice, such as determinism.
 pub type Tabulate = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Given, CostError>;
 
 /// All trades by name, in the order of the page.
@@ -30,5 +30,5 @@ pub const TRADES: [(&str, Measure); 6] = [
     ("live", live::measure),
 ];
 
-/// Tables of properties that are not a choice, shown below the trades.
+/// Tables of the costs of properties that are not a choice, shown below the trades.
 pub const GIVEN: [Tabulate; 1] = [memory::tabulate];

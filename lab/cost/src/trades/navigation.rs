@@ -37,7 +37,7 @@ const USUAL_HZ: u32 = 100;
 const DECIDES_M: f64 = 0.05;
 /// Resolution of the time at which the vehicle passes a section, s.
 const MOMENT_S: f64 = 0.1;
-/// Length of the part of a dive that is timed, s.
+/// Length of the timed part of a dive, s.
 const TIMED_S: f64 = 15.0;
 /// Difference between the errors of two settings below which the settings count as equal, m.
 const RESOLUTION_M: f64 = 5e-4;
@@ -149,13 +149,13 @@ fn places(inputs: &Inputs<'_>) -> Result<Vec<Place>, CostError> {
     Ok(places)
 }
 
-/// The four heads of VITA 2, and the cable slack of the shipped scene.
+/// The four heads of VITA 2. `SLACK` is the cable slack of the shipped scene.
 const FOUR_HEADS: &str = "\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }";
 
 /// The field scene with VITA 2 and four heads.
 ///
-/// The vehicle file's slack_sd_m = 0.02 is that of a taut cable.
+/// The vehicle file's slack_sd_m = 0.02 is for a taut cable.
 fn four_heads(field: &str) -> String {
     let four = field.replace("vita1.toml", "vita2-4.toml").replace("\"sonar_0\"", FOUR_HEADS);
     four.replace(SLACK, "tether_slack = { reach_m = 0.03, period_s = 30 }")
@@ -237,7 +237,7 @@ struct Prepared {
     unique: Vec<(u32, Way)>,
     /// For each distinct setting, the number of simulated seeds and the errors.
     errors: Vec<(u32, Vec<Error>)>,
-    /// Dives of the first seed, by rate of the inertial unit, Hz.
+    /// Dives of the first seed, each with the rate of its inertial unit, Hz.
     first: Vec<(u32, Dived)>,
 }
 
@@ -463,8 +463,9 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
 
 /// Error of the references.
 ///
-/// One comparison is between two computations of D_true. The other is between true places and the readings of a taut
-/// cable. The readings pass through emulator, bytes and decoder, and share only the trajectory with the true places.
+/// One comparison is between two computations of the true hole D_true. The other is between true places and the
+/// readings of a taut cable. The readings pass through emulator, bytes and decoder, and share only the trajectory with
+/// the true places.
 fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostError> {
     let (mut hole_m, mut displacement_m) = (0.0_f64, 0.0_f64);
     for place in places.iter().filter(|place| place.all_knobs) {

@@ -25,13 +25,13 @@ const MANY_RAYS: u32 = 1024;
 /// Number of rays of a second reference, which is as good as [`MANY_RAYS`]. Its rays have other directions within the
 /// beam.
 const OTHER_RAYS: u32 = 769;
-/// Change of D that can change a decision, m: a tenth of the smallest shipped target, 0.5 m.
+/// Change of the hole diameter D that can change a decision, m: a tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;
-/// Smallest difference of D that counts, m. Rounding in the simulation is far smaller.
+/// Smallest difference of the hole diameter D that counts, m. Rounding in the simulation is far smaller.
 const RESOLUTION_M: f64 = 1e-4;
 /// Minimum number of seeds, since differences need a spread.
 const LEAST_SEEDS: u32 = 2;
-/// Maximum number of seconds of a dive that are timed. The simulation advances in slices of a second.
+/// At most this many seconds of a dive are timed. The simulation advances in slices of a second.
 const TIMED_S: u32 = 8;
 /// Number of seeds when the number of rays is varied. It is small, since a simulation with [`MANY_RAYS`] takes long.
 const RAYS_SEEDS: u32 = 2;
@@ -47,7 +47,7 @@ struct Stage {
 
 /// Results of a simulated dive.
 struct Figures {
-    /// D and verdict of each section, by the section's start in millimetres.
+    /// Hole diameter D and verdict of each section, by the section's start in millimetres.
     sections: Vec<(i64, Option<f64>, Verdict)>,
     /// Numbers of the features that beams hit.
     features_hit: Vec<u16>,
@@ -312,7 +312,8 @@ impl Differences {
         spread(&self.hole_m).map_or(f64::NAN, |change| change.middle.abs())
     }
 
-    /// The errors: first the magnitude of the mean change of D with an interval; then the changes with their signs.
+    /// The errors: first the magnitude of the mean change of the hole diameter D, with an interval; then the changes
+    /// with their signs.
     fn errors(&self) -> Vec<Error> {
         let size = spread(&self.hole_m).map(|Interval { low, middle, high }| Interval {
             low: if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) },
@@ -448,7 +449,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     left_out
 }
 
-/// Change of D below which D counts as unchanged, m.
+/// Change of the hole diameter D below which D counts as unchanged, m.
 const UNCHANGED_M: f64 = 0.01;
 
 /// Reasons for the default number of rays and for keeping all effects.
@@ -492,7 +493,7 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    // A dive in which no section has a D gives no finite change.
+    // A dive in which no section has a hole diameter D gives no finite change.
     let is_known = |point: &&Point| figure(point, "change of D").is_finite();
     let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);

@@ -1,8 +1,8 @@
 //! Survey: the cost of a finer target in hours of diving.
 //!
-//! Hours and T come from the functions of `headrace plan`. They are shown beside the largest hole of a simulated dive
-//! at the planned speed, with heads phased for that speed. A dive keeps its plan if its largest hole is at most the
-//! planned T.
+//! Hours and the planned spacing T come from the functions of `headrace plan`. They are shown beside the largest hole
+//! of a simulated dive at the planned speed, with heads phased for that speed. A dive keeps its plan if its largest
+//! hole is at most the planned T.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::plan::{Planner, Question};
@@ -35,7 +35,7 @@ const PLACES: [[f64; 2]; 5] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0
 const WAY_BACK_MPS: f64 = 0.3;
 /// Share of the tunnel that is assumed to be inspected a second time.
 const AGAIN_SHARE: f64 = 0.1;
-/// Length, m, and number of the sections in which both references are compared.
+/// Length of the sections in which both references are compared, m. `STRETCHES` is their number.
 const STRETCH_M: f64 = 0.25;
 const STRETCHES: u32 = 4;
 /// Smallest error claimed for the oracle, m. Both references are computed to this accuracy.
@@ -142,7 +142,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
     reasons
 }
 
-/// Sentence about plans whose simulated dives have a hole larger than the planned T.
+/// Sentence about plans whose simulated dives have a hole larger than the planned spacing T.
 fn broken(points: &[Point]) -> Option<String> {
     let is_broken = |point: &&Point| {
         point.errors.get(1).is_some_and(|error| error.unit == "m" && error.interval.middle > point.error())
@@ -338,7 +338,7 @@ fn true_holes(
     Ok(holes)
 }
 
-/// Largest D_true of a dive, away from the dive's ends.
+/// Largest true hole D_true of a dive, away from the dive's ends.
 fn true_hole(inputs: &Inputs<'_>, dives: &Dives<'_>, seed: u32) -> Result<TrueHole, CostError> {
     let end_m = END_M + dives.target_m;
     let length_m = inputs.effort.length_m() + 2.0 * end_m;

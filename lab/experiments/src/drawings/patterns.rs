@@ -101,7 +101,7 @@ pub(super) fn phase_shift(figure: &PhaseShift) -> String {
     });
     let own: Vec<f64> = figure.at_crown.iter().filter(|(head, _)| *head == 0).map(|(_, x_m)| *x_m).collect();
     if let [from_m, to_m, ..] = own.as_slice() {
-        /// Distance of the T_x dimension below the crown, pixels.
+        /// Distance of the dimension line of T_x below the crown, pixels.
         const BELOW_PX: f64 = 58.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.crown_m, BELOW_PX);
@@ -155,8 +155,8 @@ pub(super) fn sectors(figure: &Sectors) -> String {
         measured(&chart, [*from_m, *to_m], figure.line_m, look, (&words, -13.0));
     }
     if let [from_m, _, to_m, ..] = figure.at_line.as_slice() {
-        /// Distance of a dimension line below the wall line on which passes are measured, pixels. It shows the sum of
-        /// two distances.
+        /// Distance of a dimension line below the wall line on which passes are measured, pixels. The dimension shows
+        /// the sum of two distances between passes.
         const BELOW_PX: f64 = 30.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.line_m, BELOW_PX);

@@ -76,7 +76,7 @@ fn titles(canvas: &Canvas, panel: &Panel, left: f64) {
     }
 }
 
-/// Text that states the largest T_x.
+/// Text that states the largest distance T_x between passes.
 fn gap_words(panel: &Panel) -> String {
     let Some(gap) = panel.widest else { return "no two passes".to_owned() };
     let length_m = gap.length_m();

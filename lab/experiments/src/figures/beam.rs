@@ -15,15 +15,15 @@ const RANGE_M: f64 = 10.0;
 const POINTS: u32 = 60;
 /// Number of rays of a simulated beam: the largest number that a scene allows.
 const RAYS: usize = 64;
-/// The footprint is also simulated for every curve point whose number is a multiple of this.
+/// The footprint is also simulated for every curve point whose number is a multiple of this number.
 const SIMULATED: u32 = 6;
 
 /// Data of Figure 15.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Footprints {
-    /// Footprints of a beam perpendicular to a wall, by the range to the wall, m.
+    /// Footprints of a beam perpendicular to a wall, as functions of the range to the wall, m.
     pub by_range: Vec<Footprint>,
-    /// Footprints on the floor, by the beam's angle from straight down, degrees.
+    /// Footprints on the floor, as functions of the beam's angle from straight down, degrees.
     pub by_angle: Vec<Footprint>,
     /// Height of the head above the floor, m.
     pub height_m: f64,

@@ -50,7 +50,7 @@ impl Window {
         within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, arc_m: s.arc_m }).collect()
     }
 
-    /// The heads' tracks within the window, and one step beyond it.
+    /// The heads' tracks within the window, and one step beyond the window.
     fn ways(&self, dive: &Dive) -> Vec<Way> {
         let mut ways = Vec::new();
         for samples in &dive.heads {
@@ -70,7 +70,7 @@ impl Window {
 
 /// Appends a step to the last track if the step continues it; otherwise begins a new track.
 ///
-/// A step over the seam is split into two that end at the seam.
+/// A step over the seam is split into two steps that end at the seam.
 fn add_step(ways: &mut Vec<Way>, head: u16, perimeter_m: f64, from: [f64; 2], to: [f64; 2]) {
     for [begin, end] in polyline::over_seam(perimeter_m, from, to) {
         match ways.last_mut() {

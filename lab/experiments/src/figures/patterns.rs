@@ -30,7 +30,7 @@ pub(crate) struct PhaseShift {
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// T_x of a single head, m.
+    /// Distance T_x between passes of a single head, m.
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,
@@ -55,7 +55,7 @@ pub(crate) struct Sectors {
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// T_x of one continuously turning head, divided by the number of heads, m.
+    /// Distance T_x between passes of one continuously turning head, divided by the number of heads, m.
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,
@@ -136,7 +136,7 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
         let turned_rad = f64::from(number * FASTER_STEP_DEG).to_radians();
         let (sine, cosine) = math::sin_cos(if growing { turned_rad } else { -turned_rad });
         let arc_m = match number * FASTER_STEP_DEG % 360 {
-            // The exact value avoids rounding at the seam to either side.
+            // An exact zero can't be rounded to the wrong side of the seam.
             0 => 0.0,
             _ => dive.profile.arc_of([y_m + sine, z_m - cosine]),
         };

@@ -68,7 +68,7 @@ pub(crate) struct Panel {
     pub sectors: bool,
     /// Whether the heads' phases are aligned.
     pub aligned: bool,
-    /// T_x of a single head, divided by the number of heads, m.
+    /// Distance T_x between passes of a single head, divided by the number of heads, m.
     pub t_x_m: f64,
     /// Samples of the stretch, in time order for each head.
     pub samples: Vec<Place>,
@@ -80,7 +80,8 @@ pub(crate) struct Panel {
     pub mean_m: f64,
     /// The longest gap between passes along the tunnel, among lines with at least two passes.
     pub widest: Option<Gap>,
-    /// Arc lengths of the start and end of each strip of wall in which some gap between passes exceeds 1.5 T_x / s, m.
+    /// Arc lengths of the start and end of each strip of wall in which some gap between passes exceeds 1.5 times the
+    /// usual one, T_x / s, m.
     pub wide_m: Vec<[f64; 2]>,
     /// Arc lengths of the start and end of each strip of wall without passes, m.
     pub unseen_m: Vec<[f64; 2]>,

@@ -29,7 +29,7 @@ impl Baselines {
         self.modes.iter().find(|mode| mode.name == name).copied().ok_or(PaperError::Mode { name })
     }
 
-    /// The mode and the predicted T_y for a line of a printed table.
+    /// The mode and the predicted ping distance T_y for a line of a printed table.
     pub(super) fn of(&self, line: &Line) -> Result<(Mode, Across), PaperError> {
         let (name, rig) = (line.text("mode")?, Rig::of(line.heads()?));
         let of_rig = self.rigs.iter().filter(|(one, _)| *one == rig).flat_map(|(_, modes)| modes);
@@ -39,7 +39,8 @@ impl Baselines {
     }
 }
 
-/// The largest distance between passes, m: T_x / s in the phase-shift layout, 2 T_x / s in the sector-offset layout.
+/// The largest distance between passes, m: T_x / s in phase shift, 2 T_x / s in sector offset, with T_x of one head and
+/// s heads.
 pub(super) fn t_x_m(turn: Turn, layout: HeadLayout, heads: u8, speed_mps: f64) -> Result<f64, PaperError> {
     let passes_per_turn = match layout {
         HeadLayout::PhaseShift => f64::from(heads),

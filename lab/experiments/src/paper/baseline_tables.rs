@@ -14,13 +14,13 @@ use super::{FITTING_SPEED_MPS, PaperError, STATED_SPEED_MPS};
 pub struct OneHeadRow {
     /// The mode's name.
     pub mode: &'static str,
-    /// T_x.
+    /// Distance T_x between passes.
     pub t_x_m: Cell,
-    /// Mean T_y (Eq. 10).
+    /// Mean distance T_y between pings (Eq. 10).
     pub t_y_mean_m: Cell,
-    /// T_ymin (Eq. 5).
+    /// Least distance between pings, T_ymin (Eq. 5).
     pub t_y_min_m: Cell,
-    /// T_ymax, by ray casting.
+    /// Largest distance between pings, T_ymax, by ray casting.
     pub t_y_max_m: Cell,
 }
 
@@ -29,17 +29,17 @@ pub struct OneHeadRow {
 pub struct SeveralHeadsRow {
     /// The mode's name.
     pub mode: &'static str,
-    /// s, the number of heads.
+    /// Number of heads s.
     pub heads: u8,
-    /// T_x / s, in phase shift.
+    /// Distance between passes of s heads in phase shift, T_x / s.
     pub phase_t_x_m: AtBothSpeeds,
-    /// 2 T_x / s, in sector offset.
+    /// Largest distance between passes of s heads in sector offset, 2 T_x / s.
     pub sector_t_x_m: AtBothSpeeds,
-    /// Mean T_y (Eq. 10).
+    /// Mean distance T_y between pings (Eq. 10).
     pub t_y_mean_m: Cell,
-    /// T_ymin (Eq. 5).
+    /// Least distance between pings, T_ymin (Eq. 5).
     pub t_y_min_m: Cell,
-    /// T_ymax, by ray casting.
+    /// Largest distance between pings, T_ymax, by ray casting.
     pub t_y_max_m: Cell,
 }
 

@@ -14,37 +14,37 @@ use super::{PaperError, STATED_SPEED_MPS};
 pub struct CombinedRow {
     /// The mode's name.
     pub mode: &'static str,
-    /// s, the number of heads.
+    /// Number of heads s.
     pub heads: u8,
-    /// T in phase shift.
+    /// Combined distance T in phase shift.
     pub phase_shift: Combined,
-    /// T in sector offset.
+    /// Combined distance T in sector offset.
     pub sector_offset: Combined,
 }
 
-/// T of heads in one layout: phase shift or sector offset.
+/// Combined distance T of heads in one layout: phase shift or sector offset.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Combined {
-    /// T for the mean T_y.
+    /// Combined distance T for the mean ping distance T_y.
     pub t_mean_m: CombinedCell,
-    /// T for T_ymin.
+    /// Combined distance T for the least ping distance, T_ymin.
     pub t_min_m: CombinedCell,
-    /// T for T_ymax.
+    /// Combined distance T for the largest ping distance, T_ymax.
     pub t_max_m: CombinedCell,
 }
 
-/// A printed T beside two recomputed ones. Like the paper, the recomputed values ignore the vehicle's advance between
-/// two pings.
+/// A printed combined distance T beside two recomputed values. Like the paper, the recomputed values ignore the
+/// vehicle's advance between two pings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CombinedCell {
-    /// Recomputed from the T_x and T_y that Table 4 prints as experimental.
+    /// Recomputed from the distances T_x and T_y that Table 4 prints as experimental.
     pub from_experiment: Cell,
     /// Recomputed from the baseline at [`STATED_SPEED_MPS`].
     pub predicted: Cell,
 }
 
 impl Combined {
-    /// The cells for the mean, least and largest T_y.
+    /// The cells for the mean, least and largest ping distance T_y.
     pub fn cells(&self) -> [CombinedCell; 3] {
         [self.t_mean_m, self.t_min_m, self.t_max_m]
     }
@@ -54,7 +54,7 @@ impl Combined {
 struct Columns {
     layout: HeadLayout,
     t_x: &'static str,
-    /// Columns of T_y in Table 4 and of T in Table 5, for mean, least and largest.
+    /// Columns of the ping distance T_y in Table 4 and of the combined distance T in Table 5: mean, least, largest.
     t_y_and_t: [[&'static str; 2]; 3],
 }
 

@@ -1,4 +1,4 @@
-//! The baseline across the tunnel: T_y of a stationary head at the largest drift and mounting offset.
+//! The baseline across the tunnel: the ping distance T_y of a stationary head at the largest drift and mounting offset.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::PI;
@@ -57,7 +57,7 @@ impl Rig {
     }
 }
 
-/// T_y of a rig in each of the modes, in the tables' tunnel.
+/// Ping distance T_y of a rig in each of the modes, in the tables' tunnel.
 pub(super) fn across(rig: Rig, modes: &[Mode]) -> Result<Vec<Across>, PaperError> {
     let profile = shapes::ceran_blueprint()?;
     let floor_m = floor_m(&profile, rig)?;

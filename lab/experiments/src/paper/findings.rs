@@ -18,7 +18,7 @@ pub(super) struct Place {
     pub(super) aside_m: f64,
 }
 
-/// The position from which Eq. 5 and 6 give a rig's printed T_ymin and T_ymax.
+/// The position from which Eq. 5 and 6 give a rig's printed ping distances T_ymin and T_ymax.
 ///
 /// The positions were found by search. The tests check every printed digit that isn't an erratum.
 pub(super) fn fitting_place(rig: Rig) -> Place {
@@ -29,7 +29,7 @@ pub(super) fn fitting_place(rig: Rig) -> Place {
     }
 }
 
-/// Whether the T_y columns of this row of Table 4 are copied from the row of mode FASTER.
+/// Whether the columns of the ping distance T_y in this row of Table 4 are copied from the row of mode FASTER.
 pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }
@@ -49,7 +49,8 @@ fn of_rows(
     Ok(Interval::common(intervals))
 }
 
-/// Perimeters that give all printed means of Tables 3 and 4, m. A mean is the perimeter divided by n.
+/// Perimeters that give all printed means of Tables 3 and 4, m. A mean is the perimeter divided by the number n of
+/// samples per turn.
 ///
 /// The first interval assumes rounding; the second one also allows truncation.
 pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
@@ -66,8 +67,8 @@ pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], Paper
     Ok([perimeter(super::Printed::rounded_from)?, perimeter(super::Printed::read_from)?])
 }
 
-/// Speeds that give all printed T_x of Table 3 except FAST's, and speeds that give all T_x / s and 2 T_x / s of Table
-/// 4, m/s.
+/// Speeds that give all pass distances T_x printed in Table 3 except FAST's, and speeds that give all T_x / s and 2 T_x
+/// / s of Table 4, m/s.
 pub(super) fn speeds_mps(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let speed = |line: &Line, column, passes: f64| {
         let period_s = baselines.of(line)?.0.turn.period_s();
@@ -102,13 +103,13 @@ pub(super) fn floors_m(
     )
 }
 
-/// The step along a flat floor that ends in the corner, m (Eq. 6 with m theta at the corner).
+/// The step along a flat floor that ends in the corner, m (Eq. 6, with the angle m theta at the corner).
 pub(super) fn corner_step_m(place: Place, step_rad: f64) -> f64 {
     let corner = math::atan2(place.aside_m, place.floor_m);
     place.floor_m * (math::tan(corner) - math::tan(corner - step_rad))
 }
 
-/// Note on the differences of the means in Table 3.
+/// Note on why the recomputed means differ from those printed in Table 3.
 pub(super) fn means<'a>(
     mark: char,
     baselines: &Baselines,
@@ -149,7 +150,7 @@ pub(super) fn speed(mark: char, baselines: &Baselines) -> Result<Note, PaperErro
     Ok(Note::new(mark, NoteKind::NewErratum, text))
 }
 
-/// Note on the differences of Table 3's minima.
+/// Note on why the recomputed minima differ from those printed in Table 3.
 pub(super) fn minima_of_one(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let profile = shapes::ceran_blueprint()?;
     let most = floors_m(baselines, Rig::Vita1, |mode| mode != "FASTEST")?;
@@ -168,7 +169,7 @@ pub(super) fn minima_of_one(mark: char, baselines: &Baselines) -> Result<Note, P
     Ok(Note::new(mark, NoteKind::Erratum, text))
 }
 
-/// Note on the differences of Table 4's minima.
+/// Note on why the recomputed minima differ from those printed in Table 4.
 pub(super) fn minima_of_several(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let in_line = floors_m(baselines, Rig::Vita2InLine, |mode| mode != "FASTEST")?;
     let fastest = floors_m(baselines, Rig::Vita2InLine, |mode| mode == "FASTEST")?;
@@ -187,7 +188,7 @@ pub(super) fn minima_of_several(mark: char, baselines: &Baselines) -> Result<Not
     Ok(Note::new(mark, NoteKind::Erratum, text))
 }
 
-/// Note on the differences of Table 3's maxima.
+/// Note on why the recomputed maxima differ from those printed in Table 3.
 pub(super) fn maxima_of_one(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let place = fitting_place(Rig::Vita1);
     let slow_m = corner_step_m(place, baselines.mode("SLOW")?.turn.step_rad());
@@ -201,7 +202,7 @@ pub(super) fn maxima_of_one(mark: char, baselines: &Baselines) -> Result<Note, P
     Ok(Note::new(mark, NoteKind::Finding, text))
 }
 
-/// Note on the differences of Table 4's maxima.
+/// Note on why the recomputed maxima differ from those printed in Table 4.
 pub(super) fn maxima_of_several(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let (in_line, pairs) = (fitting_place(Rig::Vita2InLine), fitting_place(Rig::Vita2Pairs));
     let fast_m = corner_step_m(pairs, baselines.mode("FAST")?.turn.step_rad());

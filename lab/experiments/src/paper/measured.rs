@@ -19,11 +19,11 @@ pub struct Measured {
 /// Sample spacings that the paper prints for a run, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spacings {
-    /// T_x.
+    /// Distance T_x between passes.
     pub t_x_m: Printed,
-    /// T_y: mean, standard deviation, least, largest.
+    /// Distance T_y between pings: mean, standard deviation, least, largest.
     pub t_y_m: [Printed; 4],
-    /// T: mean, least, largest; from Table 5, which has no rows for one head.
+    /// Combined distance T: mean, least, largest; from Table 5, which has no rows for one head.
     pub t_m: Option<[Printed; 3]>,
 }
 

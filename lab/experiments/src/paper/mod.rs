@@ -43,11 +43,11 @@ pub struct Tables {
     pub stated_speed_mps: f64,
     /// The speed for which Table 4's baseline was computed, m/s.
     pub fitting_speed_mps: f64,
-    /// Speeds that give all printed T_x of Table 4's baseline, m/s.
+    /// Speeds that give all distances T_x printed in Table 4's baseline, m/s.
     pub consistent_speed_mps: Interval,
     /// The perimeter used for the recomputed means, m.
     pub perimeter_m: f64,
-    /// Perimeters that, with rounding, give all printed means of Tables 3 and 4 except those of copied rows, m.
+    /// Perimeters that, with rounding, give all printed means of Tables 3 and 4 except the means of copied rows, m.
     pub consistent_perimeter_m: Interval,
     /// Table 1: overlap of beams.
     pub table_1: Table<OverlapRow>,
@@ -57,7 +57,7 @@ pub struct Tables {
     pub table_3: Table<OneHeadRow>,
     /// Table 4: several heads.
     pub table_4: Table<SeveralHeadsRow>,
-    /// Table 5: T.
+    /// Table 5: the combined distance T.
     pub table_5: Table<CombinedRow>,
 }
 

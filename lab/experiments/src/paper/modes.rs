@@ -16,11 +16,11 @@ const BEAM_1_MHZ_DEG: f64 = 1.4;
 /// A row of Table 1: overlap of beams.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OverlapRow {
-    /// theta, degrees.
+    /// Angular step theta, degrees.
     pub step_deg: Printed,
-    /// epsilon at 600 kHz.
+    /// Overlap epsilon of neighbouring beams at 600 kHz.
     pub overlap_600_khz: Cell,
-    /// epsilon at 1 MHz.
+    /// Overlap epsilon of neighbouring beams at 1 MHz.
     pub overlap_1_mhz: Cell,
 }
 
@@ -29,13 +29,13 @@ pub struct OverlapRow {
 pub struct ModeRow {
     /// The mode's name.
     pub mode: &'static str,
-    /// theta, degrees, as printed.
+    /// Angular step theta as printed, degrees.
     pub step_deg: Printed,
-    /// T, seconds, as printed.
+    /// Period T of a turn as printed, seconds.
     pub period_s: Printed,
-    /// n, samples per turn.
+    /// Number of samples per turn, n.
     pub samples_per_turn: Cell,
-    /// f_s, samples per second.
+    /// Number of samples per second, f_s.
     pub ping_rate_hz: Cell,
 }
 

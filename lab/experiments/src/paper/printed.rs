@@ -153,7 +153,7 @@ impl Line {
         Printed::parse(self.text(column)?).ok_or_else(|| self.wrong(column))
     }
 
-    /// The number of heads in this line; 1 in a table without that column.
+    /// The number of heads in this line; 1 if the table has no column of heads.
     pub(super) fn heads(&self) -> Result<u8, PaperError> {
         self.text("heads").map_or(Ok(1), |text| text.parse().map_err(|_| self.wrong("heads")))
     }

@@ -91,7 +91,7 @@ fn printed_mean_steps_are_consistent_with_one_perimeter() {
     assert_eq!(apart(one), ["SLOW", "FAST", "FASTER", "FASTEST"]);
     let Interval { low, high } = tables.consistent_perimeter_m;
     assert!((low - 34.425).abs() < 1e-9 && (high - 34.5).abs() < 1e-9, "{low} to {high}");
-    // For any perimeter in the interval, all means match to the digit except those of copied rows.
+    // For any perimeter in the interval, all means match to the digit except the means of copied rows.
     for perimeter_m in [low + 1e-6, high - 1e-6] {
         for line in lines(3).into_iter().chain(lines(4)) {
             let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());
@@ -178,7 +178,7 @@ fn differing_cells_refer_to_existing_notes() {
         along.into_iter().flatten().chain([r.t_y_mean_m, r.t_y_min_m, r.t_y_max_m])
     });
     for cell in cells.chain(several) {
-        // The printed 2.116 is T_x of mode SLOW with two heads.
+        // The printed 2.116 is the pass distance T_x of mode SLOW with two heads.
         let cut = cell.digits == Digits::Truncated && cell.printed.to_string() == "2.116";
         assert_eq!(cell.note.is_none(), cell.digits.rounded() || cut, "{cell:?}");
         assert!(cell.note.is_none_or(|mark| ('a'..='e').contains(&mark)));

@@ -3,19 +3,19 @@
 //! n cells have n + 2 functions; function i has its support on cells i - 2 to i. Lengths are in cells. Integrals cover
 //! only the existing cells, so the boundary condition is the natural one (no flux).
 
-/// Integral of N_a N_b over a cell.
+/// Integrals over a cell of the product of two B-splines N_a and N_b.
 const MASS: [[f64; 3]; 3] = [
     [6.0 / 120.0, 13.0 / 120.0, 1.0 / 120.0],
     [13.0 / 120.0, 54.0 / 120.0, 13.0 / 120.0],
     [1.0 / 120.0, 13.0 / 120.0, 6.0 / 120.0],
 ];
-/// Integral of N_a' N_b' over a cell.
+/// Integrals over a cell of the product of two B-splines' derivatives, N_a' N_b'.
 const STIFFNESS: [[f64; 3]; 3] = [
     [1.0 / 3.0, -1.0 / 6.0, -1.0 / 6.0],
     [-1.0 / 6.0, 1.0 / 3.0, -1.0 / 6.0],
     [-1.0 / 6.0, -1.0 / 6.0, 1.0 / 3.0],
 ];
-/// Integral of N_a' N_b over a cell.
+/// Integrals over a cell of the product of a B-spline's derivative and a B-spline, N_a' N_b.
 const SLOPE: [[f64; 3]; 3] = [
     [-1.0 / 8.0, -1.0 / 3.0, -1.0 / 24.0],
     [1.0 / 12.0, 0.0, -1.0 / 12.0],
@@ -45,17 +45,17 @@ impl Band {
         Self { rows }
     }
 
-    /// Matrix of the integrals of N_row N_column.
+    /// Matrix of the integrals of B-spline products, N_row N_column.
     pub(super) fn mass(cells: usize) -> Self {
         Self::assemble(cells, &MASS)
     }
 
-    /// Matrix of the integrals of N_row' N_column'.
+    /// Matrix of the integrals of products of B-spline derivatives, N_row' N_column'.
     pub(super) fn stiffness(cells: usize) -> Self {
         Self::assemble(cells, &STIFFNESS)
     }
 
-    /// Matrix of the integrals of N_row' N_column.
+    /// Matrix of the integrals of a B-spline derivative times a B-spline, N_row' N_column.
     pub(super) fn slope(cells: usize) -> Self {
         Self::assemble(cells, &SLOPE)
     }

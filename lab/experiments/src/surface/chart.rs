@@ -19,7 +19,7 @@ pub(crate) struct Deviation {
     pub x_m: f64,
     /// Arc length at which the ray from the reference point through the sample meets the design wall, m.
     pub arc_m: f64,
-    /// Distance of the sample beyond the design wall on that ray, m.
+    /// Distance of the sample beyond the design wall, along the ray from the reference point, m.
     pub deviation_m: f64,
 }
 
@@ -148,7 +148,7 @@ mod tests {
         let chart = Chart::new(20.0, &lattice(20.0, wave)).unwrap();
         let stretch = Stretch { from_m: 0.0, to_m: 10.0, step_m: 0.05 };
         let compared = chart.compare(&stretch, wave);
-        // The bound is f'' s^2 / 8 for steps s of half a metre.
+        // The interpolation error is at most f'' s^2 / 8: f'' is the second derivative, s the step of half a metre.
         let bound = 0.2 * (math::TAU / 20.0) * (math::TAU / 20.0) * 0.25 / 8.0;
         assert!(compared.spread.max_m < bound * 1.01 && compared.spread.max_m > bound * 0.8, "{compared:?}");
     }

@@ -110,7 +110,7 @@ pub enum PoissonError {
     },
 }
 
-/// A field, and the level at which it defines the surface.
+/// A field, and the field's level on the reconstructed surface.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     grid: Grid,
@@ -231,8 +231,8 @@ impl<'a> Cloud<'a> {
         Self { samples, areas_m2, coarser, area_m2 }
     }
 
-    /// Coefficients of V on a grid that is `level` levels coarser than the finest grid. Samples spread on coarser
-    /// levels are included.
+    /// Coefficients of the normals' vector field V on a grid that is `level` levels coarser than the finest grid.
+    /// Samples spread on coarser levels are included.
     ///
     /// `finest` is the level being solved. Samples are not spread on levels finer than this.
     fn normals(&self, grid: &Grid, level: usize, finest: usize) -> [Vec<f64>; 3] {

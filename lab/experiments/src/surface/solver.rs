@@ -72,8 +72,8 @@ impl<'a> Screened<'a> {
         Scratch { mass_z: zeros(), stiffness_z: zeros(), mass_yz: zeros(), stiffness_yz: zeros() }
     }
 
-    /// Sets `target` to the left-hand side times `field`. The Laplacian is Kx My Mz + Mx Ky Mz + Mx My Kz, computed
-    /// axis by axis.
+    /// Sets `target` to the left-hand side times `field`. The Laplacian is Kx My Mz + Mx Ky Mz + Mx My Kz with
+    /// stiffness matrices K and mass matrices M, computed axis by axis.
     fn apply(&self, field: &[f64], target: &mut [f64], scratch: &mut Scratch) {
         let [_, ny, nz] = self.grid.nodes();
         let Scratch { mass_z, stiffness_z, mass_yz, stiffness_yz } = scratch;

@@ -1,7 +1,7 @@
 use super::*;
 
-/// Published critical values of min(W+, W-): two-sided alpha 0.10, 0.05, 0.02, 0.01; 0 if there is none. Source:
-/// Wilcoxon and Wilcox 1964, as reprinted in textbooks.
+/// Published critical values of the smaller rank sum, min(W+, W-): two-sided alpha 0.10, 0.05, 0.02, 0.01; 0 if there
+/// is none. Source: Wilcoxon and Wilcox 1964, as reprinted in textbooks.
 const CRITICAL: [(usize, [usize; 4]); 26] = [
     (5, [0, 99, 99, 99]),
     (6, [2, 0, 99, 99]),
@@ -59,7 +59,7 @@ fn ten_pairs_with_a_rank_sum_of_eight_have_the_known_exact_p_value() {
     assert!((test.p_less - 25.0 / 1024.0).abs() < 1e-15);
 }
 
-/// W+ for all choices of signs, for the given ranks.
+/// Rank sums W+ for all choices of signs, for the given ranks.
 fn all_choices(ranks: &[f64]) -> Vec<f64> {
     (0..1_u32 << ranks.len())
         .map(|signs| ranks.iter().enumerate().filter(|(k, _)| signs >> k & 1 == 1).map(|(_, r)| r).sum())
@@ -107,7 +107,7 @@ fn mean_and_variance_with_ties_and_zeros_match_all_sign_choices() {
 
 #[test]
 fn tie_correction_matches_the_textbook() {
-    // The variance is n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48.
+    // The variance is n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48 over all ties of t values.
     let values = [1.0, 1.0, 1.0, -2.0, 2.0, 4.0, -5.0, 5.0, 5.0, 5.0];
     let test = of_differences(&values, Options::default()).unwrap();
     let variance = 10.0 * 11.0 * 21.0 / 24.0 - (24.0 + 6.0 + 60.0) / 48.0;

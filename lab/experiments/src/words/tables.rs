@@ -178,7 +178,8 @@ fn percent(cell: &Cell) -> String {
     }
 }
 
-/// The mark of the note on a cell. A cell without a note has a mark that states how its printed digits follow.
+/// The mark of the note on a cell. A cell without a note has a mark that states how its printed digits follow from the
+/// recomputed value.
 fn sign(cell: &Cell) -> char {
     cell.note.unwrap_or(match cell.digits {
         Digits::Both => '=',

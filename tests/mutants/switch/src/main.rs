@@ -87,7 +87,7 @@ impl Text<'_> {
         self.within(0..self.source.len(), 0)
     }
 
-    /// Returns the text of a range. Places in it, from index `first` on, are rewritten as switches.
+    /// Returns the text of a range. Places in the range, from index `first` on, are rewritten as switches.
     fn within(&self, range: Range<usize>, first: usize) -> String {
         let mut out = String::new();
         let mut at = range.start;

@@ -27,11 +27,11 @@ pub(super) fn chainage_m(info: &SensorInfo, reading: &Reading) -> Option<f64> {
 
 /// Navigation that takes chainage and speed from the counter.
 ///
-/// The vehicle is assumed to be in the middle of the section, level and heading straight ahead. The stated errors are
-/// those of the counter's resolution.
+/// The vehicle is assumed to be in the middle of the cross-section, level and heading straight ahead. The stated errors
+/// come from the counter's resolution.
 pub(super) struct CableNavigation {
     middle: Yz,
-    /// The last reading, and a reading about [`SPEED_OVER_S`] earlier, each as time and chainage, m.
+    /// The last reading, as time and chainage, m. `before` is a reading about [`SPEED_OVER_S`] earlier.
     last: Option<(MonoNs, f64)>,
     before: Option<(MonoNs, f64)>,
     speed_mps: f64,

@@ -23,7 +23,7 @@ fn worst(points: &[Point], method: &str) -> Option<[f64; 2]> {
     Some([across_m, of("displacements within two sigma").reduce(f64::min)?])
 }
 
-/// Reasons for the filter with sonar returns as default, although other settings beat it.
+/// Reasons for the filter with sonar returns as default, although other settings beat this default.
 pub(super) fn reasons(points: &[Point]) -> Vec<String> {
     let mut reasons = Vec::new();
     if let (Some(usual), Some(cable), Some(direct)) =
