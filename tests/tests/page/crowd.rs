@@ -2,6 +2,8 @@
 //!
 //! The page's server needs real sockets and time, so the simulated world of `tests/tests/world.rs` has no crowds.
 
+#![expect(clippy::disallowed_methods, reason = "an operator waits in wall time")]
+
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
