@@ -212,6 +212,9 @@ fn reason_text(
     state: &LiveState,
     (profile, heads): (&Profile, &HeadDescriptions),
 ) -> String {
+    if let Some(phase) = state.phase_text() {
+        return phase;
+    }
     let is_told = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
     if advice.reason == Reason::HelixPitch && !is_told {
         return format!("the {} limits the speed", limit_words(advice.reason));

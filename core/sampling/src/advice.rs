@@ -285,6 +285,7 @@ impl Advisor {
             anew: self.anew,
             margins: self.margins,
             lost_share: mean(situation.losses_of_turning().map(|rate| rate.share)),
+            rising_mps: None,
         }
     }
 

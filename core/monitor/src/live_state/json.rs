@@ -57,7 +57,7 @@ pub struct LiveStateJson {
     pub cannot_say: Option<StretchJson>,
     /// Counts of the alerts that have not ended.
     pub alert_counts: AlertCountsJson,
-    /// Text of the setting that would allow a higher speed; `None` if there is none.
+    /// Text of what would allow a higher speed; `None` if there is nothing.
     pub remedy: Option<String>,
     /// Remaining cable, time and charge. An unknown amount is `None`.
     pub left: LeftJson,
@@ -222,7 +222,7 @@ impl LiveState {
                 to_m: stretch.to as f64 * section_m,
             }),
             alert_counts: alerts.counts(),
-            remedy: advice.and_then(|advice| gain_text(advice, around.heads)),
+            remedy: self.phase_text().or_else(|| gain_text(advice?, around.heads)),
             left: alerts.left(self),
             alert_list: shown.into_iter().map(|alert| alert.json(around, self.now)).collect(),
             alerts_hidden,

@@ -5,9 +5,16 @@ use serde::Serialize;
 use super::condition::Condition;
 use super::speed_band::SpeedBand;
 use super::state::{LiveState, SensorState};
-use crate::pilot_text::{limit_steps, speed_steps, station};
+use crate::pilot_text::{limit_steps, limit_text, speed_steps, station};
 use crate::words::{verdict_words, withheld_text};
 use headrace_coverage::Verdict;
+
+/// Phase error below which the heads count as in phase: 20 degrees.
+const IN_PHASE_RAD: f64 = 20.0 * core::f64::consts::PI / 180.0;
+
+/// Minimum ratio of the speed in phase to the present limit for the phases to be named. At 1.1 the text flickered in
+/// a simulated dive with heads in phase.
+const PHASE_GAIN: f64 = 1.3;
 
 /// Texts of the speed and its limit, each without its unit.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
@@ -66,6 +73,22 @@ impl LiveState {
         SpeedTexts { speed: speed.map(text), limit: limit.map(text), margin }
     }
 
+    /// Text about a limit that rises soon, or is low because the heads are out of phase; `None` if it
+    /// is not.
+    ///
+    /// While a head is silent or does not turn, the text about that head is the cause.
+    pub fn phase_text(&self) -> Option<String> {
+        let advice = self.advice.as_ref().filter(|_| self.turning & !self.deaf == self.heads)?;
+        let limit_mps = self.v_max_mps().filter(|_| self.has_limit() && self.heads.count_ones() > 1)?;
+        if let Some(mps) = advice.rising_mps {
+            return Some(format!("limit rises to {} in a few seconds", limit_text(mps)));
+        }
+        advice.phase_error_rad.filter(|error_rad| error_rad.abs() >= IN_PHASE_RAD)?;
+        let in_phase_mps = advice.anew.map(|anew| anew.planned_speed_mps);
+        let in_phase_mps = in_phase_mps.filter(|mps| *mps > PHASE_GAIN * limit_mps)?;
+        Some(format!("heads out of phase: {} once they are in phase", limit_text(in_phase_mps)))
+    }
+
     /// Number of a sensor's withheld readings, with the reason; `None` unless they make it useless.
     pub fn withheld_text(&self, source: usize) -> Option<String> {
         let is_useless = self.sensor(source) == SensorState::Withheld;
@@ -86,7 +109,7 @@ impl LiveState {
 mod tests {
     use super::super::condition::test_state;
     use super::*;
-    use headrace_sampling::advice::Advice;
+    use headrace_sampling::advice::{Advice, Anew};
 
     /// Texts for a speed and a limit, m/s, as one line.
     fn shown(speed_mps: f64, v_max_mps: f64) -> String {
@@ -112,6 +135,30 @@ mod tests {
         0.25 | 0.10 | 0.15 too fast
         0.11 | 0.10 | 0.01 too fast
         ");
+    }
+
+    #[test]
+    fn limit_that_is_low_because_of_the_phases_names_the_cause() {
+        let state = LiveState { heads: 0b11, turning: 0b11, ..test_state() };
+        let text = |in_phase_mps: f64, rising_mps: Option<f64>, state: &LiveState| {
+            let anew = Some(Anew { planned_speed_mps: in_phase_mps });
+            let phase_error_rad = Some(1.0);
+            let advice = state.advice.map(|advice| Advice {
+                v_max_mps: 0.06,
+                phase_error_rad,
+                anew,
+                rising_mps,
+                ..advice
+            });
+            LiveState { advice, speed_mps: Some(0.05), ..*state }.phase_text()
+        };
+        let texts = [text(0.094, None, &state), text(0.094, Some(0.092), &state), text(0.065, None, &state)];
+        let [out, rising, fits] = texts;
+        assert_eq!(out.as_deref(), Some("heads out of phase: 0.094 m/s once they are in phase"));
+        assert_eq!(rising.as_deref(), Some("limit rises to 0.092 m/s in a few seconds"));
+        assert_eq!(fits, None);
+        // A head that does not turn is the cause itself.
+        assert_eq!(text(0.094, Some(0.092), &LiveState { turning: 0b01, ..state }), None);
     }
 
     #[test]

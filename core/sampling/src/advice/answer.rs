@@ -214,6 +214,8 @@ pub struct Advice {
     pub margins: Option<Margins>,
     /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,
+    /// Higher speed that is displayed soon if it stays possible, m/s.
+    pub rising_mps: Option<f64>,
 }
 
 impl Advice {
@@ -252,6 +254,7 @@ impl Advice {
             anew: None,
             margins: None,
             lost_share: 0.0,
+            rising_mps: None,
         }
     }
 }

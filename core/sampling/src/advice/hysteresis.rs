@@ -96,7 +96,9 @@ impl Hysteresis {
         let (unseen_m, remedy, reason, worst_mps) =
             (worst.unseen_m, worst.remedy, worst.reason, worst.v_max_mps);
         let v_max_mps = self.steadied_mps(at, worst_mps, reason == Reason::HelixPitch);
-        let shown = Advice { v_max_mps, reason, will_exceed, may_exceed, unseen_m, remedy, ..advice };
+        let rising_mps = self.rising.map(|(_, least_mps)| least_mps);
+        let shown =
+            Advice { v_max_mps, reason, will_exceed, may_exceed, unseen_m, remedy, rising_mps, ..advice };
         (self.will_exceed, self.may_exceed) = (will_exceed, may_exceed);
         shown
     }
@@ -211,10 +213,16 @@ mod tests {
     #[test]
     fn decrease_of_the_advised_speed_is_displayed_at_once_and_increase_after_10_s() {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
-        let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
+        let advised = shown(given);
+        let speeds: Vec<f64> = advised.iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
         // The low speed stays in the history for a second. After it, the higher speed must last for ten seconds.
         assert_eq!(speeds[10..66], [0.1; 56]);
+        let rising: Vec<Option<f64>> = advised.iter().map(|advice| advice.rising_mps).collect();
+        assert_eq!(
+            (&rising[10..16], &rising[16..66], rising[66]),
+            (&[None; 6][..], &[Some(0.2); 50][..], None)
+        );
         assert_eq!(speeds[66..], [0.2; 15]);
     }
 
