@@ -69,8 +69,10 @@ impl Resuming {
         let missing =
             logs.iter().zip(&found).filter(|(_, found)| found.is_none()).map(|(log, _)| log.clone());
         let (present, gone): (Vec<PathBuf>, Vec<PathBuf>) = missing.partition(|log| folder_of(log).is_dir());
-        let moved = recordings.first().cloned().flatten();
-        recordings.extend(present.iter().map(|log| Some(moved.as_ref()?.at(log))));
+        let longest = recordings.iter().flatten().max_by_key(|recording| recording.last).cloned();
+        for (log, longest) in present.iter().zip(longest.iter().cycle()) {
+            recordings.push(Some(longest.at(log).ok_or_else(|| not_replaced(log))?));
+        }
         let resuming = Self::continuing(recordings.into_iter().flatten().collect(), vehicle)?;
         Ok(Some(Self { gone, ..resuming }))
     }
@@ -132,7 +134,7 @@ impl Resuming {
 
     /// Losses that the interruption caused, as text.
     fn losses(&self) -> Vec<String> {
-        let interruptions = self.recordings.iter().map(|interrupted| interrupted.loss().to_string());
+        let interruptions = self.recordings.iter().map(Interrupted::loss_text);
         interruptions.chain(self.gone.iter().map(|log| gone_text(log))).collect()
     }
 
@@ -187,6 +189,15 @@ fn named_recording(args: &Run, named: &Path) -> Result<Unfinished, Failure> {
              it; begin another dive with --new"
         ))
     })
+}
+
+/// The error if the files at a path, which can't be continued, belong to the dive that is to be continued.
+fn not_replaced(log: &Path) -> Failure {
+    let log = log.display();
+    Failure::Usage(format!(
+        "run --resume: the recording of this dive at {log} ended in order, or another program is recording to it; give --record \
+         only for recordings that can be continued, or --new"
+    ))
 }
 
 /// Text about a recording that isn't continued, because its medium is gone.

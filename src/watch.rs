@@ -366,7 +366,7 @@ impl Watch {
 
     fn json(&mut self, at: MonoNs, mut value: Value) {
         if let Some(object) = value.as_object_mut() {
-            let dive_time = self.begun.map_or(DurNs(0), |begun| at.since(begun));
+            let dive_time = self.begun.map_or(DurNs(0), |begun| at.since(begun).max(DurNs(0)));
             object.insert("t_s".to_owned(), dive_time.as_secs_f64().into());
         }
         self.print(one_line(&value.to_string()).into_owned());

@@ -47,7 +47,9 @@ impl UnreadSpan {
         let readings = match packet.withheld {
             0 if is_first => WithheldReadings { count: so_far.count.saturating_add(1), ..so_far },
             0 => so_far,
-            count if is_first => WithheldReadings { count, reason: packet.reason },
+            count if is_first && packet.reason != WithheldReason::NoMessage => {
+                WithheldReadings { count, reason: packet.reason }
+            }
             more => WithheldReadings { count: so_far.count.saturating_add(more), reason: packet.reason },
         };
         Self { from, to: packet.received, readings }

@@ -126,17 +126,21 @@ pub fn sensor_words(state: SensorState) -> &'static str {
 pub fn withheld_text(readings: WithheldReadings) -> String {
     let WithheldReadings { count, reason } = readings;
     let reason = match reason {
-        WithheldReason::NoMessage => return format!("{count} packets without a message of this device"),
+        WithheldReason::NoMessage => {
+            let packets = if count == 1 { "packet" } else { "packets" };
+            return format!("{count} {packets} without a message of this device");
+        }
         WithheldReason::OtherDevice => "they have the id of another device".to_owned(),
         WithheldReason::OtherRange => "measured at another range than the vehicle file's".to_owned(),
         WithheldReason::NoCalibration => "calibration unknown".to_owned(),
         WithheldReason::MarkedInvalid => "marked invalid by the device".to_owned(),
-        WithheldReason::Fault => "the device reports a fault".to_owned(),
+        WithheldReason::Fault => "the device reports a fault or is busy".to_owned(),
         WithheldReason::Implausible => "values that cannot be".to_owned(),
         WithheldReason::Repeated => "the device repeats one reading".to_owned(),
         WithheldReason::Late { age_s, at_most_s } => format!("{age_s:.1} s late, at most {at_most_s} s"),
     };
-    format!("{count} readings withheld: {reason}")
+    let what = if count == 1 { "reading" } else { "readings" };
+    format!("{count} {what} withheld: {reason}")
 }
 
 /// Action against withheld readings.
@@ -147,7 +151,9 @@ pub fn withheld_action(reason: WithheldReason) -> &'static str {
         }
         WithheldReason::OtherRange => "write the device's range in the vehicle file",
         WithheldReason::NoCalibration => "write its calibration in the vehicle file",
-        WithheldReason::MarkedInvalid | WithheldReason::Implausible => "check its mounting and its view",
+        WithheldReason::MarkedInvalid | WithheldReason::Implausible => {
+            "check its mounting, view and settings"
+        }
         WithheldReason::Fault | WithheldReason::Repeated | WithheldReason::Late { .. } => "restart it",
     }
 }

@@ -227,7 +227,7 @@ impl Reader {
         let reason = if header.head_id != command.head_id {
             Some((head_id, WithheldReason::OtherDevice))
         } else if header.tag.is_gs() {
-            Some((tag, WithheldReason::NoMessage))
+            Some((tag, WithheldReason::OtherDevice))
         } else if !header.status.accepted() || header.status.overrun() {
             Some((status, WithheldReason::Fault))
         } else if header.range_m != command.range_m {

@@ -163,6 +163,11 @@ fn headers() -> Vec<Bomb> {
             "more than 524288 chunks",
         ),
         bomb(
+            "600,000 empty chunks, the last 70,000 with earlier times",
+            &[depth(), chunk("", 0, b"", (9, 9)).repeat(530_000), chunk("", 0, b"", (1, 1)).repeat(70_000)],
+            "more than 524288 chunks",
+        ),
+        bomb(
             "100,000 broken chunks",
             &[depth(), chunk("zstd", 50, b"no frame at all", (0, 0)).repeat(100_000)],
             "can't be decompressed",

@@ -420,6 +420,30 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     }
 }
 
+/// At several rates, because the first withheld report comes one period after the last reading.
+#[test]
+fn velocity_log_that_becomes_late_during_the_dive_is_never_called_silent() {
+    for keep_one_of in [1, 5, 10] {
+        let (scene, mut packets) = withheld_dive(|_, _| ());
+        let begun = packets[0].at;
+        let is_dvl = |packet: &Packet| scene.vehicle.sensor_configs[packet.source].id == "dvl";
+        let mut number = 0;
+        packets.retain(|packet| {
+            number += usize::from(is_dvl(packet));
+            !is_dvl(packet) || number % keep_one_of == 0
+        });
+        for packet in packets.iter_mut().filter(|packet| is_dvl(packet)) {
+            if packet.at.since(begun).as_secs_f64() > 15.0 {
+                make_late("dvl", &mut packet.bytes);
+            }
+        }
+        let (late, told) = dive(&scene, &packets, 20);
+        assert_eq!(withheld(&late).len(), 1, "one of {keep_one_of} reports");
+        let silent = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+        assert_eq!(silent, 0, "one of {keep_one_of} reports");
+    }
+}
+
 /// Without any reading, only the commands that state the time let alerts be raised.
 #[test]
 fn can_frames_without_a_known_id_are_alerted_although_no_sensor_has_a_reading() {

@@ -278,7 +278,9 @@ impl LiveState {
     /// Once a sensor has delivered readings, messages of other devices on its line don't count.
     pub fn withheld(&self, source: usize) -> Option<WithheldReadings> {
         let UnreadSpan { from, to, readings } = self.unread.get(source).copied().flatten()?;
-        let is_long = to.since(from).0 > OLD_AFTER.0 && self.now.since(to).0 <= OLD_AFTER.0;
+        // Since the last reading, so that a sensor is never called silent before it is called withheld.
+        let since = self.heard.get(source).copied().flatten().unwrap_or(from);
+        let is_long = self.now.since(since).0 > OLD_AFTER.0 && self.now.since(to).0 <= OLD_AFTER.0;
         let may_be_others =
             matches!(readings.reason, WithheldReason::NoMessage | WithheldReason::OtherDevice);
         (is_long && !(may_be_others && self.age_of(source).is_some())).then_some(readings)

@@ -109,7 +109,9 @@ pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     // Accepted connections inherit the size of the send buffer and the limit of unsent bytes.
     socket.set_send_buffer_size(SEND_BUFFER)?;
     #[cfg(any(target_os = "android", target_os = "linux"))]
-    socket2::SockRef::from(&socket).set_tcp_notsent_lowat(MOST_NOT_SENT)?;
+    if let Err(error) = socket2::SockRef::from(&socket).set_tcp_notsent_lowat(MOST_NOT_SENT) {
+        tracing::warn!("a viewer that reads nothing is dropped late: limiting unsent bytes: {error}");
+    }
     socket.bind(address)?;
     socket.listen(BACKLOG)
 }

@@ -80,6 +80,8 @@ pub(super) struct Scan {
     attachment_bytes: u64,
     /// Number of bytes that the chunks so far unpack to.
     unpacked: u64,
+    /// Place in the file up to which another log was searched for. No byte is searched twice.
+    searched_to: u64,
     budget: HeaderBudget,
 }
 
@@ -179,6 +181,9 @@ impl Scan {
                     find_records(file, frame.body, u64::MAX)?
                 }
                 Found::Cut(Frame { item: Item::Chunk(place), end, .. }) => {
+                    if self.ends_at_other_log(file, at..file.len(), at)? {
+                        return Ok(());
+                    }
                     self.lose(LossKind::Truncated, at..file.len());
                     self.add_chunk(at, end, &place);
                     return Ok(());
@@ -210,7 +215,9 @@ impl Scan {
         range: core::ops::Range<u64>,
         at: u64,
     ) -> Result<bool, LogError> {
-        let Some(other) = find_log(file, range.start, range.end)? else { return Ok(false) };
+        let from = range.start.max(self.searched_to);
+        self.searched_to = self.searched_to.max(range.end);
+        let Some(other) = find_log(file, from, range.end)? else { return Ok(false) };
         if at < other {
             self.lose(LossKind::Truncated, at..other);
         }

@@ -61,6 +61,12 @@ impl Interrupted {
         let kind = LossKind::InPart { part: recording.number + 1, kind };
         Loss { kind, offset: 0, bytes: 0, from: Some(recording.last), to: Some(*to) }
     }
+
+    /// Returns the text of the loss, with times of the dive.
+    pub fn loss_text(&self) -> String {
+        let begun = self.recording.span.map_or(MonoNs(0), |(begun, _)| begun);
+        self.loss().in_dive_time(begun).to_string()
+    }
 }
 
 impl Unfinished {
@@ -155,18 +161,21 @@ impl Unfinished {
         Ok(has_head && unended(&files)?.is_some())
     }
 
-    /// Returns the same dive, to be continued at another path. None of the dive's parts at that path can be continued.
+    /// Returns the same dive, to be continued at another path. `None` if parts of the dive are already there.
     #[must_use]
-    pub fn at(&self, recording: &Path) -> Self {
+    pub fn at(&self, recording: &Path) -> Option<Self> {
         let present = in_the_way(recording).unwrap_or_default();
+        if present.iter().any(|file| part_head(file).is_some_and(|head| head.dive == self.dive)) {
+            return None;
+        }
         let named = present.iter().map(|file| named_part(file).map_or(1, |(_, number)| number)).max();
-        Self {
+        Some(Self {
             recording: recording.to_owned(),
             files: Vec::new(),
             named: self.named.max(named.unwrap_or(0)),
             _lock: None,
             ..self.clone()
-        }
+        })
     }
 
     /// Returns the path of the last part.

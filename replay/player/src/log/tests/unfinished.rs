@@ -154,7 +154,8 @@ fn dive_is_continued_at_another_path_if_its_medium_is_gone() {
     cut(&recording, std::fs::metadata(&recording).unwrap().len() / 2);
     let elsewhere = folder.0.join("other.mcap");
     let unfinished = Unfinished::read(&recording).unwrap().unwrap();
-    let moved = unfinished.at(&elsewhere);
+    assert!(unfinished.at(&recording).is_none(), "the dive is there already");
+    let moved = unfinished.at(&elsewhere).unwrap();
     assert_eq!(moved.next_path(), folder.0.join("other.part002.mcap"));
     let (tick, to) = (moved.next_tick(), moved.last);
     let interrupted = Interrupted { recording: moved, to, words: "begins within a dive".to_owned() };
