@@ -282,7 +282,9 @@ impl Alerter {
 
     fn hear_unread(&mut self, inputs: &mut Inputs<'_>, until: usize) {
         let packets = inputs.unread.get(inputs.taken.unread..until).unwrap_or_default();
-        packets.iter().for_each(|packet| self.state.hear_unread(packet));
+        for packet in packets {
+            self.state.hear_unread(packet);
+        }
         inputs.taken.unread = until.max(inputs.taken.unread);
     }
 

@@ -86,16 +86,14 @@ impl Decoder for Bar100Decoder {
             }
             Transaction::Measurement(measured) => {
                 let known = calibration.ok().flatten();
-                match known.filter(|_| !(meaning.reject_busy && measured.status.is_busy())) {
-                    Some(known) => {
-                        let pressure = water_pressure(measured, &known, meaning.ambient_bar);
-                        sink(Decoded { valid_at, reading: Reading::Pressure(pressure) });
-                    }
-                    None => {
-                        *withheld += 1;
-                        let busy = known.map(|_| WithheldReason::Fault);
-                        *reason = Some(busy.unwrap_or(WithheldReason::NoCalibration));
-                    }
+                let ready = known.filter(|_| !(meaning.reject_busy && measured.status.is_busy()));
+                if let Some(ready) = ready {
+                    let pressure = water_pressure(measured, &ready, meaning.ambient_bar);
+                    sink(Decoded { valid_at, reading: Reading::Pressure(pressure) });
+                } else {
+                    *withheld += 1;
+                    let busy = known.map(|_| WithheldReason::Fault);
+                    *reason = Some(busy.unwrap_or(WithheldReason::NoCalibration));
                 }
             }
         };

@@ -19,6 +19,13 @@ pub(super) struct Events(pub(super) Vec<Event>);
 #[derive(Debug, Default, Resource)]
 pub(super) struct UnreadPackets(pub(super) Vec<UnreadPacket>);
 
+/// Readings of this tick, and its packets without a reading.
+#[derive(SystemParam)]
+pub(super) struct Outcomes<'w> {
+    events: ResMut<'w, Events>,
+    unread: ResMut<'w, UnreadPackets>,
+}
+
 /// The operator's input, as a source of commands.
 #[derive(SystemParam)]
 pub(super) struct Operator<'w> {
@@ -31,10 +38,10 @@ pub(super) fn decode(
     entities: Res<'_, VehicleEntities>,
     mut sensors: Query<'_, '_, (&mut SensorDecoder, &mut SensorHealth)>,
     mut sound_speed: ResMut<'_, SoundSpeed>,
-    mut events: ResMut<'_, Events>,
-    mut unread: ResMut<'_, UnreadPackets>,
+    mut outcomes: Outcomes<'_>,
     mut operator: Operator<'_>,
 ) {
+    let Outcomes { events, unread } = &mut outcomes;
     events.0.clear();
     unread.0.clear();
     operator.commands.0.clear();

@@ -28,8 +28,9 @@ pub struct SourceReport {
     pub readings: u64,
     /// Number of readings decoded but not used.
     pub withheld: u64,
-    /// Number of withheld readings, with the reason; `None` if the source gave a reading, or sent nothing.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Number of withheld readings, with the reason, for the summary; `None` if the source gave a reading, or sent
+    /// nothing.
+    #[serde(skip)]
     pub no_reading: Option<String>,
     /// Longest silence between two packets, seconds.
     pub longest_gap_s: f64,
