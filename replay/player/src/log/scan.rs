@@ -80,8 +80,8 @@ pub(super) struct Scan {
     attachment_bytes: u64,
     /// Number of bytes that the chunks so far unpack to.
     unpacked: u64,
-    /// Place in the file up to which another log was searched for. No byte is searched twice.
-    searched_to: u64,
+    /// Start and end of the range in which another log was last searched for, because times went back.
+    searched: (u64, u64),
     budget: HeaderBudget,
 }
 
@@ -168,10 +168,7 @@ impl Scan {
                 Found::Record(frame) => {
                     let next = look(file, frame.end)?;
                     if is_believed(file, &frame, &next)? {
-                        // In a copy of a log, times go back, and the copy may begin within the latest chunk.
-                        let before = self.spans.last().filter(|before| before.is_after(&frame.item));
-                        let from = before.map_or(at, |before| before.at);
-                        if self.ends_at_other_log(file, from..at, at)? {
+                        if self.goes_back_into_other_log(file, &frame)? {
                             return Ok(());
                         }
                         (last, at, found) = (at, frame.end, next);
@@ -208,6 +205,22 @@ impl Scan {
         }
     }
 
+    /// Whether a chunk has earlier times than the chunk before it because another log begins between them, or within
+    /// the chunk before it.
+    fn goes_back_into_other_log<R: Read + Seek>(
+        &mut self,
+        file: &mut LogFile<R>,
+        frame: &Frame,
+    ) -> Result<bool, LogError> {
+        let before = self.spans.last().filter(|before| before.is_after(&frame.item)).map(|before| before.at);
+        let Some(before) = before else { return Ok(false) };
+        // If many chunks have earlier times than the same chunk, nothing is searched twice.
+        let (start, end) = self.searched;
+        let from = if start == before { end } else { before };
+        self.searched = (before, frame.at);
+        self.ends_at_other_log(file, from..frame.at, frame.at)
+    }
+
     /// Whether another log begins in this range of the file. If so, it isn't read, and the log was cut off at `at`.
     fn ends_at_other_log<R: Read + Seek>(
         &mut self,
@@ -215,9 +228,7 @@ impl Scan {
         range: core::ops::Range<u64>,
         at: u64,
     ) -> Result<bool, LogError> {
-        let from = range.start.max(self.searched_to);
-        self.searched_to = self.searched_to.max(range.end);
-        let Some(other) = find_log(file, from, range.end)? else { return Ok(false) };
+        let Some(other) = find_log(file, range.start, range.end)? else { return Ok(false) };
         if at < other {
             self.lose(LossKind::Truncated, at..other);
         }

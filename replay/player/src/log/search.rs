@@ -67,9 +67,15 @@ fn find<R: Read + Seek, T>(
     until: u64,
     examine: impl Fn(&mut LogFile<R>, &[u8], u64) -> Result<Option<T>, LogError>,
 ) -> Result<Option<T>, LogError> {
-    let mut block = vec![0; SEARCH_BYTES];
+    // A position is examined with the bytes after it. No more are read, because many short ranges may be searched.
+    let after = mcap::MAGIC.len() - 1;
+    let block_bytes = |start: u64| {
+        usize::try_from(until - start).map_or(SEARCH_BYTES, |len| SEARCH_BYTES.min(len.saturating_add(after)))
+    };
+    let mut block = vec![0; block_bytes(from.min(until))];
     let mut start = from;
     while start < until.min(file.len()) {
+        block.truncate(block_bytes(start));
         let got = file.read_at(start, &mut block)?;
         let bytes = block.get(..got).unwrap_or_default();
         for (at, head) in (start..until).zip(bytes.windows(mcap::MAGIC.len())) {
@@ -78,7 +84,7 @@ fn find<R: Read + Seek, T>(
             }
         }
         // Windows that cross the end of this block are checked with the next block.
-        let whole_windows = got.saturating_sub(mcap::MAGIC.len() - 1);
+        let whole_windows = got.saturating_sub(after);
         if whole_windows == 0 {
             break;
         }
