@@ -98,8 +98,8 @@ mod tests {
     #[test]
     fn missing_or_conflicting_speeds_of_sound_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.sound_speed_error]\n{keys}"));
-        assert!(refusal("").contains("is needed, and not both"));
-        assert!(refusal("true_mps = 1450\nshare = 0.01").contains("not both"));
+        assert!(refusal("").contains("give exactly one of true_mps and share"));
+        assert!(refusal("true_mps = 1450\nshare = 0.01").contains("give exactly one of true_mps and share"));
         assert!(refusal("share = 0.2").contains("from -0.1 to 0.1"));
         assert!(refusal("true_mps = 340").contains("from 1300 to 1700"));
     }

@@ -274,11 +274,7 @@ fn error_for_an_invalid_mesh_names_scene_line_and_place() {
     let place = "s.toml:4: tunnel.features[0].file = \"box.ply\": ";
     let open = good.replace("face 6", "face 5").replace("4 4 5 7 6\n", "");
     refused(&keys, &[("box.ply", &open)], &[place, "1 hole(s)", "4 edges", "0.500)"]);
-    refused(
-        &keys,
-        &[("box.ply", &good.replace("4 0 2 6 4", "4 0 2 8 4"))],
-        &[place, "has vertex 8 as a corner"],
-    );
+    refused(&keys, &[("box.ply", &good.replace("4 0 2 6 4", "4 0 2 8 4"))], &[place, "refers to vertex 8"]);
     refused(&keys, &[], &[place, "can't be read"]);
     let ply = tube(3.0, 10.0, 1, &[]);
     let cut = ply.get(..ply.len() / 2).unwrap();
@@ -309,7 +305,7 @@ fn meshes_in_impossible_positions_are_refused() {
     );
     refused(&table("file = \"box.ply\"\nchainage_m = 99.6"), &files, &["chainage_m = 99.6", "100 m"]);
     refused(&wall("chainage_m = 101"), &files, &["chainage_m = 101", "is outside the tunnel"]);
-    refused(&wall("yaw_deg = 3"), &files, &["yaw_deg = 3", "for a body"]);
+    refused(&wall("yaw_deg = 3"), &files, &["yaw_deg = 3", "to a body only"]);
     let station =
         |at_m: u32, scale: f64| format!("[[tunnel.stations]]\nchainage_m = {at_m}\nscale = {scale}\n");
     let text = station(45, 1.0) + &wall("chainage_m = 40");

@@ -28,7 +28,7 @@ fn too_tight_or_reversing_axes_are_refused() {
         "length_m = 3",
         "cannot be combined with radius_m",
     );
-    refused("[[tunnel.axis]]\nlength_m = 60\nturn_deg = 30", "turn_deg = 30", "give radius_m");
+    refused("[[tunnel.axis]]\nlength_m = 60\nturn_deg = 30", "turn_deg = 30", "needs radius_m");
     refused("[[tunnel.axis]]\nlength_m = 0", "length_m = 0", "0.01");
     refused("[[tunnel.axis]]\nradius_m = 60", "turn_deg", "missing");
     refused("[[tunnel.axis]]\nradius_m = 60\nturn_deg = 0", "turn_deg = 0", "0.01");
@@ -44,7 +44,7 @@ fn unordered_or_too_steep_stations_are_refused() {
     refused(
         &two("chainage_m = 5\nscale = 1", "chainage_m = 5\nscale = 1"),
         "stations[1].chainage_m = 5",
-        "more than",
+        "must be above the previous station's",
     );
     refused(
         &two("chainage_m = 5\nscale = 1", "chainage_m = 6\nscale = 1.2"),
@@ -83,7 +83,7 @@ fn impossible_features_are_refused() {
     feature(
         "kind = \"rock_trap\"\nchainage_m = 9\nlength_m = 4\ndepth_m = 1\nwidth_m = 13",
         "width_m = 13",
-        "tunnel has",
+        "more than the tunnel's width",
     );
     feature(
         "kind = \"gate\"\nchainage_m = 9\nslot_width_m = 1\nslot_depth_m = -1",
@@ -103,9 +103,9 @@ fn impossible_walls_are_refused() {
             "kind = \"bulge\"\nchainage_m = 9\nlength_m = 8\nwidth_m = {width}\narc_m = 0\ndepth_m = {depth}\n"
         )
     };
-    feature(&bulge(2.6, 4.0), "features[0].depth_m = 2.6", "too near");
+    feature(&bulge(2.6, 4.0), "features[0].depth_m = 2.6", "keeps away from");
     feature(&bulge(0.0, 4.0), "depth_m = 0", "must not be 0");
-    feature(&bulge(2.0, 1.0), "depth_m = 2", "as long and as wide as deep");
+    feature(&bulge(2.0, 1.0), "depth_m = 2", "as long and as wide as it is deep");
     feature(&bulge(1.0, 40.0), "width_m = 40", "35.8");
     let twice = format!("{}[[tunnel.features]]\n{}", bulge(1.3, 4.0), bulge(1.3, 4.0));
     feature(&twice, "features[1].depth_m = 1.3", "moves the wall by 2.600 m");
@@ -121,7 +121,11 @@ fn impossible_walls_are_refused() {
         "as_built.length_m = 9",
         "isn't allowed here",
     );
-    feature("kind = \"debris\"\nchainage_m = 9\nlength_m = 8\nheight_m = 4", "height_m = 4", "too near");
+    feature(
+        "kind = \"debris\"\nchainage_m = 9\nlength_m = 8\nheight_m = 4",
+        "height_m = 4",
+        "keeps away from",
+    );
 }
 
 #[test]
