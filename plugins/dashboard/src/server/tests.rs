@@ -245,8 +245,9 @@ fn unread_streams_are_dropped_10_s_after_their_machine_takes_no_more_data() {
     }
     println!("dropped after {dropped:.1?} s: WebSocket, lines with a small buffer and with the usual one");
     assert_eq!(dropped.len(), unread.len());
-    // The usual buffer takes 180 kB at first. The server counts these bytes as sent.
-    assert!(dropped[1] < 11.5 && dropped[2] < 40.0, "{dropped:?}");
+    // The readers' kernels take up to some 200 kB at first, depending on the machine. The server counts these bytes as
+    // sent.
+    assert!(dropped[0] < 15.0 && dropped[2] < 40.0, "{dropped:?}");
     assert_eq!(served.page.viewers(), 0);
 }
 
