@@ -155,7 +155,7 @@ fn sweep() {
 }
 
 fn advised(outcome: &Outcome) -> f64 {
-    outcome.told_mps()
+    outcome.advised_mps()
 }
 
 fn planned() {

@@ -62,7 +62,7 @@ fn main() {
                 let over = remedied.then_m.iter().filter(|[_, hole_m]| *hole_m > dive.drawn.target_m);
                 println!(
                     "dive {seed}: not cleared: {:?}; T {:.3}, then {:.2?}; {:?}",
-                    remedied.told,
+                    remedied.reported,
                     dive.drawn.target_m,
                     over.collect::<Vec<_>>(),
                     dive.drawn.injected
@@ -77,7 +77,7 @@ fn main() {
                 section.ends_m[0],
                 section.hole_m,
                 section.right,
-                section.told,
+                section.reported,
                 section.run,
                 e.speed_mps,
                 e.pass_gap_s,
@@ -90,7 +90,7 @@ fn main() {
             );
         }
         for stretch in dive.stretches() {
-            let is_right = stretch.right.iter().any(|set| set == stretch.told());
+            let is_right = stretch.right.iter().any(|set| set == stretch.reported());
             if wrong && (!is_right || stretch.runs() > 1) {
                 let [first, last] = [stretch.sections.first().unwrap(), stretch.sections.last().unwrap()];
                 println!(
@@ -99,7 +99,7 @@ fn main() {
                     last.ends_m[1],
                     dive.drawn.target_m,
                     stretch.right,
-                    stretch.told(),
+                    stretch.reported(),
                     stretch.runs(),
                     over_target(stretch.sections, dive.drawn.target_m),
                     dive.drawn.injected

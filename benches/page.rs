@@ -181,7 +181,7 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     let mut follower = page.as_ref().map(|page| Follower {
         collector: page.collector(&armed, false),
         teller: LiveMessages::default(),
-        told: Vec::new(),
+        messages: Vec::new(),
     });
     let is_over = Arc::new(AtomicBool::new(false));
     let viewers = page.as_ref().filter(|_| beside == Beside::Viewers);
@@ -260,31 +260,31 @@ fn run(dive: &mut Loop, messages: &[Kept], seconds: u64, mut beside: impl FnMut(
 struct Follower {
     collector: Collector,
     teller: LiveMessages,
-    told: Vec<LiveMessage>,
+    messages: Vec<LiveMessage>,
 }
 
 impl Follower {
     fn notice(&mut self, notice: &Notice, dive: &Loop) {
-        self.teller.hear(notice, dive, &mut |one| self.told.push(one));
+        self.teller.hear(notice, dive, &mut |one| self.messages.push(one));
         self.pass_on(dive);
         self.collector.notice(notice);
     }
 
     fn tick(&mut self, dive: &Loop) {
-        self.teller.tick(dive.view().live_state(), dive, &mut |one| self.told.push(one));
+        self.teller.tick(dive.view().live_state(), dive, &mut |one| self.messages.push(one));
         self.pass_on(dive);
         self.collector.tick(dive);
     }
 
     fn end(&mut self, dive: &Loop) {
-        self.teller.end(&dive.view().coverage().sections, &mut |one| self.told.push(one));
+        self.teller.end(&dive.view().coverage().sections, &mut |one| self.messages.push(one));
         self.pass_on(dive);
         self.collector.end(dive);
     }
 
     fn pass_on(&mut self, dive: &Loop) {
-        self.collector.messages(&self.told, dive);
-        self.told.clear();
+        self.collector.messages(&self.messages, dive);
+        self.messages.clear();
     }
 }
 

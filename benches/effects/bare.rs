@@ -124,9 +124,9 @@ impl<'a> ByHand<'a> {
             for (source, (head, mount)) in self.heads.iter_mut().enumerate() {
                 measure(head, mount, self.profile, until, &mut self.due);
                 for sounding in &self.due {
-                    head.tell(sounding, &mut |_, at, told| {
+                    head.tell(sounding, &mut |_, at, sent| {
                         let from = self.bytes.len();
-                        self.bytes.extend_from_slice(told);
+                        self.bytes.extend_from_slice(sent);
                         self.waiting.push((at, source, from, self.bytes.len()));
                     });
                 }

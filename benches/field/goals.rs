@@ -26,13 +26,13 @@ pub(crate) struct Missed {
     pub(crate) ratio: bool,
     pub(crate) within: bool,
     pub(crate) nis: [bool; KINDS_OF_SOURCES.len()],
-    pub(crate) told: bool,
+    pub(crate) unreported: bool,
 }
 
 impl Missed {
     pub(crate) fn of(cell: &Cell, figures: &Figures) -> Self {
         let bounds = match cell.condition {
-            Condition::Clean | Condition::DataSheet | Condition::Told => {
+            Condition::Clean | Condition::DataSheet | Condition::Declared => {
                 Some(Bounds { false_fails: 0.0, cannot_say: 0.02, passed: 0.97, advice: 0.95 })
             }
             Condition::Poor
@@ -76,7 +76,7 @@ impl Missed {
             ratio: judged && !ratios.contains(&figures.ratio_rms()),
             within: judged && bounds.is_some() && !(0.93..=0.98).contains(&figures.within(2.0)),
             nis: core::array::from_fn(nis),
-            told: figures.way_m[1] < figures.way_m[0] - 1e-6,
+            unreported: figures.way_m[1] < figures.way_m[0] - 1e-6,
         }
     }
 
@@ -91,7 +91,7 @@ impl Missed {
             ("advice", self.advice),
             ("ratio", self.ratio),
             ("within", self.within),
-            ("told_m", self.told),
+            ("told_m", self.unreported),
         ];
         let named = single.iter().filter(|(_, missed)| *missed).map(|(name, _)| (*name).to_owned());
         let nis = KINDS_OF_SOURCES.iter().zip(&self.nis).filter(|(_, missed)| **missed);

@@ -52,7 +52,7 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if place == DRIVEN_THERE.0 {
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";
     }
-    let stood = [Condition::DataSheet, Condition::Told, Condition::Rough, Condition::AsBuilt];
+    let stood = [Condition::DataSheet, Condition::Declared, Condition::Rough, Condition::AsBuilt];
     let stands = place == "portal" && stood.contains(&condition);
     if speed == "stood" && !stands && arguments.cell.is_empty() {
         return false;
@@ -62,13 +62,13 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
         return false;
     }
     // The middle place runs for few cells, because it only shows that results don't depend on the place.
-    let told_apart = place != "3000"
+    let is_covered_elsewhere = place != "3000"
         || ["vita1", "vita2-4"].contains(&vehicle.name) && ["planned", "advised"].contains(&speed);
-    if !told_apart && arguments.cell.is_empty() {
+    if !is_covered_elsewhere && arguments.cell.is_empty() {
         return false;
     }
     // Results under these conditions don't depend on the place.
-    let anywhere = [Condition::Told, Condition::AsBuilt, Condition::Altered];
+    let anywhere = [Condition::Declared, Condition::AsBuilt, Condition::Altered];
     if anywhere.contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);
     }
@@ -100,10 +100,10 @@ pub(crate) fn csv(cells: &[NamedCell], figures: &[Figures]) -> String {
 /// One line for each section that passed although its true hole exceeds the target.
 pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
     let line = |name: &[String; 4], section: &FalsePass| {
-        let [told_m, sd_m, true_m] = section.hole_m;
+        let [reported_m, sd_m, true_m] = section.hole_m;
         let (x_m, clock) = &section.at;
         format!(
-            "{} seed {}: {:.2} passed, D {told_m:.3} +- {sd_m:.3} m at {x_m:.2}, {clock}; true {true_m:.3}; {} doubtful\n",
+            "{} seed {}: {:.2} passed, D {reported_m:.3} +- {sd_m:.3} m at {x_m:.2}, {clock}; true {true_m:.3}; {} doubtful\n",
             name.join("/"),
             section.seed,
             section.start_m,

@@ -221,7 +221,7 @@ impl Faulty {
         let control = Arc::new(Control::default());
         control.unplugged.store(end.stand.is_none(), Ordering::SeqCst);
         let wire = Wire { end, control: Arc::clone(&control) };
-        let mut life = Life { devices, wire, fault, told: 0, out: Vec::new() };
+        let mut life = Life { devices, wire, fault, frames_sent: 0, out: Vec::new() };
         let thread = thread::spawn(move || life.live());
         Self { control, thread: Some(thread) }
     }
@@ -244,7 +244,7 @@ struct Life {
     devices: Vec<Emulated>,
     wire: Wire,
     fault: Box<dyn Fault>,
-    told: u64,
+    frames_sent: u64,
     out: Vec<Vec<u8>>,
 }
 
@@ -297,11 +297,11 @@ impl Life {
             return;
         }
         for frame in out {
-            self.told += 1;
+            self.frames_sent += 1;
             if self.wire.control.healed.load(Ordering::SeqCst) {
                 self.wire.whole(&frame);
             } else {
-                self.fault.to_host(self.told, &frame, &mut self.wire);
+                self.fault.to_host(self.frames_sent, &frame, &mut self.wire);
             }
         }
         if !self.wire.control.healed.load(Ordering::SeqCst) {

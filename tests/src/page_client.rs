@@ -51,14 +51,14 @@ impl Serving {
             });
         }
         drop(sender);
-        let mut told = Vec::new();
+        let mut printed = Vec::new();
         let address = loop {
-            let Ok(line) = lines.recv_timeout(WITHIN) else { panic!("no page: {told:#?}") };
+            let Ok(line) = lines.recv_timeout(WITHIN) else { panic!("no page: {printed:#?}") };
             let scheme = line.find("://").filter(|_| line.contains("page ") && line.contains("http"));
             if let Some(at) = scheme {
                 break line[at + 3..].trim().to_owned();
             }
-            told.push(line);
+            printed.push(line);
         };
         let stdin = child.stdin.take();
         Self { child, address, stdin, rest: lines }

@@ -90,7 +90,7 @@ impl Compared {
 
     /// Speed advised to a pilot who follows the advice, divided by the largest speed at which sections truly pass.
     pub fn followed_ratio(&self) -> f64 {
-        self.over_true(self.followed.told_mps())
+        self.over_true(self.followed.advised_mps())
     }
 
     fn over_true(&self, speed_mps: f64) -> f64 {
@@ -115,7 +115,7 @@ impl Outcome {
     /// exceeds the advice equals the fraction of sections that may fail.
     ///
     /// A swaying vehicle temporarily gets lower advice, which a constant speed can't follow.
-    pub fn told_mps(&self) -> f64 {
+    pub fn advised_mps(&self) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
@@ -228,7 +228,7 @@ impl Outing {
         let plan_mps = self.plan_mps();
         let planned_mps = self.planned_share * plan_mps;
         let planned = self.dive(planned_mps, planned_mps);
-        let advised_mps = planned.told_mps();
+        let advised_mps = planned.advised_mps();
         let at = |share: f64| self.dive(planned_mps, share * advised_mps);
         let passes = |share: f64| at(share).passes();
         let followed = at(1.0);

@@ -129,7 +129,7 @@ struct RecordedNavigation<N> {
     inner: N,
     silence: Silence,
     last: Option<MonoNs>,
-    told: Vec<Consistency>,
+    consistencies: Vec<Consistency>,
     said: SyncSender<Said>,
 }
 
@@ -156,10 +156,11 @@ impl<N: Transparent> Navigation for RecordedNavigation<N> {
             self.last = Some(at);
             self.said.try_send(Said::Epoch(at, Box::new((state, factors)))).unwrap();
         }
-        if let (Some(consistency), Some(told)) = (self.inner.consistency(source), self.told.get_mut(source))
-            && *told != consistency
+        if let (Some(consistency), Some(last)) =
+            (self.inner.consistency(source), self.consistencies.get_mut(source))
+            && *last != consistency
         {
-            *told = consistency;
+            *last = consistency;
             self.said.try_send(Said::Consistency(source, consistency)).unwrap();
         }
     }
@@ -193,8 +194,9 @@ pub fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
         app.add_device(sensor.as_ref()).unwrap();
     }
     let (said, heard) = sync_channel(MOST_SAID);
-    let told = vec![Consistency::default(); vehicle.sensors.len()];
-    let mut dive = app.arm(Box::new(RecordedNavigation { inner, silence, last: None, told, said })).unwrap();
+    let consistencies = vec![Consistency::default(); vehicle.sensors.len()];
+    let mut dive =
+        app.arm(Box::new(RecordedNavigation { inner, silence, last: None, consistencies, said })).unwrap();
     let simulation = Simulation::new(scene).unwrap();
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
     dive.finish(&mut |_, _| {});

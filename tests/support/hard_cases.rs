@@ -41,9 +41,9 @@ fn tell(name: &str, error: f64, bound: f64, condition: Option<f64>) {
         return;
     }
     let row = row(name);
-    let told = &row[3..6];
+    let stated = &row[3..6];
     assert_eq!(
-        told, figures,
+        stated, figures,
         "docs/why/hard-cases.csv has other figures for {name}; renew it with tests/hard_cases/run"
     );
 }

@@ -127,7 +127,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
     let which = format!("kill {number} after {after:?} ({arguments:?})");
 
     let answer = folder.headrace(&["verify", "--json", &log]);
-    let Ok(told) = serde_json::from_str::<Value>(&answer.stdout) else {
+    let Ok(report) = serde_json::from_str::<Value>(&answer.stdout) else {
         // The file or its header didn't exist yet, so the dive hadn't begun.
         assert!(lines.is_empty(), "{which}: {}, but the pilot had read {lines:?}", answer.stderr);
         let early = ["could not open", "is not an MCAP file", "no vehicle file can be read"];
@@ -135,13 +135,13 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
         count.before.fetch_add(1, Ordering::Relaxed);
         return;
     };
-    let same = told["same_records"].as_u64().unwrap();
-    assert_eq!(told["differences"], Value::Array(Vec::new()), "{which}: {told}");
+    let same = report["same_records"].as_u64().unwrap();
+    assert_eq!(report["differences"], Value::Array(Vec::new()), "{which}: {report}");
     match answer.code {
-        Some(0) => assert!(ended, "{which}: no loss is reported: {told}"),
-        Some(3) => assert!(same > 0 && told["losses"][0].is_string(), "{which}: {told}"),
+        Some(0) => assert!(ended, "{which}: no loss is reported: {report}"),
+        Some(3) => assert!(same > 0 && report["losses"][0].is_string(), "{which}: {report}"),
         // The killed dive had not published any result yet.
-        code => assert!(code == Some(1) && same == 0 && lines.is_empty(), "{which}: {code:?}, {told}"),
+        code => assert!(code == Some(1) && same == 0 && lines.is_empty(), "{which}: {code:?}, {report}"),
     }
     count.same.fetch_add(same, Ordering::Relaxed);
     let replayed = folder.headrace(&["replay", &log]).stdout;

@@ -73,8 +73,8 @@ impl<'a> Document<'a> {
         let (table, broken) = DeTable::parse_recoverable(self.text);
         // Only the first syntax error of a line is reported, because further errors on the same line follow from the
         // first.
-        let told = broken.iter().take(2 * MOST_ERRORS);
-        let mut broken: Vec<ConfigError> = told.map(|error| self.broken(error)).collect();
+        let reported = broken.iter().take(2 * MOST_ERRORS);
+        let mut broken: Vec<ConfigError> = reported.map(|error| self.broken(error)).collect();
         broken.dedup_by_key(|error| error.line);
         if let Some(errors) = ConfigErrors::of(broken) {
             return Err(errors);
@@ -315,7 +315,7 @@ impl<'a> Section<'a> {
             return wrong;
         }
         let misnamed = self.misnamed(key);
-        misnamed.unwrap_or_else(|| self.told(self.error(key, None, "is missing".to_owned())))
+        misnamed.unwrap_or_else(|| self.noting(self.error(key, None, "is missing".to_owned())))
     }
 
     /// Returns an error about an unread key of this table whose name is similar to `key`, if there is one.
@@ -326,7 +326,7 @@ impl<'a> Section<'a> {
         others.sort_by_key(|other| other.span().start);
         let found = nearest(key, others.iter().map(|other| other.get_ref().as_ref()))?;
         let other = others.iter().find(|other| other.get_ref() == found)?;
-        Some(self.told(self.unknown(other, &[key])))
+        Some(self.noting(self.unknown(other, &[key])))
     }
 
     /// Reads a part of the file; `None` if the part has errors. These errors are noted, and reading continues.
@@ -396,7 +396,7 @@ impl<'a> Section<'a> {
         let is_below = value.is_none() && !self.path.is_empty();
         let follows = self.noted(|error| error.key == name || (is_below && self.is_of(error)));
         let misnamed = || if is_below { self.misnamed(key) } else { None };
-        follows.or_else(misnamed).unwrap_or_else(|| self.told(self.error(key, value, problem.to_owned())))
+        follows.or_else(misnamed).unwrap_or_else(|| self.noting(self.error(key, value, problem.to_owned())))
     }
 
     /// Returns an error about this table as a whole; if an error about one of its keys was noted, returns that error
@@ -409,7 +409,7 @@ impl<'a> Section<'a> {
             value: None,
             problem: problem.to_owned(),
         };
-        self.noted(|noted| self.is_of(noted)).unwrap_or_else(|| self.told(error()))
+        self.noted(|noted| self.is_of(noted)).unwrap_or_else(|| self.noting(error()))
     }
 
     /// Whether an error concerns a key of this table.
@@ -428,7 +428,7 @@ impl<'a> Section<'a> {
     }
 
     /// Notes an error and returns it to the caller.
-    fn told(&self, error: ConfigError) -> ConfigError {
+    fn noting(&self, error: ConfigError) -> ConfigError {
         self.notes.add(&error);
         error
     }

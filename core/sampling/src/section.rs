@@ -168,8 +168,8 @@ mod tests {
             for left in [1e-3, 1e-6, 1e-9, 1e-12] {
                 let b_rad = FRAC_PI_2 - a_rad - left;
                 let exact = math::sin((FRAC_PI_2 - a_rad) - b_rad + REST);
-                let told = cos_of_sum(a_rad, b_rad).unwrap();
-                assert!((told / exact - 1.0).abs() < 1e-13, "{a_rad} + {b_rad}: {told} {exact}");
+                let computed = cos_of_sum(a_rad, b_rad).unwrap();
+                assert!((computed / exact - 1.0).abs() < 1e-13, "{a_rad} + {b_rad}: {computed} {exact}");
             }
         }
     }

@@ -49,7 +49,7 @@ pub struct SampleTimes {
 struct Stamped {
     received: MonoNs,
     usual: MonoNs,
-    told: [bool; KINDS],
+    seen: [bool; KINDS],
 }
 
 /// Number of kinds of readings: turn rate, force, attitude. A stamp belongs to the first reading of each kind after
@@ -84,7 +84,7 @@ impl SampleTimes {
     pub fn stamp(&mut self, ticks: u64, received: MonoNs) {
         let device = self.clock.take(ticks, received);
         let late = self.delay.late(device, received);
-        self.stamped = Some(Stamped { received, usual: received - late, told: [false; KINDS] });
+        self.stamped = Some(Stamped { received, usual: received - late, seen: [false; KINDS] });
     }
 
     /// Returns the receive time that a reading would have had without the delay of its sample.
@@ -100,7 +100,7 @@ impl SampleTimes {
         };
         let Some(stamped) = &mut self.stamped else { return received };
         let last = self.last_reading.replace(received);
-        if let Some(last) = last.filter(|_| stamped.told == [false; KINDS]) {
+        if let Some(last) = last.filter(|_| stamped.seen == [false; KINDS]) {
             // Within a burst, receive times are equal and do not show whether the stamp came before the readings.
             let lead = match received.since(stamped.received).cmp(&stamped.received.since(last)) {
                 Ordering::Less => 1,
@@ -110,10 +110,10 @@ impl SampleTimes {
             let leads = self.leads.saturating_add(lead);
             self.leads = leads.clamp(-MOST_LEADS, MOST_LEADS);
         }
-        let is_told = stamped.told.get_mut(kind).is_none_or(|told| core::mem::replace(told, true));
+        let is_seen = stamped.seen.get_mut(kind).is_none_or(|seen| core::mem::replace(seen, true));
         let late = received.since(stamped.usual);
         let is_late = (LEAST..=MOST).contains(&late);
-        if is_late && !is_told && self.leads >= SURE_LEADS { stamped.usual } else { received }
+        if is_late && !is_seen && self.leads >= SURE_LEADS { stamped.usual } else { received }
     }
 
     /// Returns statistics of the device's clock.

@@ -335,8 +335,8 @@ fn check_sound(
     sensors: &Sensors,
 ) -> Result<(), ConfigError> {
     let Some(id) = water.and_then(|(_, from)| from.as_deref()) else { return Ok(()) };
-    let told_by = sensors.configs.iter().zip(&sensors.devices).find(|(config, _)| config.id == id);
-    if told_by.is_some_and(|(_, sensor)| sensor.sense() == Sense::Depth) {
+    let named = sensors.configs.iter().zip(&sensors.devices).find(|(config, _)| config.id == id);
+    if named.is_some_and(|(_, sensor)| sensor.sense() == Sense::Depth) {
         return Ok(());
     }
     let problem = format!("sound_speed_from = {id:?} is not the id of a depth sensor in this file");

@@ -290,12 +290,12 @@ pub fn front(points: &mut [Point], resolution: f64) {
 /// Errors below `resolution` count as `resolution`, and only the cheapest of these points is on the front. `None` if
 /// fewer than three points remain, or if no point lies below the line.
 pub fn knee<'a>(points: &'a [Point], scene: &str, resolution: f64) -> Option<&'a Point> {
-    let told = |point: &Point| point.error().max(resolution);
+    let error_of = |point: &Point| point.error().max(resolution);
     let mut on_front: Vec<(&Point, [f64; 2])> = points
         .iter()
         .filter(|point| point.on_front && point.scene == scene)
-        .filter(|point| told(point) > 0.0 && told(point).is_finite() && point.cost.middle > 0.0)
-        .map(|point| (point, [math::ln(told(point)), math::ln(point.cost.middle)]))
+        .filter(|point| error_of(point) > 0.0 && error_of(point).is_finite() && point.cost.middle > 0.0)
+        .map(|point| (point, [math::ln(error_of(point)), math::ln(point.cost.middle)]))
         .collect();
     on_front.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.1[1].total_cmp(&b.1[1])));
     on_front.dedup_by(|dearer, cheaper| dearer.1[0].to_bits() == cheaper.1[0].to_bits());

@@ -96,12 +96,12 @@ fn cost_page_in_docs_matches_its_data() {
 fn shipped_defaults_falsely_pass_few_sections() {
     let text = std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap();
     let results: Results = serde_json::from_str(&text).unwrap();
-    let mut told = 0;
+    let mut figures = 0;
     for point in results.trades.iter().flat_map(|trade| &trade.points).filter(|point| point.is_default) {
         for error in point.errors.iter().filter(|error| error.name.starts_with("passed of those over")) {
-            told += 1;
+            figures += 1;
             assert!(error.interval.middle < 2.5, "{}: {} %", point.scene, error.interval.middle);
         }
     }
-    assert!(told > 0, "no trade has a figure for false passes");
+    assert!(figures > 0, "no trade has a figure for false passes");
 }

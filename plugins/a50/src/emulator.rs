@@ -31,13 +31,13 @@ pub struct A50Emulator {
     device: Simulated,
     start: MonoNs,
     begun: u64,
-    told: u64,
+    sent: u64,
 }
 
 impl A50Emulator {
     /// Creates a device that is switched on, and first pings, at `start`.
     pub fn new(device: Simulated, start: MonoNs) -> Self {
-        Self { device, start, begun: 0, told: 0 }
+        Self { device, start, begun: 0, sent: 0 }
     }
 
     fn due(&self) -> MonoNs {
@@ -61,14 +61,14 @@ impl Emulator<GroundVelocity> for A50Emulator {
         let report = Velocity {
             against: Against::Bottom,
             velocity_mps: [x, -y, -z],
-            fom_mps: if self.told.is_multiple_of(2) { even } else { odd },
+            fom_mps: if self.sent.is_multiple_of(2) { even } else { odd },
             altitude_m: ALTITUDE_M,
             valid_beams: 4,
             is_valid: true,
             status: 0,
             times_us: Some([at_us, at_us + DELAY_US]),
         };
-        self.told += 1;
+        self.sent += 1;
         let received = moved.at + DurNs(DELAY_US * 1000) + self.device.latency;
         line(Direction::Received, received, &report.encode());
     }

@@ -76,7 +76,7 @@ struct Invalid {
 }
 
 /// A reading and its delay within the device. The delay is zero if the device sends none.
-type Told = Option<(Reading, DurNs)>;
+type DelayedReading = Option<(Reading, DurNs)>;
 
 impl AxisOrder {
     /// Converts three values from wire order to sensor axes x, y, z, or back.
@@ -161,7 +161,7 @@ impl Decoder for ImuDecoder {
 }
 
 impl State {
-    fn take(&mut self, message: &Message) -> Told {
+    fn take(&mut self, message: &Message) -> DelayedReading {
         match message {
             Message::Xsens(message) => self.take_xsens(message),
             Message::Sbg(message) => self.take_sbg(message),
@@ -170,7 +170,7 @@ impl State {
         }
     }
 
-    fn take_xsens(&mut self, message: &xsens::Message) -> Told {
+    fn take_xsens(&mut self, message: &xsens::Message) -> DelayedReading {
         use xsens::Message as M;
         match *message {
             M::StatusWord(word) => {
@@ -195,7 +195,7 @@ impl State {
         None
     }
 
-    fn take_sbg(&mut self, message: &sbg::Message) -> Told {
+    fn take_sbg(&mut self, message: &sbg::Message) -> DelayedReading {
         use sbg::Message as M;
         match *message {
             M::Quaternion(raw) => {
@@ -218,9 +218,9 @@ impl State {
         }
     }
 
-    fn take_j1939(&mut self, message: &j1939::Message) -> Told {
+    fn take_j1939(&mut self, message: &j1939::Message) -> DelayedReading {
         let order = self.meaning.axis_order;
-        let (triple, told) = match message {
+        let (triple, reading) = match message {
             // Pitch and roll without yaw are no full attitude. The navigation filter gets pitch and roll from gravity.
             j1939::Message::Slope(_) => return None,
             j1939::Message::AngularRate(triple) => {
@@ -232,7 +232,7 @@ impl State {
             }
         };
         let heeded = order == AxisOrder::Yxz;
-        let Some((reading, _)) = told.filter(|_| !(heeded && triple.has_error())) else {
+        let Some((reading, _)) = reading.filter(|_| !(heeded && triple.has_error())) else {
             self.withheld += 1;
             return None;
         };
@@ -243,7 +243,7 @@ impl State {
     /// Handles a message of a Bosch unit; returns the acceleration once all three components have arrived.
     ///
     /// Turn rates are not reported, since the unit has none about its pitch axis.
-    fn take_bosch(&mut self, message: bosch::Message) -> Told {
+    fn take_bosch(&mut self, message: bosch::Message) -> DelayedReading {
         let [x, y, z] = &mut self.acceleration_mps2;
         match message {
             bosch::Message::Roll(_, acceleration) => *x = Some(acceleration.mps2()),
@@ -270,29 +270,29 @@ impl State {
         clock.stamp(u64::from(ticks), self.received);
     }
 
-    fn rate(&mut self, radps: [f64; 3]) -> Told {
+    fn rate(&mut self, radps: [f64; 3]) -> DelayedReading {
         self.withheld += u64::from(self.invalid.rate);
         rate(radps).filter(|_| !self.invalid.rate)
     }
 
-    fn force(&mut self, mps2: [f64; 3]) -> Told {
+    fn force(&mut self, mps2: [f64; 3]) -> DelayedReading {
         self.withheld += u64::from(self.invalid.force);
         force(mps2).filter(|_| !self.invalid.force)
     }
 
-    fn quaternion(&mut self, [w, x, y, z]: [f64; 4]) -> Told {
+    fn quaternion(&mut self, [w, x, y, z]: [f64; 4]) -> DelayedReading {
         self.sends_quaternions = true;
         self.attitude(Rot::from_wxyz(w, x, y, z))
     }
 
-    fn euler(&mut self, [roll, pitch, yaw]: [f64; 3]) -> Told {
+    fn euler(&mut self, [roll, pitch, yaw]: [f64; 3]) -> DelayedReading {
         if self.sends_quaternions {
             return None;
         }
         self.attitude(Some(Rot::from_roll_pitch_yaw(roll, pitch, yaw)))
     }
 
-    fn attitude(&mut self, attitude: Option<Rot<Level, Sensor>>) -> Told {
+    fn attitude(&mut self, attitude: Option<Rot<Level, Sensor>>) -> DelayedReading {
         let attitude = attitude.filter(|_| !self.invalid.orientation);
         self.withheld += u64::from(attitude.is_none());
         Some((Reading::Attitude(attitude?), DurNs::ZERO))
@@ -300,11 +300,11 @@ impl State {
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "the callers pass it on")]
-fn rate([x, y, z]: [f64; 3]) -> Told {
+fn rate([x, y, z]: [f64; 3]) -> DelayedReading {
     Some((Reading::AngularRate(Vec3::new(x, y, z)), DurNs::ZERO))
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "the callers pass it on")]
-fn force([x, y, z]: [f64; 3]) -> Told {
+fn force([x, y, z]: [f64; 3]) -> DelayedReading {
     Some((Reading::SpecificForce(Vec3::new(x, y, z)), DurNs::ZERO))
 }

@@ -19,13 +19,13 @@ pub struct ImuEmulator {
     rate_hz: f64,
     start: MonoNs,
     begun: u64,
-    told: u64,
+    sent: u64,
 }
 
 impl ImuEmulator {
     /// Creates a unit that is switched on, and first samples, at `start`.
     pub fn new(meaning: DecoderSettings, rate_hz: f64, start: MonoNs) -> Self {
-        Self { meaning, rate_hz, start, begun: 0, told: 0 }
+        Self { meaning, rate_hz, start, begun: 0, sent: 0 }
     }
 
     /// Time of a sample on the unit's clock, counted from the start.
@@ -78,8 +78,8 @@ impl Emulator<Inertia> for ImuEmulator {
     }
 
     fn tell(&mut self, motion: &Inertia, line: LineSink<'_>) {
-        let elapsed = self.elapsed(self.told);
-        self.told += 1;
+        let elapsed = self.elapsed(self.sent);
+        self.sent += 1;
         let mut send = |messages: &[Option<Message>]| {
             for frame in messages.iter().flatten().filter_map(|message| self.meaning.set.encode(message)) {
                 line(Direction::Received, motion.at + self.meaning.latency, &frame.encode());

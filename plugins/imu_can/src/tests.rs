@@ -346,7 +346,7 @@ fn emulated_unit_sends_no_unmeasured_values() {
             panic!("no inertial unit")
         };
         let mut felt = Inertia::due(MonoNs(0), DurNs::ZERO);
-        let mut told = |felt: &Inertia| {
+        let mut decoded_of = |felt: &Inertia| {
             let (mut decoder, mut readings, mut frames) = (ImuDecoder::new(meaning(set)), Vec::new(), 0);
             emulator.tell(felt, &mut |_, received, bytes| {
                 frames += 1;
@@ -354,9 +354,9 @@ fn emulated_unit_sends_no_unmeasured_values() {
             });
             (frames, readings)
         };
-        assert_eq!(told(&felt).0, whole, "{own}");
+        assert_eq!(decoded_of(&felt).0, whole, "{own}");
         felt.attitude = Rot::from_roll_pitch_yaw(f64::NAN, f64::NAN, f64::NAN);
-        let (frames, readings) = told(&felt);
+        let (frames, readings) = decoded_of(&felt);
         assert_eq!(frames, without, "{own}");
         assert!(
             matches!(readings[..], [Reading::AngularRate(_), Reading::SpecificForce(_)])
@@ -364,6 +364,6 @@ fn emulated_unit_sends_no_unmeasured_values() {
             "{readings:?}"
         );
         felt.rate_radps = Vec3::new(0.0, f64::NAN, 0.0);
-        assert!(matches!(told(&felt).1[..], [Reading::SpecificForce(_)]), "{own}");
+        assert!(matches!(decoded_of(&felt).1[..], [Reading::SpecificForce(_)]), "{own}");
     }
 }

@@ -17,7 +17,7 @@ use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 use crate::decoder::{DecoderSettings, DistancePart, MavlinkDecoder, Part};
 use crate::dialect::{ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavType};
 use crate::frame::{encode, without_identity};
-use crate::message::{Distance, ImuMessage, Message, Pressure as Told, PressureMessage};
+use crate::message::{Distance, ImuMessage, Message, Pressure as PressureValues, PressureMessage};
 use crate::{MavHeader, MavlinkKind};
 
 /// Recorded ATTITUDE, RAW_IMU and SCALED_PRESSURE2 messages of an ArduSub, from a telemetry log.
@@ -260,7 +260,7 @@ fn impossible_values_are_withheld() {
     };
     let pressure = |absolute_hpa| {
         let message = PressureMessage::Second;
-        Message::Pressure(Told { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 })
+        Message::Pressure(PressureValues { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 })
     };
     for (part, message) in [
         (RAW_IMU, attitude([f32::NAN, 0.0, 0.0])),
@@ -343,8 +343,9 @@ impl Wire for Delivered {
 
 fn pressure_of(system_id: u32, absolute_hpa: f32) -> Vec<u8> {
     let message = PressureMessage::Second;
-    let told = Message::Pressure(Told { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 });
-    told.to_frame(MavHeader { system_id, component_id: 1, sequence: 0 }).raw_bytes().to_vec()
+    let pressure =
+        Message::Pressure(PressureValues { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 });
+    pressure.to_frame(MavHeader { system_id, component_id: 1, sequence: 0 }).raw_bytes().to_vec()
 }
 
 fn heartbeat_of(system_id: u32, mavtype: MavType, autopilot: MavAutopilot) -> Vec<u8> {

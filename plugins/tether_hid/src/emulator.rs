@@ -36,8 +36,8 @@ pub struct HidEmulator {
     counter: Counter,
     start: MonoNs,
     begun: u64,
-    told: u64,
-    told_counts: i64,
+    sent: u64,
+    sent_counts: i64,
 }
 
 /// An ideal emulated LCI-90: there is no noise and no added delay, but lengths are whole millimetres.
@@ -73,7 +73,7 @@ impl CounterSettings {
 impl HidEmulator {
     /// Creates a counter that is switched on, and first reports, at `start`.
     pub fn new(reeling: CounterSettings, counter: Counter, start: MonoNs) -> Self {
-        Self { reeling, counter, start, begun: 0, told: 0, told_counts: 0 }
+        Self { reeling, counter, start, begun: 0, sent: 0, sent_counts: 0 }
     }
 
     /// Count in the next report. In delta mode, a change too large for one report is divided among several reports.
@@ -83,8 +83,8 @@ impl HidEmulator {
             Counting::Absolute => layout.width.wrapped(counts, layout.signed),
             Counting::Delta => {
                 let most = (1_i64 << (layout.width.bits() - 1)) - 1;
-                let change = counts.saturating_sub(self.told_counts).clamp(-most, most);
-                self.told_counts += change;
+                let change = counts.saturating_sub(self.sent_counts).clamp(-most, most);
+                self.sent_counts += change;
                 change
             }
         }
@@ -99,12 +99,12 @@ impl Emulator<Payout> for HidEmulator {
     fn tell(&mut self, payout: &Payout, line: LineSink<'_>) {
         let length_m = self.reeling.length_m(payout);
         let report = Report {
-            sequence: Some((self.told & 0xFF) as u8),
+            sequence: Some((self.sent & 0xFF) as u8),
             status: Some(STATUS_WELL),
             count: self.count(math::round_to_i64(length_m * self.counter.counts_per_metre)),
-            auxiliary: i32::try_from(self.reeling.elapsed(self.told).0 / 1_000_000).ok(),
+            auxiliary: i32::try_from(self.reeling.elapsed(self.sent).0 / 1_000_000).ok(),
         };
-        self.told += 1;
+        self.sent += 1;
         let bytes = self.counter.layout.encode(&report);
         line(Direction::Received, payout.at + self.reeling.latency, &bytes);
     }

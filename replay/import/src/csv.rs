@@ -211,10 +211,10 @@ impl Target {
         };
         let (value, is_beyond) = self.sensor.within_reach(value);
         let stream = self.sensor.id.clone();
-        let told = self.sensor.tell(MonoNs(stamp_ns), &value, &mut |at, bytes| {
+        let is_encoded = self.sensor.tell(MonoNs(stamp_ns), &value, &mut |at, bytes| {
             out.push(Entry { stamp_ns: at.0, stream: stream.clone(), bytes: bytes.to_vec() });
         });
-        match (told, is_beyond) {
+        match (is_encoded, is_beyond) {
             (true, true) => Err(BEYOND),
             (true, false) => Ok(()),
             (false, _) => Err("rows with values that the sensor can't encode"),

@@ -127,10 +127,10 @@ impl EmulatedSensor {
         if !value.is_possible() {
             return false;
         }
-        let mut told = false;
+        let mut is_sent = false;
         let mut line = |direction, at: MonoNs, bytes: &[u8]| {
             if direction == Direction::Received && !bytes.is_empty() {
-                told = true;
+                is_sent = true;
                 sink(at, bytes);
             }
         };
@@ -158,6 +158,6 @@ impl EmulatedSensor {
             }
             _ => return false,
         }
-        told
+        is_sent
     }
 }

@@ -23,7 +23,7 @@ pub trait Format {
     }
 
     /// Returns the format's losses and remarks, at the end of the file.
-    fn told(&self) -> ImportReport {
+    fn report(&self) -> ImportReport {
         ImportReport::default()
     }
 
@@ -46,8 +46,8 @@ impl Format for Box<dyn Format> {
         (**self).reach_ns()
     }
 
-    fn told(&self) -> ImportReport {
-        (**self).told()
+    fn report(&self) -> ImportReport {
+        (**self).report()
     }
 
     fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step {

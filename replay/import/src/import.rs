@@ -71,7 +71,8 @@ impl<S: Source> Import<S> {
         let mut order = Order::reaching(input.reach_ns());
         while !order.is_full() && input.more(&mut order)? {}
         let Some(first_ns) = order.first_ns() else {
-            let why = input.told().losses.into_iter().next().map_or(String::new(), |why| format!("; {why}"));
+            let why =
+                input.report().losses.into_iter().next().map_or(String::new(), |why| format!("; {why}"));
             return Err(ImportError::Nothing {
                 name: input.name().to_owned(),
                 what,
@@ -134,9 +135,9 @@ impl<S: Source> Import<S> {
             imported.passed_over += u64::from(!taken);
         }
         losses.late(self.order.late());
-        let told = self.input.told();
-        imported.losses = [told.losses, losses.words()].concat();
-        imported.remarks = told.remarks;
+        let report = self.input.report();
+        imported.losses = [report.losses, losses.words()].concat();
+        imported.remarks = report.remarks;
         Ok(imported)
     }
 }

@@ -31,7 +31,7 @@ pub trait Source {
     fn bytes(&self) -> u64;
 
     /// Returns losses and remarks of the import so far.
-    fn told(&self) -> ImportReport;
+    fn report(&self) -> ImportReport;
 }
 
 /// A file, and the format that splits it into entries.
@@ -66,8 +66,8 @@ impl<R: Read, F: Format> Source for Input<R, F> {
         self.offset + self.done as u64
     }
 
-    fn told(&self) -> ImportReport {
-        let ImportReport { losses, remarks } = self.format.told();
+    fn report(&self) -> ImportReport {
+        let ImportReport { losses, remarks } = self.format.report();
         ImportReport { losses: [self.losses.words(), losses].concat(), remarks }
     }
 

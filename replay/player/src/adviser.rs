@@ -57,7 +57,7 @@ struct LoopAdviser {
     ports: Vec<Option<Port>>,
     /// End of the current tick of the loop.
     until: MonoNs,
-    told: Vec<PilotAdvice>,
+    advice: Vec<PilotAdvice>,
 }
 
 impl LoopAdviser {
@@ -68,17 +68,17 @@ impl LoopAdviser {
         }
         let mut dive = app.arm(vehicle.navigation())?;
         let ports = (0..dive.sources().len()).map(|source| dive.take_port(source)).collect();
-        Ok(Self { dive, ports, until: MonoNs(0), told: Vec::new() })
+        Ok(Self { dive, ports, until: MonoNs(0), advice: Vec::new() })
     }
 
     fn tick(&mut self) {
-        let Self { dive, until, told, .. } = self;
-        work_off(dive, *until, &mut |dive| told.extend(told_by(dive)), &mut || {});
+        let Self { dive, until, advice, .. } = self;
+        work_off(dive, *until, &mut |dive| advice.extend(advice_of(dive)), &mut || {});
     }
 }
 
 /// Returns the advice of the latest tick, if any.
-fn told_by(dive: &Loop) -> Option<PilotAdvice> {
+fn advice_of(dive: &Loop) -> Option<PilotAdvice> {
     let last = dive.view().advised().entries.last()?;
     let sections = &dive.view().coverage().sections;
     let open = sections.runs().all().iter().filter(|run| run.is_open());
@@ -117,7 +117,7 @@ impl Adviser for LoopAdviser {
         }
     }
 
-    fn told(&mut self) -> Vec<PilotAdvice> {
-        std::mem::take(&mut self.told)
+    fn advice(&mut self) -> Vec<PilotAdvice> {
+        std::mem::take(&mut self.advice)
     }
 }

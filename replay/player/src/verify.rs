@@ -207,10 +207,10 @@ impl Verifier {
             }
             // Logs of earlier versions have no channel for states or alerts. A log without any results isn't the log
             // of a live dive.
-            let is_told = has_results && (has_channel(name) || !LATER.contains(&name));
+            let is_reported = has_results && (has_channel(name) || !LATER.contains(&name));
             verified.same += stream.same;
             verified.unrecorded += stream.unrecorded;
-            verified.differences.extend(stream.difference.take().filter(|_| is_told));
+            verified.differences.extend(stream.difference.take().filter(|_| is_reported));
         }
         verified.differences.sort_by_key(|difference| difference.tick);
         Ok(verified)

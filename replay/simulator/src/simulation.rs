@@ -43,7 +43,7 @@ pub trait Adviser: Send {
     fn hear(&mut self, message: &Message<'_>);
 
     /// Returns the advice given since the previous call, in order of time.
-    fn told(&mut self) -> Vec<PilotAdvice>;
+    fn advice(&mut self) -> Vec<PilotAdvice>;
 }
 
 /// Source of the requests that the devices receive.
@@ -304,8 +304,8 @@ impl Simulation {
         if let Some(mut scenery) =
             self.world.get_resource_mut::<Scenery>().filter(|s| s.trajectory.is_advised())
         {
-            let told = self.adviser.as_mut().map(|adviser| adviser.told()).unwrap_or_default();
-            scenery.trajectory.lead(told, soon.since(START).as_secs_f64());
+            let advice = self.adviser.as_mut().map(|adviser| adviser.advice()).unwrap_or_default();
+            scenery.trajectory.lead(advice, soon.since(START).as_secs_f64());
             self.end = START + DurNs::from_secs_f64(scenery.trajectory.duration_s());
         }
         let Some(slice) = self.world.get_resource::<Slice>() else { return false };

@@ -86,7 +86,7 @@ pub enum Condition {
     DataSheet,
     /// As `DataSheet`, but the vehicle file states the true sensor noises. The file allows for no rough walls, tilt or
     /// cable slack.
-    Told,
+    Declared,
     /// A MEMS inertial unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error; steel
     /// nearby.
     Poor,
@@ -128,7 +128,7 @@ pub enum Condition {
 pub const CONDITIONS: [(&str, Condition); 19] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
-    ("told", Condition::Told),
+    ("told", Condition::Declared),
     ("poor", Condition::Poor),
     ("murk", Condition::Murk),
     ("fish", Condition::Fish),
@@ -256,11 +256,11 @@ impl Cell {
     pub fn dive(&self, seed: u64, length_m: f64) -> CellDive {
         let plain = self.plain(seed, length_m);
         let [planned_mps, speed_mps] = self.speeds_mps(&plain.vehicle);
-        let told = self.told().replace("PLANNED", &format!("{planned_mps:.4}"));
+        let declared = self.declared().replace("PLANNED", &format!("{planned_mps:.4}"));
         let effects = self.effects(&plain, seed, length_m, length_m / speed_mps);
-        let truly = self.truly(&told, &plain, seed);
+        let truly = self.truly(&declared, &plain, seed);
         let text = self.text(seed, length_m, speed_mps, &effects);
-        CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &told, seed) }
+        CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &declared, seed) }
     }
 
     /// Ratio of the planned speed to the largest speed by the paper's Eq. 16.
@@ -277,11 +277,11 @@ impl Cell {
 
     /// The scene of a dive without effects; its speed is arbitrary.
     fn plain(&self, seed: u64, length_m: f64) -> Scene {
-        parse(&self.text(seed, length_m, 0.1, ""), &self.told(), seed)
+        parse(&self.text(seed, length_m, 0.1, ""), &self.declared(), seed)
     }
 
     /// Text of the vehicle file that headrace reads, with a placeholder for the planned speed.
-    fn told(&self) -> String {
+    fn declared(&self) -> String {
         let Vehicle { file, mode, target_m, layout, .. } = self.vehicle;
         let text = String::from_utf8(scenes::vehicle_file(file).unwrap()).unwrap();
         let lines = text.lines().map(|line| match line.split(" =").next() {
@@ -292,26 +292,26 @@ impl Cell {
             Some("[navigation]" | "slack_sd_m" | "slack_time_s" | "mount_sd_deg") => String::new(),
             _ => line.to_owned(),
         });
-        let told = lines.collect::<Vec<_>>().join("\n");
-        told.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.told_navigation()))
+        let declared = lines.collect::<Vec<_>>().join("\n");
+        declared.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.declared_navigation()))
     }
 
     /// Navigation settings that state the slack of the cable and the noise of the unit, if the pilot knows both in this
     /// condition.
-    fn told_navigation(&self) -> String {
+    fn declared_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
-            Condition::Told => TRUE_NOISES.to_owned(),
+            Condition::Declared => TRUE_NOISES.to_owned(),
             Condition::Mounts | Condition::WrongMount => format!("{TAUT}{MOUNTS}"),
             _ => TAUT.to_owned(),
         }
     }
 
     /// The vehicle file of the simulated vehicle.
-    fn truly(&self, told: &str, plain: &Scene, seed: u64) -> String {
+    fn truly(&self, declared: &str, plain: &Scene, seed: u64) -> String {
         let counts = |by: f64| {
             let count = 2000.0 * by;
-            told.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
+            declared.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
         };
         match self.condition {
             // The cable counter reads too little, not too much, so that no estimated chainage lies beyond the tunnel's
@@ -320,9 +320,9 @@ impl Cell {
             Condition::WrongCable => counts(0.98),
             Condition::WrongMount => {
                 let heads = of_sense(plain, Sense::Head);
-                turned(told, &heads[Draw::new(seed).below(heads.len())])
+                turned(declared, &heads[Draw::new(seed).below(heads.len())])
             }
-            _ => told.to_owned(),
+            _ => declared.to_owned(),
         }
     }
 
@@ -339,7 +339,7 @@ impl Cell {
 
     /// Planned speed from `plan`, m/s.
     fn plan_mps(&self, vehicle: &VehicleConfig) -> f64 {
-        planned_mps(vehicle, &self.told().replace("PLANNED", "0.1"), self.vehicle.mode)
+        planned_mps(vehicle, &self.declared().replace("PLANNED", "0.1"), self.vehicle.mode)
     }
 
     fn text(&self, seed: u64, length_m: f64, speed_mps: f64, effects: &str) -> String {

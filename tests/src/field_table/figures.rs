@@ -197,15 +197,15 @@ impl Figures {
         let from = math::floor_to_i64((dive.truth.way_m[0] - first.shift_m) / section_m);
         // A trajectory doesn't enter the section that begins at the trajectory's end.
         let to = math::floor_to_i64((dive.truth.way_m[1] - last.shift_m - TOUCH_M) / section_m);
-        let mut told: Vec<i64> = dive
+        let mut reported: Vec<i64> = dive
             .sections
             .iter()
             .map(|section| math::round_to_i64(section.report.start_m / section_m))
             .collect();
-        told.dedup();
-        let told = told.iter().filter(|k| (from..=to).contains(k)).count();
+        reported.dedup();
+        let reported = reported.iter().filter(|k| (from..=to).contains(k)).count();
         self.way_m[0] += (to - from + 1) as f64 * section_m;
-        self.way_m[1] += told as f64 * section_m;
+        self.way_m[1] += reported as f64 * section_m;
     }
 
     /// Fraction of the inner length with this verdict: 0 passed, 1 failed, 2 can't say, 3 open.

@@ -27,7 +27,7 @@ pub struct Judged {
     /// Sets of causes that count as right.
     pub right: Right,
     /// Displayed causes, sorted.
-    pub told: Vec<Cause>,
+    pub reported: Vec<Cause>,
     /// Number of the missed stretch (`run`) to which the section belongs.
     pub run: Option<u32>,
     /// Diameter of the section's hole, m.
@@ -42,13 +42,13 @@ pub struct Judged {
 impl Judged {
     /// Whether the displayed causes equal one of the right sets.
     pub fn is_right(&self) -> bool {
-        self.right.contains(&self.told)
+        self.right.contains(&self.reported)
     }
 
     /// Whether the only displayed cause is nearly right: the cause was injected, and without the cause the hole exceeds
     /// the target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
-        let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
+        let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.reported == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
     }
 }
@@ -73,12 +73,13 @@ pub struct Stretch<'a> {
 
 impl Stretch<'_> {
     /// Causes that are displayed for most sections of the stretch.
-    pub fn told(&self) -> &[Cause] {
-        let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
+    pub fn reported(&self) -> &[Cause] {
+        let count =
+            |reported: &[Cause]| self.sections.iter().filter(|section| section.reported == reported).count();
         self.sections
             .iter()
-            .map(|section| section.told.as_slice())
-            .max_by_key(|told| count(told))
+            .map(|section| section.reported.as_slice())
+            .max_by_key(|reported| count(reported))
             .unwrap_or(&[])
     }
 
@@ -132,14 +133,14 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
         else {
             continue;
         };
-        let told = told(evidence);
+        let reported = reported(evidence);
         let runs = run_of(f64::midpoint(section.start_m, section.end_m));
         let of_cause = |id: &&u32| all.runs[**id as usize].cause == evidence.cause;
         let run = runs.iter().find(of_cause).or(runs.first()).copied();
         sections.push(Judged {
             ends_m: [section.start_m, section.end_m],
             right,
-            told,
+            reported,
             run,
             hole_m: section.hole_m.unwrap_or(0.0),
             without_m,
@@ -156,7 +157,7 @@ pub(super) fn hole_at_m(report: &Report, start_m: f64) -> f64 {
 }
 
 /// Displayed causes in a section's evidence, sorted.
-fn told(evidence: &Evidence) -> Vec<Cause> {
+fn reported(evidence: &Evidence) -> Vec<Cause> {
     evidence.causes.iter().collect()
 }
 

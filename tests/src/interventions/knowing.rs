@@ -29,12 +29,12 @@ impl UpperBound {
         if dive.drawn.injected.len() < 2 {
             return;
         }
-        let told: Vec<Vec<Right>> = (1..=NOISES).map(|noise| dive.with_noise(noise)).collect();
+        let sets_by_noise: Vec<Vec<Right>> = (1..=NOISES).map(|noise| dive.with_noise(noise)).collect();
         let mut from = 0;
         for stretch in dive.stretches() {
             let of_stretch = from..from + stretch.sections.len();
             from = of_stretch.end;
-            let sets = told.iter().flat_map(|told| &told[of_stretch.clone()]).flatten();
+            let sets = sets_by_noise.iter().flat_map(|by_noise| &by_noise[of_stretch.clone()]).flatten();
             let mut counts: BTreeMap<Vec<usize>, u32> = BTreeMap::new();
             for set in sets {
                 *counts.entry(set.iter().map(|cause| *cause as usize).collect()).or_default() += 1;

@@ -55,7 +55,7 @@ pub struct Matrix {
     /// Number of dives without a failed section.
     pub idle: u32,
     /// Number of sections and of stretches by true and displayed cause, for dives with one cause.
-    told: BTreeMap<(String, String), [u32; 2]>,
+    reported: BTreeMap<(String, String), [u32; 2]>,
     /// Number of wrong stretches by true and displayed cause, for dives with two causes.
     wrong: BTreeMap<(String, String), u32>,
 }
@@ -75,29 +75,29 @@ impl Matrix {
         self.idle += u32::from(dive.sections.is_empty());
         for section in &dive.sections {
             self.sections[several].add(section.is_right());
-            self.note(several, &section.right, &section.told, 0);
+            self.note(several, &section.right, &section.reported, 0);
         }
         for stretch in dive.stretches() {
-            let is_right = stretch.right.iter().any(|set| set == stretch.told());
+            let is_right = stretch.right.iter().any(|set| set == stretch.reported());
             self.stretches[several].add(is_right);
             self.one_run.add(stretch.runs() <= 1);
             if stretch.right.iter().all(|set| set.len() > 1) {
                 self.pairs.add(is_right);
-                let close = stretch.sections.iter().filter(|section| section.told == stretch.told());
+                let close = stretch.sections.iter().filter(|section| section.reported == stretch.reported());
                 let mut close = close.peekable();
                 let is_close = close.peek().is_some()
                     && close.all(|section| section.is_close(&dive.drawn.injected, dive.drawn.target_m));
                 self.close_pairs.add(is_right || is_close);
             }
-            self.note(several, &stretch.right, stretch.told(), 1);
+            self.note(several, &stretch.right, stretch.reported(), 1);
         }
     }
 
-    fn note(&mut self, several: usize, right: &Right, told: &[Cause], which: usize) {
-        let key = (any_words(right), words(told));
+    fn note(&mut self, several: usize, right: &Right, reported: &[Cause], which: usize) {
+        let key = (any_words(right), words(reported));
         if several == 0 {
-            self.told.entry(key).or_default()[which] += 1;
-        } else if which == 1 && !right.iter().any(|set| set == told) {
+            self.reported.entry(key).or_default()[which] += 1;
+        } else if which == 1 && !right.iter().any(|set| set == reported) {
             *self.wrong.entry(key).or_default() += 1;
         }
     }
@@ -107,16 +107,16 @@ impl Matrix {
         let mut text =
             String::from("one cause injected: true cause, then displayed causes with sections/stretches\n");
         let mut last = "";
-        for ((right, told), [sections, stretches]) in &self.told {
+        for ((right, reported), [sections, stretches]) in &self.reported {
             if right != last {
                 write!(text, "{}  {right:<16}", if last.is_empty() { "" } else { "\n" }).unwrap();
                 last = right;
             }
-            write!(text, " {told} {sections}/{stretches};").unwrap();
+            write!(text, " {reported} {sections}/{stretches};").unwrap();
         }
         text.push_str("\ntwo causes injected, wrong stretches: true, displayed, number\n");
-        for ((right, told), stretches) in &self.wrong {
-            writeln!(text, "  {right:<45} {told:<35} {stretches}").unwrap();
+        for ((right, reported), stretches) in &self.wrong {
+            writeln!(text, "  {right:<45} {reported:<35} {stretches}").unwrap();
         }
         for (what, count) in [
             ("sections, one cause", self.sections[0]),

@@ -16,7 +16,7 @@ const ROLLED_DEG: f64 = 75.0;
 #[derive(Debug, Clone)]
 pub struct Remedied {
     /// Remedy that the program displays for the missed stretch.
-    pub told: ReturnReport,
+    pub reported: ReturnReport,
     /// For each section of the stretch: its start, and its hole diameter after the remedy, m. The diameter is infinite
     /// if it can't be measured.
     pub then_m: Vec<[f64; 2]>,
@@ -42,19 +42,19 @@ fn mends(action: Action, injected: &Injected) -> bool {
 
 /// Simulates the displayed remedy of each missed stretch. Skips stretches in which injected causes explain no section.
 pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
-    let of_run = |told: &ReturnReport| -> Vec<Judged> {
-        dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()
+    let of_run = |reported: &ReturnReport| -> Vec<Judged> {
+        dive.sections.iter().filter(|section| section.run == Some(reported.run)).cloned().collect()
     };
-    let runs = dive.report.go_back.iter().map(|told| (told, of_run(told)));
+    let runs = dive.report.go_back.iter().map(|reported| (reported, of_run(reported)));
     runs.filter(|(_, sections)| !sections.is_empty())
-        .map(|(told, sections)| remedy(dive, told, &sections))
+        .map(|(reported, sections)| remedy(dive, reported, &sections))
         .collect()
 }
 
-fn remedy(dive: &InterventionDive, told: &ReturnReport, sections: &[Judged]) -> Remedied {
-    let has = |action: Action| told.actions.contains(&action);
-    let over_m = [told.to_m - ROOM_M, told.from_m + ROOM_M];
-    let mended = |injected: &Injected| told.actions.iter().any(|action| mends(*action, injected));
+fn remedy(dive: &InterventionDive, reported: &ReturnReport, sections: &[Judged]) -> Remedied {
+    let has = |action: Action| reported.actions.contains(&action);
+    let over_m = [reported.to_m - ROOM_M, reported.from_m + ROOM_M];
+    let mended = |injected: &Injected| reported.actions.iter().any(|action| mends(*action, injected));
     let turned_back = dive.drawn.injected.contains(&Injected::NotPassed);
     let again_deg = if has(Action::OtherSide) {
         Some(ROLLED_DEG)
@@ -62,11 +62,14 @@ fn remedy(dive: &InterventionDive, told: &ReturnReport, sections: &[Judged]) -> 
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
     // The action "slower" without a speed means that other settings of the heads are enough at the planned speed.
-    let at_most_mps =
-        if told.at_most_mps > 0.0 || !has(Action::Slower) { told.at_most_mps } else { dive.drawn.speed_mps };
+    let at_most_mps = if reported.at_most_mps > 0.0 || !has(Action::Slower) {
+        reported.at_most_mps
+    } else {
+        dive.drawn.speed_mps
+    };
     let then = report(&dive.drawn.changed(&mended, over_m, at_most_mps, again_deg), &|_| true);
     let then_m: Vec<[f64; 2]> =
         sections.iter().map(|section| [section.ends_m[0], hole_at_m(&then, section.ends_m[0])]).collect();
     let clears = then_m.iter().all(|[_, hole_m]| *hole_m <= dive.drawn.target_m);
-    Remedied { told: told.clone(), then_m, clears }
+    Remedied { reported: reported.clone(), then_m, clears }
 }

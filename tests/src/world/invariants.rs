@@ -58,13 +58,13 @@ fn of_changed(lived: &DiveResult, replayed: &Replayed) -> Option<String> {
         Ok(changed) => {
             let is_same = (&changed.consumed, &changed.losses, changed.digest)
                 == (&replayed.consumed, &replayed.losses, replayed.digest);
-            let is_told = changed.losses != replayed.losses && !changed.losses.is_empty();
+            let is_reported = changed.losses != replayed.losses && !changed.losses.is_empty();
             let invented = invented(&lived.consumed, &changed.consumed);
             if invented > 0 {
                 format!("{invented} packets are counted twice or in another order: {:?}", changed.losses)
             } else if change == LogChange::Reordered && !is_same {
                 format!("its replay differs: {:?}", changed.losses)
-            } else if change == LogChange::Doubled && !is_told {
+            } else if change == LogChange::Doubled && !is_reported {
                 "the copy isn't reported".to_owned()
             } else if changed.consumed.len() < replayed.consumed.len() && changed.losses.is_empty() {
                 "packets are missing and no loss is reported".to_owned()
@@ -121,9 +121,9 @@ fn of_log(lived: &DiveResult, replayed: &Replayed) -> Vec<String> {
     hold(theirs.len() >= lived.certain, "packets are missing that had been synced");
     if finished {
         let summary = lived.summary.as_ref().unwrap();
-        let told = summary.faults.iter().any(|fault| fault.lost > 0);
+        let is_reported = summary.faults.iter().any(|fault| fault.lost > 0);
         let skipped = usize::try_from(summary.skipped).unwrap();
-        hold(told || missing == skipped, "packets are missing that the recorder doesn't report");
+        hold(is_reported || missing == skipped, "packets are missing that the recorder doesn't report");
         hold(missing > 0 || replayed.digest == lived.digest, "the replay's results differ");
         let lines_dropped: u64 = lived.lines.iter().map(|line| line.history.dropped).sum();
         hold(dropped == lines_dropped, "the log doesn't state the packets that the lines dropped");

@@ -5,7 +5,7 @@ use headrace_tests::{Folder, root};
 use serde_json::Value;
 
 /// Output lines (JSON) of a dive in which the shipped vehicle follows this scene's path.
-fn told(scene: &str) -> Vec<Value> {
+fn json_lines(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
     folder.write("vehicle.toml", std::fs::read(file).unwrap());
@@ -39,7 +39,7 @@ fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
 
 #[test]
 fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
-    let lines = told(&std::fs::read_to_string(root().join("deploy/scenes/demo.toml")).unwrap());
+    let lines = json_lines(&std::fs::read_to_string(root().join("deploy/scenes/demo.toml")).unwrap());
     let (flags, ends, cleared) = (of(&lines, "flag"), of(&lines, "flag_ends"), of(&lines, "cleared"));
     assert_eq!([flags.len(), ends.len(), cleared.len()], [1, 1, 1], "{flags:?} {ends:?} {cleared:?}");
     for key in ["run", "from_m", "to_m"] {
@@ -62,7 +62,7 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
 
 /// A scene in which the vehicle drives out at this speed and goes back at a high speed.
 fn there_and_back(there_mps: f64) -> Vec<Value> {
-    told(&format!(
+    json_lines(&format!(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 15\nspeed_mps = {there_mps}\n\
          [[trajectory.waypoints]]\nchainage_m = 6\nspeed_mps = 0.3\n[effects]\nmotion_within_turn = {{}}\nocclusion = {{}}\n"
@@ -85,7 +85,7 @@ fn too_fast_is_not_raised_over_passed_wall_or_while_reversing() {
 /// heads reach unsampled wall.
 #[test]
 fn speed_limit_is_displayed_again_before_the_heads_reach_unsampled_wall() {
-    let lines = told(
+    let lines = json_lines(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 12\nspeed_mps = 0.09\n\
          [[trajectory.waypoints]]\nchainage_m = 8\nspeed_mps = 0.3\n[[trajectory.waypoints]]\nchainage_m = 16\nspeed_mps = 0.3\n\
@@ -121,7 +121,7 @@ fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
 #[test]
 fn following_the_go_back_advice_clears_every_missed_section() {
     let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();
-    let lines = told(&missed_and_back(17.9, None));
+    let lines = json_lines(&missed_and_back(17.9, None));
     assert!(end(&lines) > 5.0);
     let flag = of(&lines, "flag")[0];
     let text = flag["text"].as_str().unwrap();
@@ -131,14 +131,14 @@ fn following_the_go_back_advice_clears_every_missed_section() {
         words.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     let from_m = figure(flag, "from_m");
     assert!((0.5..2.0).contains(&(from_m - back_m)), "{text}");
-    let left_m = end(&told(&missed_and_back(back_m, Some(at_most_mps))));
+    let left_m = end(&json_lines(&missed_and_back(back_m, Some(at_most_mps))));
     assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
 /// The report's totals include missed sections even if the dive ends on the way back.
 #[test]
 fn dive_that_ends_on_the_way_back_reports_its_missed_sections() {
-    let lines = told(&missed_and_back(10.5, None));
+    let lines = json_lines(&missed_and_back(10.5, None));
     let end = of(&lines, "end")[0];
     let missed_m = end["summary"]["fail_m"].as_f64().unwrap();
     assert!((1.0..3.0).contains(&missed_m), "{end}");

@@ -364,8 +364,8 @@ fn existing_file_stays_if_the_new_one_cannot_be_written() {
             let output = full(command).unwrap();
             let said = String::from_utf8(output.stderr).unwrap();
             assert_eq!(output.status.code(), Some(1), "{command:?}: {said}");
-            let told = said.contains("No space left on device") && said.contains("writing ");
-            assert!(told, "{command:?}: {said}");
+            let is_reported = said.contains("No space left on device") && said.contains("writing ");
+            assert!(is_reported, "{command:?}: {said}");
             assert!(content(&folder) == before, "{command:?}: the folder's files have changed");
         }
     }

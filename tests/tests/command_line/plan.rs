@@ -330,8 +330,11 @@ fn lines_written_by_plan_configure_the_best_mode() {
     let within = |x_m: &Value| x_m.as_f64().is_some_and(|x_m| (12.0..19.5).contains(&x_m));
     let states =
         lines.iter().filter(|line| line["type"] == "state" && within(&line["position"]["chainage_m"]));
-    let told: Vec<&str> = states.map(|state| state["condition"].as_str().unwrap()).collect();
-    assert!(told.len() > 20 && told.iter().all(|told| *told == "good"), "{told:?}");
+    let conditions: Vec<&str> = states.map(|state| state["condition"].as_str().unwrap()).collect();
+    assert!(
+        conditions.len() > 20 && conditions.iter().all(|conditions| *conditions == "good"),
+        "{conditions:?}"
+    );
     let no_vehicle =
         plan(&folder, &["--tunnel", "circle,radius_m=3", "--length", "10", "--target", "0.5", "--write"]);
     assert_eq!(no_vehicle.code, Some(2), "{}", no_vehicle.stdout);

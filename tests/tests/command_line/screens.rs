@@ -78,8 +78,8 @@ fn missed_stretch_is_announced_again_when_its_cause_changes() {
     let runs = report["runs"].as_array().unwrap();
     let kept: Vec<_> = runs.iter().filter(|run| run["merged_into"].is_null()).collect();
     let [run] = kept[..] else { panic!("{runs:#?}") };
-    let told: Vec<_> = flags.iter().map(|flag| flag["cause"].as_str().unwrap()).collect();
-    assert_eq!(told, ["too_fast", "head_silent"], "{flags:#?}");
+    let causes: Vec<_> = flags.iter().map(|flag| flag["cause"].as_str().unwrap()).collect();
+    assert_eq!(causes, ["too_fast", "head_silent"], "{flags:#?}");
     let from_m = |flag: &Value| flag["from_m"].as_f64().unwrap();
     assert!(from_m(&flags[1]) > from_m(&flags[0]) + 1.0, "{flags:#?}");
     for flag in &flags {

@@ -145,9 +145,13 @@ fn wall_beyond_start_and_turning_point_has_verdict_open_and_no_flag() {
     assert!(at_ends.iter().any(|s| s.end_m <= front_m + 0.25), "at the beginning: {:?}", report.no_verdict);
     assert!(at_ends.iter().all(|s| s.verdict == Verdict::Open && s.hole_m.unwrap() > report.target_m));
     assert!(report.sections.iter().filter(inside).all(|s| s.verdict == Verdict::Pass), "{:?}", report.runs);
-    let told: f64 =
+    let listed_m: f64 =
         report.no_verdict.iter().filter(|s| s.why == "not_inspected").map(|s| s.no_verdict_m).sum();
-    assert!((told - report.summary.not_inspected_m).abs() < 1e-9 && told > 0.0, "{:?}", report.no_verdict);
+    assert!(
+        (listed_m - report.summary.not_inspected_m).abs() < 1e-9 && listed_m > 0.0,
+        "{:?}",
+        report.no_verdict
+    );
 }
 
 #[test]

@@ -148,11 +148,11 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
     assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
     let failed = all(Verdict::Fail);
     assert!(failed.failed_under == failed.under && failed.passed_over == 0, "{failed:?}");
-    let told_m = failed.way_m[1];
+    let reported_m = failed.way_m[1];
     judged.sections.remove(judged.sections.len() / 2);
     let mut less = Figures::default();
     less.add(&judged, &dive.scene, cell.start_m);
-    assert!((told_m - less.way_m[1] - judged.report.section_m).abs() < 1e-9, "{told_m} {less:?}");
+    assert!((reported_m - less.way_m[1] - judged.report.section_m).abs() < 1e-9, "{reported_m} {less:?}");
 }
 
 /// Swinging finds an undeclared mount error of 3 degrees. Declared mount errors are included in the standard deviation

@@ -35,13 +35,18 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
      imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
 
 /// Returns the setting that is reported as wrong in a dive of 90 m with a pilot who wanders slightly. `truly` is the
-/// vehicle file of the simulated vehicle, and `told` is the vehicle file that headrace reads.
-fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingJson> {
-    told_swinging(truly, told, [aside_m, 3.0], seed)
+/// vehicle file of the simulated vehicle, and `declared` is the vehicle file that headrace reads.
+fn wrong_setting(truly: &str, declared: &str, aside_m: f64, seed: u64) -> Option<SettingJson> {
+    doubt_while_swinging(truly, declared, [aside_m, 3.0], seed)
 }
 
-/// As [`told`], but the pilot also yaws back and forth by up to `yaw_deg`.
-fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u64) -> Option<SettingJson> {
+/// As [`wrong_setting`], but the pilot also yaws back and forth by up to `yaw_deg`.
+fn doubt_while_swinging(
+    truly: &str,
+    declared: &str,
+    [aside_m, yaw_deg]: [f64; 2],
+    seed: u64,
+) -> Option<SettingJson> {
     let heads: Vec<&str> = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]
         .into_iter()
         .filter(|head| truly.contains(&format!("id = {head:?}")))
@@ -54,7 +59,7 @@ fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u6
     );
     let parse =
         |file: &str| headrace_tests::scenes::seeded(&text, &|_| Ok(file.as_bytes().to_vec()), Some(seed));
-    doubted(&parse(truly), &parse(told))
+    doubted(&parse(truly), &parse(declared))
 }
 
 /// Vehicle files, each with the id of the head whose setting is wrong.
@@ -66,7 +71,7 @@ fn head_turned_about_its_axis_is_reported_with_angle() {
     for ((name, head), by_deg) in OF_VEHICLES.into_iter().zip([3, -3]) {
         let right = file(name);
         let turned = changed(&right, head, "angles_deg", &format!("[{by_deg}, 0, 0]"));
-        let doubt = told(&turned, &right, ASIDE_M, 1).unwrap();
+        let doubt = wrong_setting(&turned, &right, ASIDE_M, 1).unwrap();
         println!("{name}: {doubt:?}");
         assert_eq!((doubt.what, doubt.source.as_deref()), ("head_turned", Some(head)), "{name}");
         let share = doubt.angle_deg.unwrap() / f64::from(by_deg);
@@ -86,7 +91,7 @@ fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
         ("sonar_3", "head_pitched", "[0, 3, 180]", 3.0),
     ] {
         let turned = changed(&right, head, "angles_deg", angles);
-        let doubt = told_swinging(&turned, &right, [ASIDE_M, 5.0], 1).unwrap();
+        let doubt = doubt_while_swinging(&turned, &right, [ASIDE_M, 5.0], 1).unwrap();
         println!("{head} {what} by {by_deg}: {doubt:?}");
         assert_eq!((doubt.what, doubt.source.as_deref()), (what, Some(head)), "{doubt:?}");
         assert!((doubt.angle_deg.unwrap() / by_deg - 1.0).abs() < 0.3, "{doubt:?}");
@@ -97,7 +102,8 @@ fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
 fn reversed_head_is_reported_when_the_vehicle_is_off_centre() {
     for (name, head) in OF_VEHICLES {
         let right = file(name);
-        let doubt = told(&changed(&right, head, "angles_deg", "[0, 0, 180]"), &right, ASIDE_M, 1).unwrap();
+        let doubt =
+            wrong_setting(&changed(&right, head, "angles_deg", "[0, 0, 180]"), &right, ASIDE_M, 1).unwrap();
         assert_eq!(
             (doubt.what, doubt.source.as_deref()),
             ("wrong_way_round", Some(head)),
@@ -114,7 +120,7 @@ fn swapped_heads_are_reported() {
         let [one, other] = ["sonar_1", "sonar_3"].map(|head| sensor_line(&right, head, key));
         swapped = changed(&changed(&swapped, "sonar_1", key, &other), "sonar_3", key, &one);
     }
-    let doubt = told(&swapped, &right, ASIDE_M, 1).unwrap();
+    let doubt = wrong_setting(&swapped, &right, ASIDE_M, 1).unwrap();
     let SettingJson { what, source, other, .. } = &doubt;
     let named = (*what, source.as_deref(), other.as_deref());
     assert_eq!(named, ("swapped", Some("sonar_1"), Some("sonar_3")), "{doubt:?}");
@@ -147,7 +153,7 @@ fn wrong_range_scale_is_reported_with_its_value() {
 fn correct_settings_are_not_reported() {
     for (name, _) in OF_VEHICLES {
         let right = file(name);
-        assert_eq!(told(&right, &right, ASIDE_M, 1), None, "{name}");
+        assert_eq!(wrong_setting(&right, &right, ASIDE_M, 1), None, "{name}");
     }
     let conditions =
         [Condition::Clean, Condition::DataSheet, Condition::Poor, Condition::Murk, Condition::Lively];

@@ -30,7 +30,7 @@ fn hangs(sensor: &str, from_s: f64) -> String {
 }
 
 /// Results of a dive: true holes, causes with their heads, alerts with their texts, and the speed advised at the end.
-struct Told {
+struct Reported {
     /// True holes of passed sections, m.
     passed_m: Vec<f64>,
     causes: Vec<(Cause, Vec<String>)>,
@@ -38,7 +38,7 @@ struct Told {
     v_max_mps: f64,
 }
 
-fn dive(scene: &Scene) -> Told {
+fn dive(scene: &Scene) -> Reported {
     let mut v_max_mps = 0.0;
     let judged = truth::dive_noting(scene, &scene.vehicle, &mut |dive| {
         if let Some(last) = dive.view().advised().entries.last() {
@@ -47,7 +47,7 @@ fn dive(scene: &Scene) -> Told {
     });
     let passed = judged.sections.iter().filter(|section| section.report.verdict == Verdict::Pass);
     let report = &judged.report;
-    Told {
+    Reported {
         passed_m: passed.map(|section| section.true_hole_m).collect(),
         causes: report.runs.iter().map(|run| (run.cause, run.silent_sources.clone())).collect(),
         alerts: report.alert_list.iter().map(|alert| (alert.kind, alert.text.clone())).collect(),
@@ -63,8 +63,8 @@ fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
     for (seed, start_m) in [(1, 2.0), (2, 3000.0), (3, 6900.0), (5, 6900.0)] {
         let [sound, hung] = ["", &hangs("imu", 100.0)]
             .map(|fault| dive(&seeded(seed, start_m, (15.0, 0.05), &format!("{SWAY}{fault}"))));
-        let is_named = |told: &Told| {
-            told.alerts.iter().any(|(kind, text)| *kind == "sensor_hung" && text.contains("imu"))
+        let is_named = |reported: &Reported| {
+            reported.alerts.iter().any(|(kind, text)| *kind == "sensor_hung" && text.contains("imu"))
         };
         assert!(!is_named(&sound) && is_named(&hung), "{start_m}: {:?}", hung.alerts);
         let worst_m = hung.passed_m.iter().copied().fold(0.0, f64::max);
@@ -85,14 +85,18 @@ fn head_without_returns_is_reported_as_silent() {
     let silent = "device_faults = { sensors = [\"sonar_1\"], kind = \"die\", from_s = 90 }\n";
     let [deaf, silent, stuck] =
         [deaf, silent, &hangs("sonar_1", 90.0)].map(|fault| dive(&scene(6900.0, (12.0, 0.1), fault)));
-    for (what, told) in [("deaf", &deaf), ("silent", &silent), ("stuck", &stuck)] {
-        let causes = &told.causes;
+    for (what, reported) in [("deaf", &deaf), ("silent", &silent), ("stuck", &stuck)] {
+        let causes = &reported.causes;
         let is_its = |(cause, heads): &(Cause, Vec<String>)| {
             matches!(cause, Cause::HeadSilent | Cause::HeadStalled)
                 && (heads == &["sonar_1"] || what == "stuck")
         };
         assert!(!causes.is_empty() && causes.iter().all(is_its), "{what}: {causes:?}");
-        assert!((told.v_max_mps / silent.v_max_mps - 1.0).abs() < 0.03, "{what}: {}", told.v_max_mps);
-        assert!(told.alerts.iter().any(|(_, text)| text.contains("sonar_1")), "{what}: {:?}", told.alerts);
+        assert!((reported.v_max_mps / silent.v_max_mps - 1.0).abs() < 0.03, "{what}: {}", reported.v_max_mps);
+        assert!(
+            reported.alerts.iter().any(|(_, text)| text.contains("sonar_1")),
+            "{what}: {:?}",
+            reported.alerts
+        );
     }
 }

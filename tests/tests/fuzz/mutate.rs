@@ -85,9 +85,9 @@ fn lengths(random: &mut Random, bytes: &mut [u8], at: usize) {
         .position(|field| (1..1 << 20).contains(&number(field)));
     let at = at + likely.unwrap_or(0);
     let Some(field) = bytes.get_mut(at..at + width) else { return };
-    let told = lie(random, number(field));
+    let wrong = lie(random, number(field));
     for (place, byte) in field.iter_mut().enumerate() {
         let shift = if big_endian { width - 1 - place } else { place };
-        *byte = told.to_le_bytes()[shift];
+        *byte = wrong.to_le_bytes()[shift];
     }
 }

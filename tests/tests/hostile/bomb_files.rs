@@ -180,13 +180,13 @@ fn oversized_files_are_refused_with_the_limit() {
     .unwrap();
     let mut wrong = Vec::new();
     println!("| file | bytes | code | MiB | s |");
-    for (name, content, arguments, told) in files() {
+    for (name, content, arguments, expected_text) in files() {
         folder.write("file", &content);
         let ran = run(&folder, arguments);
         println!("| {name} | {} | {:?} | {} | {:.2} |", content.len(), ran.code, ran.most_mib, ran.took_s);
-        let is_told = ran.stderr.contains(told);
+        let is_reported = ran.stderr.contains(expected_text);
         let refused = matches!(ran.code, Some(1..=3));
-        if !is_told || !refused || ran.most_mib >= MOST_MIB || ran.stderr.len() > 100_000 {
+        if !is_reported || !refused || ran.most_mib >= MOST_MIB || ran.stderr.len() > 100_000 {
             let start: String = ran.stderr.chars().take(400).collect();
             wrong.push(format!("{name}: {:?} {} MiB {start}", ran.code, ran.most_mib));
         }

@@ -10,7 +10,7 @@ pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
     /// Words that the report of a replay must contain. Alternatives are separated by `|`.
-    pub(crate) told: &'static str,
+    pub(crate) expected_text: &'static str,
 }
 
 const MIB: u64 = 1 << 20;
@@ -35,7 +35,7 @@ fn filled<'a>(head: &'a mut Vec<u8>, opcode: u8, front: &[u8], len: u64) -> [Par
 
 /// Logs with a bomb inside a compressed chunk.
 fn chunks() -> Vec<Bomb> {
-    let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
+    let bomb = |name, records: &[Vec<u8>], expected_text| Bomb { name, bytes: log(records), expected_text };
     let zeros = |len| packed_chunk(&[Part::Repeated(0, len)], (1, 2));
     let mut head = Vec::new();
     let topic_front = [&[9, 0, 0, 0][..], &u32::try_from(200 * MIB).unwrap().to_le_bytes()].concat();
@@ -108,7 +108,7 @@ fn chunks() -> Vec<Bomb> {
 
 /// Logs with a bomb in a record outside of chunks.
 fn headers() -> Vec<Bomb> {
-    let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
+    let bomb = |name, records: &[Vec<u8>], expected_text| Bomb { name, bytes: log(records), expected_text };
     let channels = |topic: &str, metadata: &[u8]| -> Vec<u8> {
         (2..=u16::MAX).flat_map(|id| channel(id, &format!("{topic}{id}"), metadata)).collect()
     };
@@ -200,7 +200,7 @@ fn pointers() -> Vec<Bomb> {
     let index_of_chunks =
         [&[0; 16][..], &8_u64.to_le_bytes(), &u64::MAX.to_le_bytes(), &u32::MAX.to_le_bytes(), &[0; 40]]
             .concat();
-    let bomb = |name, bytes, told| Bomb { name, bytes, told };
+    let bomb = |name, bytes, expected_text| Bomb { name, bytes, expected_text };
     let mut statistics = vec![0xFF; 42];
     statistics.extend([0xFF; 4]);
     let ticks: Vec<u8> =

@@ -19,7 +19,7 @@ fn log_bombs_take_little_memory_and_are_reported() {
     folder.write("vehicle.toml", VEHICLE);
     println!("| bomb | bytes | replay MiB | s | verify MiB | s | recover MiB | s |");
     let mut wrong = Vec::new();
-    for Bomb { name, bytes, told } in all() {
+    for Bomb { name, bytes, expected_text } in all() {
         folder.write("bomb.mcap", &bytes);
         let ran = [
             &["replay", "bomb.mcap", "--vehicle", "vehicle.toml"][..],
@@ -33,13 +33,14 @@ fn log_bombs_take_little_memory_and_are_reported() {
             wrong.push(format!("{name}: over {MOST_MIB} MiB"));
         }
         let [replayed, _, recovered] = ran;
-        if told.is_empty() {
+        if expected_text.is_empty() {
             continue;
         }
         for ran in [replayed, recovered] {
-            let is_told = told.split('|').any(|words| ran.stdout.contains(words));
+            let is_reported = expected_text.split('|').any(|words| ran.stdout.contains(words));
             // A replay ends with exit code 0 if the skipped records contain no packets of devices.
-            if (ran.code, is_told) != (Some(3), true) && !(told.contains("over 4096") && ran.code == Some(0))
+            if (ran.code, is_reported) != (Some(3), true)
+                && !(expected_text.contains("over 4096") && ran.code == Some(0))
             {
                 let start: String = ran.stdout.chars().take(400).collect();
                 wrong.push(format!("{name}: {:?} {start} {}", ran.code, ran.stderr));

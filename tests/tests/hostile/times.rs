@@ -37,10 +37,10 @@ fn all(folder: &Folder) -> Vec<Ran> {
 }
 
 fn losses(ran: &Ran) -> Vec<&str> {
-    let told = ran.stdout.lines().filter_map(|line| {
+    let lines = ran.stdout.lines().filter_map(|line| {
         line.split_once("LOST: ").or_else(|| line.split_once("lost     ")).map(|(_, loss)| loss)
     });
-    told.collect()
+    lines.collect()
 }
 
 #[test]
@@ -52,9 +52,9 @@ fn messages_with_impossible_times_are_skipped_and_reported() {
             let code = if arguments.contains(&"verify") { 1 } else { 3 };
             assert_eq!(ran.code, Some(code), "{arguments:?}: {} {}", ran.stdout, ran.stderr);
             if !arguments.contains(&"trim") {
-                let told =
+                let is_reported =
                     losses(&ran).iter().any(|loss| loss.contains(&format!("1 messages stamped {last} ns")));
-                assert!(told, "{arguments:?}: {}", ran.stdout);
+                assert!(is_reported, "{arguments:?}: {}", ran.stdout);
             }
         }
     }

@@ -298,7 +298,7 @@ fn rows_that_contradict_the_header_are_skipped_and_reported() {
     };
     let (code, messages, _) = import("1,0.0,3.0\n1.1,2.4,3.1,\n1.2,4.8,\n");
     assert_eq!((code, messages), (Some(0), 3));
-    for (rows, told, words) in [
+    for (rows, expected_messages, words) in [
         ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with more or fewer cells than the header"),
         ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4\n", 2, "rows with more or fewer cells than the header"),
         ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4.8,2", 2, "a last row without a line end: it may be cut short"),
@@ -309,7 +309,7 @@ fn rows_that_contradict_the_header_are_skipped_and_reported() {
         ),
     ] {
         let (code, messages, said) = import(rows);
-        assert_eq!((code, messages), (Some(3), told), "{rows}: {said}");
+        assert_eq!((code, messages), (Some(3), expected_messages), "{rows}: {said}");
         assert!(said.contains(words), "{said}");
     }
 }

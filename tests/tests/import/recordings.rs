@@ -146,7 +146,7 @@ fn up(
     at: MonoNs,
     force: Vec3<headrace_geometry::frames::Sensor>,
 ) -> f64 {
-    let before = attitudes.partition_point(|(told, _)| *told <= at).max(1) - 1;
+    let before = attitudes.partition_point(|(measured_at, _)| *measured_at <= at).max(1) - 1;
     let level = attitudes[before].1 * force;
     headrace_geometry::math::acos((level.z() / level.norm()).clamp(-1.0, 1.0)).to_degrees()
 }

@@ -132,13 +132,13 @@ fn json(dive: &Loop) -> Value {
 fn tick_boundaries_do_not_change_alerts_and_commands() {
     let scene = scenes::scene(SCENE);
     let packets = with_commands(&scene);
-    let (expected, told) = dive(&scene, &packets, 20);
+    let (expected, changes) = dive(&scene, &packets, 20);
     let report = json(&expected);
-    let kinds: Vec<&str> = told.iter().map(|(_, _, alert)| alert.kind.as_str()).collect();
+    let kinds: Vec<&str> = changes.iter().map(|(_, _, alert)| alert.kind.as_str()).collect();
     for kind in ["missed", "too_fast", "sensor_silent", "not_recorded", "battery_left"] {
         assert!(kinds.contains(&kind), "{kinds:?}");
     }
-    let done: Vec<AlertChange> = told.iter().map(|(_, change, _)| *change).collect();
+    let done: Vec<AlertChange> = changes.iter().map(|(_, change, _)| *change).collect();
     for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
@@ -146,7 +146,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
     let around = expected.view().surroundings();
     let asks = |alert: &&ListedAlert| !alert.advice(&around).is_empty();
     let (holding, over): (Vec<_>, Vec<_>) =
-        told.iter().map(|(.., alert)| alert).partition(|alert| alert.state == AlertState::Active);
+        changes.iter().map(|(.., alert)| alert).partition(|alert| alert.state == AlertState::Active);
     assert!(holding.iter().any(asks) && over.iter().all(|alert| !asks(alert)));
     assert_eq!(report["notes"].as_array().unwrap().len(), 3);
     assert_eq!(report["notes"][0]["text"], "start of the lining");
@@ -159,10 +159,10 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
     assert_eq!(expected.view().console_counts(), counts);
     assert_eq!(report["sources"].as_array().unwrap().len(), scene.vehicle.sensors.len());
     for tick_ms in [1, 333, 5000] {
-        let (other, also_told) = dive(&scene, &packets, tick_ms);
+        let (other, other_changes) = dive(&scene, &packets, tick_ms);
         assert_eq!(streams(&other), streams(&expected), "ticks of {tick_ms} ms");
         assert_eq!(json(&other), report, "ticks of {tick_ms} ms");
-        assert_eq!(also_told, told, "ticks of {tick_ms} ms");
+        assert_eq!(other_changes, changes, "ticks of {tick_ms} ms");
     }
 }
 
@@ -198,10 +198,10 @@ fn commands_change_no_result_except_alerts() {
 #[test]
 fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
     let scene = scenes::scene(SCENE);
-    let (dive, told) = dive(&scene, &sent(&scene), 20);
+    let (dive, changes) = dive(&scene, &sent(&scene), 20);
     let raised = |kind: ListKind| -> Vec<f64> {
         let raised =
-            told.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
+            changes.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
     // The second too-fast alert follows only after the way back, because any speed is allowed on the way back.
@@ -244,11 +244,11 @@ fn silence_of_all_sensors_raises_one_alert_in_time() {
         let at = last + DurNs::from_millis(500 * half);
         packets.push(Packet { source, at, bytes: Command::Time.to_json().into_bytes() });
     }
-    let (dive, told) = dive(&scene, &packets, 20);
-    let silent: Vec<_> = told.iter().filter(|(.., alert)| alert.kind == ListKind::NoData).collect();
+    let (dive, changes) = dive(&scene, &packets, 20);
+    let silent: Vec<_> = changes.iter().filter(|(.., alert)| alert.kind == ListKind::NoData).collect();
     let [(at, AlertChange::Raised, _)] = silent[..] else { panic!("{silent:?}") };
     assert!((2.0..=2.6).contains(&at.since(last).as_secs_f64()), "{:?}", at.since(last));
-    let of_one = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+    let of_one = changes.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
     assert_eq!(of_one, 0, "one situation, not one for each sensor");
     assert_eq!(dive.view().span().unwrap().1, last, "operator input counts as a sensor");
 }
@@ -390,7 +390,7 @@ fn withheld(dive: &Loop) -> Vec<(String, String)> {
 #[test]
 fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     let (scene, packets) = withheld_dive(make_late);
-    let (late, told) = dive(&scene, &packets, 20);
+    let (late, changes) = dive(&scene, &packets, 20);
     let sent =
         packets.iter().filter(|packet| scene.vehicle.sensor_configs[packet.source].id == "dvl").count();
     let [(text, action)] = &withheld(&late)[..] else { panic!("{:?}", withheld(&late)) };
@@ -403,7 +403,7 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     assert!((sent - 3..=sent).contains(&count), "{count} of {sent}");
     assert_eq!(action, "restart it");
     // Other alerts about a sensor would contradict this one.
-    let of_sensors = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+    let of_sensors = changes.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
     assert_eq!(of_sensors, 0);
     let state = late.view().live_state_json();
     let dvl = state.sensors.iter().find(|sensor| sensor.id == "dvl").unwrap();
@@ -415,8 +415,12 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     assert_eq!(of("dvl").unwrap(), format!("{sent} readings withheld: 15.0 s late, at most 2 s"));
     assert_eq!(of("imu"), None);
     for tick_ms in [1, 333, 5000] {
-        let (other, also_told) = dive(&scene, &packets, tick_ms);
-        assert_eq!((streams(&other), also_told), (streams(&late), told.clone()), "ticks of {tick_ms} ms");
+        let (other, other_changes) = dive(&scene, &packets, tick_ms);
+        assert_eq!(
+            (streams(&other), other_changes),
+            (streams(&late), changes.clone()),
+            "ticks of {tick_ms} ms"
+        );
     }
 }
 
@@ -437,9 +441,9 @@ fn velocity_log_that_becomes_late_during_the_dive_is_never_called_silent() {
                 make_late("dvl", &mut packet.bytes);
             }
         }
-        let (late, told) = dive(&scene, &packets, 20);
+        let (late, changes) = dive(&scene, &packets, 20);
         assert_eq!(withheld(&late).len(), 1, "one of {keep_one_of} reports");
-        let silent = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+        let silent = changes.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
         assert_eq!(silent, 0, "one of {keep_one_of} reports");
     }
 }
@@ -458,17 +462,21 @@ fn can_frames_without_a_known_id_are_alerted_although_no_sensor_has_a_reading() 
         bytes: Command::Time.to_json().into_bytes(),
     }));
     packets.sort_by_key(|packet| (packet.at, packet.source));
-    let (foreign, told) = dive(&scene, &packets, 20);
+    let (foreign, changes) = dive(&scene, &packets, 20);
     let [(text, action)] = &withheld(&foreign)[..] else { panic!("{:?}", withheld(&foreign)) };
     assert!(
         text.starts_with("imu: ") && text.ends_with(" packets without a message of this device"),
         "{text}"
     );
     assert_eq!(action, "check its plugin, connection and ids in the vehicle file");
-    let (at, ..) = told.iter().find(|(.., alert)| alert.kind == ListKind::SensorWithheld).unwrap();
+    let (at, ..) = changes.iter().find(|(.., alert)| alert.kind == ListKind::SensorWithheld).unwrap();
     assert!((2.0..4.0).contains(&at.since(from).as_secs_f64()), "{:?}", at.since(from));
     for tick_ms in [1, 333] {
-        let (other, also_told) = dive(&scene, &packets, tick_ms);
-        assert_eq!((streams(&other), also_told), (streams(&foreign), told.clone()), "ticks of {tick_ms} ms");
+        let (other, other_changes) = dive(&scene, &packets, tick_ms);
+        assert_eq!(
+            (streams(&other), other_changes),
+            (streams(&foreign), changes.clone()),
+            "ticks of {tick_ms} ms"
+        );
     }
 }

@@ -64,8 +64,11 @@ fn single_failed_sync_is_reported_and_loses_nothing() {
     let digest = folder.digest("dive.mcap", &[]);
     let fault = ["-e", "trace=fdatasync", "-e", "inject=fdatasync:error=EIO:when=2"];
     let (code, report) = with_fault(&folder, &fault, &["log.mcap"]);
-    let told = losses(&report);
-    assert!(code == Some(3) && told.contains("Input/output error") && told.contains("no message"), "{told}");
+    let losses_text = losses(&report);
+    assert!(
+        code == Some(3) && losses_text.contains("Input/output error") && losses_text.contains("no message"),
+        "{losses_text}"
+    );
     assert!(folder.path("log.part002.mcap").exists());
     all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
     // Both parts of the recording replay under the recording's name and give the same dive as the original log.
@@ -88,10 +91,21 @@ fn failed_recording_is_reported_live_and_until_the_end() {
     let lines = String::from_utf8(output.stdout).unwrap();
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).collect::<Vec<_>>();
-    let told = of("recording");
-    assert_eq!(told.iter().map(|line| line["fails"].as_bool().unwrap()).collect::<Vec<_>>(), [true, false]);
-    assert!(told[0]["text"].as_str().unwrap().contains("Input/output error"), "{}", told[0]);
-    assert!(told[1]["text"].as_str().unwrap().contains("no message is missing"), "{}", told[1]);
+    let recording_lines = of("recording");
+    assert_eq!(
+        recording_lines.iter().map(|line| line["fails"].as_bool().unwrap()).collect::<Vec<_>>(),
+        [true, false]
+    );
+    assert!(
+        recording_lines[0]["text"].as_str().unwrap().contains("Input/output error"),
+        "{}",
+        recording_lines[0]
+    );
+    assert!(
+        recording_lines[1]["text"].as_str().unwrap().contains("no message is missing"),
+        "{}",
+        recording_lines[1]
+    );
     let states = of("state");
     let (first, last) = (states[0], states[states.len() - 1]);
     assert_eq!((&first["recording_fails"], &last["recording_fails"]), (&Value::Null, &Value::Bool(false)));
@@ -129,10 +143,10 @@ fn failure_of_one_recording_does_not_affect_the_other() {
     let fault = ["-P", stick, "-e", "trace=fdatasync", "-e", "inject=fdatasync:error=EIO:when=2+"];
     for (records, other) in [(["log.mcap", stick], "log.mcap"), ([stick, "second.mcap"], "second.mcap")] {
         let (code, report) = with_fault(&folder, &fault, &records);
-        let told = losses(&report);
-        assert!(code == Some(3) && told.contains("stick.mcap: recording failed"), "{told}");
+        let losses_text = losses(&report);
+        assert!(code == Some(3) && losses_text.contains("stick.mcap: recording failed"), "{losses_text}");
         assert_eq!(folder.digest(other, &[]), digest, "nothing is missing there");
-        assert!(!told.contains(&format!("{other}:")), "{told}");
+        assert!(!losses_text.contains(&format!("{other}:")), "{losses_text}");
         for file in ["stick.mcap", "stick.part002.mcap"] {
             std::fs::remove_file(folder.path(file)).unwrap();
         }
@@ -321,13 +335,21 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         assert_eq!(output.status.code(), Some(3), "{words}");
         let lines = String::from_utf8(output.stdout).unwrap();
         let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-        let told: Vec<_> = lines.iter().filter(|line| line["type"] == "recording").collect();
+        let recording_lines: Vec<_> = lines.iter().filter(|line| line["type"] == "recording").collect();
         assert_eq!(
-            told.iter().map(|line| line["fails"].as_bool().unwrap()).collect::<Vec<_>>(),
+            recording_lines.iter().map(|line| line["fails"].as_bool().unwrap()).collect::<Vec<_>>(),
             [true, false]
         );
-        assert!(told[0]["text"].as_str().unwrap().contains(words), "{words}: {}", told[0]);
-        assert!(told[1]["text"].as_str().unwrap().contains("messages are missing"), "{}", told[1]);
+        assert!(
+            recording_lines[0]["text"].as_str().unwrap().contains(words),
+            "{words}: {}",
+            recording_lines[0]
+        );
+        assert!(
+            recording_lines[1]["text"].as_str().unwrap().contains("messages are missing"),
+            "{}",
+            recording_lines[1]
+        );
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(report["digest"], digest.as_str());
         assert!(losses(&report).contains(words), "{words}: {}", losses(&report));

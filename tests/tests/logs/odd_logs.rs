@@ -14,7 +14,7 @@ fn replay(folder: &Folder, log: &str) -> Answer {
 }
 
 /// Lines of a replay's output with losses ("LOST") and notes about the log.
-fn told(answer: &Answer) -> String {
+fn loss_lines(answer: &Answer) -> String {
     let odd = answer.stdout.lines().filter(|line| line.contains("LOST") || line.contains("note"));
     odd.fold(String::new(), |all, line| all + line.trim() + "\n")
 }
@@ -32,7 +32,7 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     write_log(&folder.path("mixed.mcap"), WriteOptions::new(), None, &messages);
     let answer = replay(&folder, "mixed.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years after those of most messages"#);
+    insta::assert_snapshot!(loss_lines(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years after those of most messages"#);
 
     // The result is the same if the messages with times of the other clock come first, because the majority decides.
     for message in &mut messages {
@@ -44,7 +44,7 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     write_log(&folder.path("mixed.mcap"), WriteOptions::new(), None, &messages);
     let answer = replay(&folder, "mixed.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years before those of most messages"#);
+    insta::assert_snapshot!(loss_lines(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years before those of most messages"#);
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn topic_on_two_channels_is_reported() {
     write_log(&folder.path("doubled.mcap"), WriteOptions::new(), None, &messages);
     let answer = replay(&folder, "doubled.mcap");
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @r#"note: channels 1, 101 are all called "/raw/sonar_0": read as one"#);
+    insta::assert_snapshot!(loss_lines(&answer), @r#"note: channels 1, 101 are all called "/raw/sonar_0": read as one"#);
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn messages_too_late_to_be_ordered_are_counted() {
     folder.write("lying.mcap", bytes);
     let answer = replay(&folder, "lying.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @"LOST: 419 messages too far out of order to be sorted, delivered in file order");
+    insta::assert_snapshot!(loss_lines(&answer), @"LOST: 419 messages too far out of order to be sorted, delivered in file order");
 }
 
 #[test]

@@ -283,8 +283,8 @@ fn damage_seen_before_seeking_back_is_reported_at_the_end() {
         "pause\nseek 19s\nseek 1s\ngo\n",
     ] {
         // Only the number of losses is compared, because their times may be known more exactly at the end of the log.
-        let (code, told) = losses(lines);
-        assert_eq!((code, told.as_array().unwrap().len()), (Some(3), 3), "{lines}: {told}");
+        let (code, listed) = losses(lines);
+        assert_eq!((code, listed.as_array().unwrap().len()), (Some(3), 3), "{lines}: {listed}");
     }
 }
 

@@ -30,10 +30,10 @@ fn damaged_log_and_its_recovery_have_the_same_digest() {
     for (name, bytes) in [("cut", &whole[..whole.len() * 2 / 3]), ("spotted", &spotted)] {
         let (log, fixed) = (format!("{name}.mcap"), format!("{name}-fixed.mcap"));
         folder.write(&log, bytes);
-        let (code, told) = recover(&folder, &log, &fixed);
-        assert_eq!(code, Some(3), "{told}");
-        let loss = &told["losses"][0];
-        assert!(loss["from_ns"].is_u64() && loss["what"].as_str().unwrap().contains("after "), "{told}");
+        let (code, report) = recover(&folder, &log, &fixed);
+        assert_eq!(code, Some(3), "{report}");
+        let loss = &report["losses"][0];
+        assert!(loss["from_ns"].is_u64() && loss["what"].as_str().unwrap().contains("after "), "{report}");
         let ((before, damaged), (after, recovered)) = (folder.replay(&log, &[]), folder.replay(&fixed, &[]));
         assert_eq!((before, after), (Some(3), Some(3)), "{name}: the loss is still reported");
         assert_eq!(recovered["digest"], damaged["digest"], "{name}");
@@ -44,16 +44,16 @@ fn damaged_log_and_its_recovery_have_the_same_digest() {
     }
     // The recovered log also keeps the results that were published live.
     let answer = folder.headrace(&["verify", "cut-fixed.mcap", "--json"]);
-    let told: Value = serde_json::from_str(&answer.stdout).unwrap();
-    assert_eq!(answer.code, Some(3), "{told}");
-    assert!(told["same_records"].as_u64().unwrap() > 100 && told["differences"][0].is_null(), "{told}");
+    let report: Value = serde_json::from_str(&answer.stdout).unwrap();
+    assert_eq!(answer.code, Some(3), "{report}");
+    assert!(report["same_records"].as_u64().unwrap() > 100 && report["differences"][0].is_null(), "{report}");
 }
 
 #[test]
 fn recover_overwrites_nothing_and_leaves_no_file_for_a_non_log() {
     let (folder, _) = recorded();
-    let (code, told) = recover(&folder, "live.mcap", "fixed.mcap");
-    assert_eq!((code, &told["losses"]), (Some(0), &Value::Array(Vec::new())), "{told}");
+    let (code, report) = recover(&folder, "live.mcap", "fixed.mcap");
+    assert_eq!((code, &report["losses"]), (Some(0), &Value::Array(Vec::new())), "{report}");
     assert_eq!(folder.digest("fixed.mcap", &[]), folder.digest("live.mcap", &[]));
     for (output, why) in [("dive.mcap", "exists"), ("live.mcap", "is read by this command")] {
         let answer = folder.headrace(&["recover", "live.mcap", "-o", output]);

@@ -141,17 +141,17 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
         dive.wait().unwrap();
         parts += std::fs::read_dir(folder.path(&name)).unwrap().count();
         let answer = folder.headrace(&["verify", "--json", &name]);
-        let Ok(told) = serde_json::from_str::<Value>(&answer.stdout) else {
+        let Ok(report) = serde_json::from_str::<Value>(&answer.stdout) else {
             let early = ["holds no log", "is not an MCAP file", "no vehicle file can be read"];
             assert!(early.iter().any(|words| answer.stderr.contains(words)), "{name}: {}", answer.stderr);
             continue;
         };
-        assert_eq!(told["differences"], Value::Array(Vec::new()), "{name}: {told}");
-        let lost = told["losses"].as_array().unwrap();
+        assert_eq!(report["differences"], Value::Array(Vec::new()), "{name}: {report}");
+        let lost = report["losses"].as_array().unwrap();
         // After a kill, only the log part that was being written and a part that had just begun may have lost data.
-        assert!(lost.len() <= 2, "{name}: {told}");
-        assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {told}");
-        same += told["same_records"].as_u64().unwrap();
+        assert!(lost.len() <= 2, "{name}: {report}");
+        assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {report}");
+        same += report["same_records"].as_u64().unwrap();
         assert!(Path::new(&folder.path(&name)).exists());
     }
     println!("{KILLS} kills, {parts} parts, {same} results the same");

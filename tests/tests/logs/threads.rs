@@ -99,9 +99,9 @@ fn of_tick(dive: &Loop) -> u64 {
     }
     let heard = (dive.view().readings(), dive.view().health(), dive.view().vehicle(), dive.view().tally());
     let alerts: Vec<_> = dive.view().alert_list().iter().collect();
-    let told = (dive.view().notices().collect::<Vec<_>>(), dive.view().live_state(), alerts);
+    let results = (dive.view().notices().collect::<Vec<_>>(), dive.view().live_state(), alerts);
     let console = dive.view().console_counts();
-    (dive.ticks(), dive.now().0, format!("{heard:?} {told:?} {console:?}")).hash(&mut hasher);
+    (dive.ticks(), dive.now().0, format!("{heard:?} {results:?} {console:?}")).hash(&mut hasher);
     hasher.finish()
 }
 

@@ -51,10 +51,10 @@ fn trim_without_a_cut_keeps_the_dive_and_its_results() {
     for (name, further) in
         [("copy.mcap", &[][..]), ("echoless.mcap", &["--drop-echoes"]), ("public.mcap", &["--anonymise"])]
     {
-        let told = trim(&folder, name, further);
+        let report = trim(&folder, name, further);
         // Alerts contain people's names, so an anonymous log leaves them out.
-        let leaves_out = told["results_left_out"].as_u64().unwrap() > 0;
-        assert_eq!((told["cut"].as_u64(), leaves_out), (Some(0), name == "public.mcap"), "{told}");
+        let leaves_out = report["results_left_out"].as_u64().unwrap() > 0;
+        assert_eq!((report["cut"].as_u64(), leaves_out), (Some(0), name == "public.mcap"), "{report}");
         assert_eq!(folder.digest(name, &[]), digest, "{name}");
         let answer = folder.headrace(&["verify", name]);
         assert_eq!(answer.code, Some(0), "{name}: {}", answer.stdout);
@@ -72,10 +72,10 @@ fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
     for (name, further) in
         [("time.mcap", &["--from", "20s", "--to", "1.75min"][..]), ("place.mcap", &["--chainage", "7..24"])]
     {
-        let told = trim(&folder, name, further);
-        assert!(told["cut"].as_u64().unwrap() > 100, "{told}");
-        assert!(told["results_left_out"].as_u64().unwrap() > 10, "{told}");
-        assert_eq!(told["spans"].as_array().unwrap().len(), 1, "{told}");
+        let report = trim(&folder, name, further);
+        assert!(report["cut"].as_u64().unwrap() > 100, "{report}");
+        assert!(report["results_left_out"].as_u64().unwrap() > 10, "{report}");
+        assert_eq!(report["spans"].as_array().unwrap().len(), 1, "{report}");
         let (code, report) = folder.replay(name, &[]);
         let losses = report["log"]["losses"].to_string();
         assert_eq!(code, Some(3), "{name}: {losses}");
@@ -119,10 +119,10 @@ fn trim_removes_echoes_and_keeps_ranges() {
     }
     write_log(&folder.path("live.mcap"), WriteOptions::new().compression(None), Some(VEHICLE), &messages);
     let digest = folder.digest("live.mcap", &[]);
-    let told = trim(&folder, "echoless.mcap", &["--drop-echoes"]);
-    assert!(told["changed"].as_u64().unwrap() > 1000, "{told}");
-    let bytes = |key: &str| told[key].as_u64().unwrap();
-    assert!(bytes("sensor_bytes") * 2 < bytes("sensor_bytes_before"), "{told}");
+    let report = trim(&folder, "echoless.mcap", &["--drop-echoes"]);
+    assert!(report["changed"].as_u64().unwrap() > 1000, "{report}");
+    let bytes = |key: &str| report[key].as_u64().unwrap();
+    assert!(bytes("sensor_bytes") * 2 < bytes("sensor_bytes_before"), "{report}");
     assert_eq!(folder.digest("echoless.mcap", &[]), digest);
     assert!(folder.read("echoless.mcap").len() * 2 < folder.read("live.mcap").len());
 }
@@ -138,7 +138,7 @@ fn anonymous_log_has_no_name_address_comment_or_time_of_day() {
     folder.write("scene.toml", headrace_tests::SCENE);
     folder.simulate("scene.toml", "plain.mcap");
     folder.record("plain.mcap", "live.mcap", &[]);
-    let told = trim(&folder, "public.mcap", &["--anonymise"]);
+    let report = trim(&folder, "public.mcap", &["--anonymise"]);
     // Attachments and metadata aren't compressed, so their text is searched in the file's bytes. Messages are searched
     // after decompression.
     let answer = folder.headrace(&["recover", "public.mcap", "-o", "again.mcap"]);
@@ -152,7 +152,7 @@ fn anonymous_log_has_no_name_address_comment_or_time_of_day() {
     }
     assert!(text.contains("file1.csv") && text.contains("192.0.2."));
     assert_eq!(folder.digest("public.mcap", &[]), folder.digest("live.mcap", &[]));
-    let left = told["done"].to_string();
+    let left = report["done"].to_string();
     assert!(
         left.contains("the sensors' ids (sonar_0") && left.contains("content of the attached files"),
         "{left}"
@@ -173,9 +173,9 @@ fn times_outside_the_dive_are_refused_without_changing_files() {
         for (from, output) in [("20min", "part.mcap"), ("99h", "new.mcap")] {
             let answer = folder.headrace(&["trim", log, "-o", output, "--from", from]);
             assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{}", answer.stderr);
-            let (_, told) = answer.stderr.split_once("the log spans 0 s to ").unwrap();
-            let told_s: f64 = told.split_whitespace().next().unwrap().parse().unwrap();
-            assert!((told_s - span_s).abs() < 1.0, "{span_s}: {}", answer.stderr);
+            let (_, report) = answer.stderr.split_once("the log spans 0 s to ").unwrap();
+            let stated_s: f64 = report.split_whitespace().next().unwrap().parse().unwrap();
+            assert!((stated_s - span_s).abs() < 1.0, "{span_s}: {}", answer.stderr);
         }
     }
     assert!(folder.read("part.mcap") == before && !folder.path("new.mcap").exists());

@@ -22,11 +22,11 @@ fn verified(folder: &Folder, further: &[&str]) -> (Option<i32>, Value) {
 fn verify_passes_at_any_tick_length() {
     let folder = recorded();
     for tick in ["1", "20", "5000"] {
-        let (code, told) = verified(&folder, &["live.mcap", "--tick-ms", tick]);
-        assert_eq!(code, Some(0), "{told}");
-        assert!(told["same_records"].as_u64().unwrap() > 1000, "{told}");
+        let (code, report) = verified(&folder, &["live.mcap", "--tick-ms", tick]);
+        assert_eq!(code, Some(0), "{report}");
+        assert!(report["same_records"].as_u64().unwrap() > 1000, "{report}");
         assert_eq!(
-            (&told["unrecorded_records"], &told["differences"]),
+            (&report["unrecorded_records"], &report["differences"]),
             (&0.into(), &Value::Array(Vec::new()))
         );
     }
@@ -39,9 +39,9 @@ fn verify_reports_a_tiny_mount_change_with_tick_sensor_field_and_bits() {
     // sensor.
     let other = VEHICLE.replacen("mode = \"fastest\"", "mode = \"fastest\"\nangles_deg = [0, 0, 1e-13]", 1);
     folder.write("other.toml", other);
-    let (code, told) = verified(&folder, &["live.mcap", "--vehicle", "other.toml"]);
-    assert_eq!(code, Some(4), "{told}");
-    let first = &told["differences"][0];
+    let (code, report) = verified(&folder, &["live.mcap", "--vehicle", "other.toml"]);
+    assert_eq!(code, Some(4), "{report}");
+    let first = &report["differences"][0];
     assert_eq!((&first["stream"], &first["source"]), (&"pings".into(), &"sonar_0".into()), "{first}");
     let bits = |key: &str| u64::from_str_radix(first[key].as_str().unwrap(), 16).unwrap();
     let (live, replayed) = (bits("live_bits"), bits("replayed_bits"));
@@ -55,9 +55,9 @@ fn truncated_log_is_verified_up_to_its_end() {
     let folder = recorded();
     let whole = folder.read("live.mcap");
     folder.write("cut.mcap", &whole[..whole.len() / 2]);
-    let (code, told) = verified(&folder, &["cut.mcap"]);
-    assert_eq!(code, Some(3), "{told}");
-    assert!(told["same_records"].as_u64().unwrap() > 100 && told["differences"][0].is_null(), "{told}");
+    let (code, report) = verified(&folder, &["cut.mcap"]);
+    assert_eq!(code, Some(3), "{report}");
+    assert!(report["same_records"].as_u64().unwrap() > 100 && report["differences"][0].is_null(), "{report}");
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
 }
 
 /// The shipped vehicle file `name`, with the gyro and accelerometer biases of an inertial unit with high noise.
-fn told(name: &str) -> Result<Vec<u8>, String> {
+fn file_bytes(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
     let unit = "[navigation]\ngyro_bias_degps = 0.2\ngyro_bias_time_s = 300\naccel_bias_mps2 = 0.02";
     Ok(file.replace("[navigation]", unit).into_bytes())
@@ -75,7 +75,7 @@ fn hole_errors_of_separately_mounted_heads_are_within_reported_bounds() {
              magnetic_disturbance = {{ per_100m = 4, up_to_deg = 10, length_m = 6 }}\n\
              depth_steps = {{ quantum_m = 0.031 }}\nrange_noise = {{ sd_m = 0.01 }}\ntether_slack = {{ {slack} }}\n"
         );
-        let scene = scenes::seeded(&text, &told, Some(seed));
+        let scene = scenes::seeded(&text, &file_bytes, Some(seed));
         let ours = dive(&scene, filter(&scene), Silence::default());
         let errors = hole_errors(&ours, &tracking::true_dive(&scene));
         // Sections at the ends of the dive are left out, because they have no neighbours on one side.

@@ -63,8 +63,8 @@ fn client_without_a_token_gets_nothing_of_the_dive() {
     assert_eq!(operator.hello["may"]["playback"], true);
     operator.send(&json!({"do": "play", "command": "end"}));
     operator.until_type("end");
-    let (_, told) = serving.end();
-    assert!(!told.contains("0123456789"), "tokens are never printed: {told}");
+    let (_, printed) = serving.end();
+    assert!(!printed.contains("0123456789"), "tokens are never printed: {printed}");
 }
 
 #[test]
@@ -113,6 +113,6 @@ fn invalid_messages_are_refused_and_the_page_goes_on() {
     viewer.until_begun();
     viewer.send(&json!({"do": "play", "command": "end"}));
     viewer.until_type("end");
-    let (code, told) = serving.end();
-    assert!(matches!(code, Some(0 | 1)), "{code:?}: {told}");
+    let (code, printed) = serving.end();
+    assert!(matches!(code, Some(0 | 1)), "{code:?}: {printed}");
 }

@@ -29,8 +29,8 @@ fn span_s(viewer: &Viewer) -> [f64; 2] {
 fn end(serving: Serving, viewer: &mut Viewer) -> Value {
     viewer.send(&json!({"do": "play", "command": "end"}));
     let end = viewer.until_type("end");
-    let (code, told) = serving.end();
-    assert_eq!(json!(code), end["exit"], "{told}");
+    let (code, printed) = serving.end();
+    assert_eq!(json!(code), end["exit"], "{printed}");
     end
 }
 
@@ -96,7 +96,8 @@ fn viewer_state_at_the_end_equals_the_report() {
 fn seen(viewer: &Viewer) -> Value {
     let state = &viewer.state;
     let verdicts: Vec<_> = viewer.sections.iter().map(|(index, section)| (index, section.verdict)).collect();
-    let back = viewer.others.iter().rfind(|told| told["type"] == "back").map(|back| back["legs"].clone());
+    let back =
+        viewer.others.iter().rfind(|message| message["type"] == "back").map(|back| back["legs"].clone());
     json!({"now_s": state["now_s"], "metres": state["metres"], "outstanding": state["outstanding"],
         "sections": verdicts, "legs": back.unwrap_or_else(|| json!([]))})
 }

@@ -146,7 +146,7 @@ fn unusable_certificate_files_are_reported_and_the_dive_goes_on() {
     folder.write("garbage.pem", "-----BEGIN CERTIFICATE-----\nnot base64!\n-----END CERTIFICATE-----\n");
     folder.write("empty.pem", "");
     let (certificate, key, other) = (text("server.cert.pem"), text("server.key.pem"), text("other.key.pem"));
-    for (pair, told) in [
+    for (pair, expected_texts) in [
         (["none.pem", &key], vec!["the page's certificate none.pem can't be used"]),
         (["empty.pem", &key], vec!["the page's certificate empty.pem can't be used", "no certificate"]),
         (["garbage.pem", &key], vec!["the page's certificate garbage.pem can't be used"]),
@@ -159,7 +159,7 @@ fn unusable_certificate_files_are_reported_and_the_dive_goes_on() {
         let answer =
             folder.headrace(&["replay", "dive.mcap", ANY, "--page-cert", page_cert, "--page-key", page_key]);
         assert_eq!(answer.code, folder.headrace(&["replay", "dive.mcap"]).code, "{pair:?}");
-        for words in told.into_iter().chain(["; the dive goes on without the page"]) {
+        for words in expected_texts.into_iter().chain(["; the dive goes on without the page"]) {
             assert!(answer.stderr.contains(words), "{pair:?}: {words:?} isn't in {}", answer.stderr);
         }
         assert!(answer.stdout.contains(" samples, target "), "{}", answer.stdout);

@@ -22,8 +22,8 @@ fn stalled_and_flooding_viewers_do_not_change_results() {
     while flooding.send_raw(Message::Text("x".repeat(4000).into())).is_ok() {}
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
     let end = viewer.until_type("end");
-    let (code, told) = serving.end();
-    assert_eq!(code, bare.code, "{told}");
+    let (code, printed) = serving.end();
+    assert_eq!(code, bare.code, "{printed}");
     let digest = |name: &str| serde_json::from_slice::<Value>(&folder.read(name)).unwrap()["digest"].clone();
     assert_eq!(digest("bare/report.json"), digest("watched/report.json"));
     assert_eq!(end["digest"], digest("bare/report.json"));

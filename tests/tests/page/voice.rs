@@ -43,8 +43,8 @@ fn upload(serving: &Serving, id: u32, headers: &[&str], audio: &[u8]) -> (u16, S
 
 /// The note with this voice id in the viewer's list.
 fn note(viewer: &Viewer, id: u32) -> Option<&Value> {
-    let told = viewer.others.iter().rev().filter(|other| other["type"] == "note");
-    told.chain(&viewer.notes).find(|note| note["voice"]["id"] == id)
+    let notes = viewer.others.iter().rev().filter(|other| other["type"] == "note");
+    notes.chain(&viewer.notes).find(|note| note["voice"]["id"] == id)
 }
 
 fn interrupt(serving: Serving, viewer: &mut Viewer) -> Value {
@@ -196,11 +196,11 @@ fn notes_command_writes_voice_files_and_overwrites_nothing() {
     assert_eq!(folder.read("voices/note-2.webm"), b"mine");
     let forced = folder.headrace(&["notes", LOG, "--out", "voices", "--force", "--json"]);
     assert_eq!(folder.read("voices/note-2.webm"), audio);
-    let told: Value = serde_json::from_str(&forced.stdout).unwrap();
+    let report: Value = serde_json::from_str(&forced.stdout).unwrap();
     let recording =
         json!({"seconds": 12, "media_type": "audio/webm", "bytes": 40_000, "file": "voices/note-2.webm"});
-    assert_eq!(told["notes"][1]["recording"], recording);
-    assert_eq!((&told["notes"][2]["recording"], &told["lost"]), (&Value::Null, &json!([])));
+    assert_eq!(report["notes"][1]["recording"], recording);
+    assert_eq!((&report["notes"][2]["recording"], &report["lost"]), (&Value::Null, &json!([])));
     without_voices(&folder, LOG, "silent.mcap");
     let silent = folder.headrace(&["notes", "silent.mcap"]);
     assert_eq!(silent.code, Some(3));

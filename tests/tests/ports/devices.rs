@@ -166,10 +166,13 @@ fn devices_command_lists_ports_and_probes_addresses() {
     }
     let (head, ping) = (Device::emulated(Carrier::Tcp, HEAD), Device::emulated(Carrier::Udp, PING));
     let addresses = [head.connect.to_string(), ping.connect.to_string()];
-    let (code, told, _) = headrace(&["--address", &addresses[0], "--address", &addresses[1]]);
+    let (code, printed, _) = headrace(&["--address", &addresses[0], "--address", &addresses[1]]);
     assert_eq!(code, Some(0));
-    assert!(told.contains(&format!("  {}\n    answers     Imagenex 881 family", addresses[0])), "{told}");
-    assert!(told.contains(&format!("  {}\n    answers     Ping echosounder", addresses[1])), "{told}");
+    assert!(
+        printed.contains(&format!("  {}\n    answers     Imagenex 881 family", addresses[0])),
+        "{printed}"
+    );
+    assert!(printed.contains(&format!("  {}\n    answers     Ping echosounder", addresses[1])), "{printed}");
     let (code, json, _) = headrace(&["--json", "--address", &addresses[0]]);
     let shown: Value = serde_json::from_str(&json).unwrap();
     assert_eq!((code, &shown["addresses"][0]["connect"]), (Some(0), &Value::from(addresses[0].as_str())));
@@ -189,22 +192,25 @@ fn vehicle_file_is_compared_with_the_devices_found() {
     let path = file.to_str().unwrap();
 
     std::fs::write(&file, vehicle_text(&there)).unwrap();
-    let (code, told, _) = headrace(&["--vehicle", path]);
-    assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains(": present, /dev/pts/") && told.contains("not probed (--probe)"), "{told}");
-    let (code, told, _) = headrace(&["--vehicle", path, "--probe"]);
-    assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains("Imagenex 881 family or 852 sounder, head_id = 0x12"), "{told}");
+    let (code, printed, _) = headrace(&["--vehicle", path]);
+    assert_eq!(code, Some(0), "{printed}");
+    assert!(
+        printed.contains(": present, /dev/pts/") && printed.contains("not probed (--probe)"),
+        "{printed}"
+    );
+    let (code, printed, _) = headrace(&["--vehicle", path, "--probe"]);
+    assert_eq!(code, Some(0), "{printed}");
+    assert!(printed.contains("Imagenex 881 family or 852 sounder, head_id = 0x12"), "{printed}");
 
     let missing = (PING, "serial:usb:0403:6015:NOT-HERE".to_owned());
     let wrong = (HEAD, "can:can0".to_owned());
     std::fs::write(&file, vehicle_text(&[there[0].clone(), missing, wrong])).unwrap();
-    let (code, told, _) = headrace(&["--vehicle", path]);
+    let (code, printed, _) = headrace(&["--vehicle", path]);
     std::fs::remove_dir_all(&folder).unwrap();
-    assert_eq!(code, Some(1), "{told}");
+    assert_eq!(code, Some(1), "{printed}");
     assert!(
-        told.contains("no such device is plugged in")
-            && told.contains("a device of this kind cannot use can:"),
-        "{told}"
+        printed.contains("no such device is plugged in")
+            && printed.contains("a device of this kind cannot use can:"),
+        "{printed}"
     );
 }

@@ -27,8 +27,9 @@ fn header(system_id: u32) -> MavHeader {
 
 fn pressure(system_id: u32, absolute_hpa: f32) -> Vec<u8> {
     let message = PressureMessage::Second;
-    let told = Message::Pressure(Pressure { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 });
-    told.to_frame(header(system_id)).raw_bytes().to_vec()
+    let pressure =
+        Message::Pressure(Pressure { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 });
+    pressure.to_frame(header(system_id)).raw_bytes().to_vec()
 }
 
 fn heartbeat(system_id: u32) -> Vec<u8> {
@@ -74,12 +75,12 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
         });
         scope.spawn(|| {
             until_end(&|| {
-                let told = if known.load(Ordering::Relaxed) {
+                let bytes = if known.load(Ordering::Relaxed) {
                     [heartbeat(1), pressure(1, FALSE_HPA)].concat()
                 } else {
                     pressure(9, FALSE_HPA)
                 };
-                stranger.send_to(&told, place).unwrap_or_default();
+                stranger.send_to(&bytes, place).unwrap_or_default();
                 stranger.send_to(b"x", place).unwrap_or_default();
                 assert!(stranger.recv(&mut [0; 300]).is_err(), "the host has sent to the foreign sender");
             });

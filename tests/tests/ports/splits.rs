@@ -56,7 +56,7 @@ fn device(text: &str) -> Box<dyn Device> {
     vehicle.unwrap().sensors.remove(0)
 }
 
-fn told<M: Measurement>(device: &mut dyn Emulator<M>, mut feel: impl FnMut(&mut M)) -> Vec<Vec<u8>> {
+fn packets_of<M: Measurement>(device: &mut dyn Emulator<M>, mut feel: impl FnMut(&mut M)) -> Vec<Vec<u8>> {
     let (mut due, mut frames, mut until) = (Vec::new(), Vec::new(), START);
     while frames.len() < FRAMES {
         until = until + DurNs::from_millis(10);
@@ -84,18 +84,18 @@ fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     let mut some = |least: f64, most: f64| least + (most - least) * (random.below(1000) as f64) / 1000.0;
     match device.emulator(&setup) {
         Emulated::Head(mut d) | Emulated::Echosounder(mut d) => {
-            told(d.as_mut(), |sounding| sounding.range_m = Some(some(0.5, 4.5)))
+            packets_of(d.as_mut(), |sounding| sounding.range_m = Some(some(0.5, 4.5)))
         }
-        Emulated::Depth(mut d) => told(d.as_mut(), |felt| felt.pressure_pa = some(1.0e5, 2.0e5)),
-        Emulated::Inertial(mut d) => told(d.as_mut(), |felt| {
+        Emulated::Depth(mut d) => packets_of(d.as_mut(), |felt| felt.pressure_pa = some(1.0e5, 2.0e5)),
+        Emulated::Inertial(mut d) => packets_of(d.as_mut(), |felt| {
             felt.rate_radps = Vec3::new(some(-0.1, 0.1), some(-0.1, 0.1), some(-0.1, 0.1));
         }),
-        Emulated::VelocityLog(mut d) => told(d.as_mut(), |felt| {
+        Emulated::VelocityLog(mut d) => packets_of(d.as_mut(), |felt| {
             felt.velocity_mps = Vec3::new(some(0.0, 0.2), some(-0.1, 0.1), some(-0.1, 0.1));
         }),
         Emulated::Tether(mut d) => {
             let mut chainage_m = 0.0;
-            told(d.as_mut(), |payout| {
+            packets_of(d.as_mut(), |payout| {
                 chainage_m += some(0.0, 0.01);
                 payout.chainage_m = chainage_m;
             })

@@ -78,9 +78,9 @@ fn rays(case: &mut Case) -> Result<(), String> {
         let wall = profile.point_at(hit.arc_m);
         let by_arc_m = math::hypot(wall[0] - hit.point[0], wall[1] - hit.point[1]);
         let along_m = hit.range_m * math::hypot(ray[0], ray[1]);
-        let told = [hit.range_m, hit.arc_m, hit.normal[0], hit.normal[1]];
+        let numbers = [hit.range_m, hit.arc_m, hit.normal[0], hit.normal[1]];
         let inwards = hit.normal[0] * ray[0] + hit.normal[1] * ray[1] < 1e-9;
-        if !(told.iter().all(|number| number.is_finite())
+        if !(numbers.iter().all(|number| number.is_finite())
             && inwards
             && (0.0..profile.perimeter_m()).contains(&hit.arc_m))
         {

@@ -29,7 +29,7 @@ fn off(got: f64, expected: f64) -> f64 {
 fn equations(case: &mut Case) -> Result<(), String> {
     let (a, b, c) = (any(case), any(case), any(case));
     let m = case.count_below(2000);
-    let told = [
+    let results = [
         section::t_y1_m(a, b),
         section::t_y2_m(a, b, m),
         section::t_y2_mean_m(a, b, m),
@@ -40,8 +40,8 @@ fn equations(case: &mut Case) -> Result<(), String> {
         start_rad(a, b, c, any(case)),
         start_reversed_rad(a, b, c, any(case)),
     ];
-    for (number, told) in told.into_iter().enumerate() {
-        match told {
+    for (number, result) in results.into_iter().enumerate() {
+        match result {
             // An equation may return infinity only if an argument is extremely large or small.
             Ok(value)
                 if value.is_finite() || [a, b, c].iter().any(|x| x.abs() > 1e100 || x.abs() < 1e-100) => {}

@@ -83,9 +83,12 @@ impl Rig {
             );
             Track { x_m: self.hull_m[k], ping_m, body }
         };
-        let told = programs(&self.specs(), layout, planned_mps).unwrap();
+        let programmed = programs(&self.specs(), layout, planned_mps).unwrap();
         let travel_m = f64::from(pings - 1) * ping_m;
-        Dive { tracks: told.iter().enumerate().map(track).collect(), shared_m: [front_m, back_m + travel_m] }
+        Dive {
+            tracks: programmed.iter().enumerate().map(track).collect(),
+            shared_m: [front_m, back_m + travel_m],
+        }
     }
 }
 

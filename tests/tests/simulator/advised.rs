@@ -63,11 +63,11 @@ fn pilot_keeps_to_the_advised_speed_within_tolerance() {
     let scene = scene("");
     let way = way(&scene);
     let report = truth::dive(&scene).report;
-    let told = &report.advice;
+    let advice = &report.advice;
     // In these seconds of the dive, the vehicle is moving steadily.
     for (second, pair) in way.windows(2).enumerate().skip(40).take(60) {
         let speed_mps = pair[1] - pair[0];
-        let about = told.iter().filter(|entry| (entry.at_s - second as f64).abs() < 12.0);
+        let about = advice.iter().filter(|entry| (entry.at_s - second as f64).abs() < 12.0);
         let most_mps = about.map(|entry| entry.v_max_mps).fold(0.0, f64::max);
         assert!(speed_mps < 1.06 * most_mps, "{second} s: {speed_mps} of {most_mps}");
     }

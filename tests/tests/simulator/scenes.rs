@@ -65,9 +65,9 @@ fn shipped_scenes_match_the_figures_of_their_page() {
                     let load =
                         |name: &str| std::fs::read(folder.join(name)).map_err(|error| error.to_string());
                     let summary = truth::dive(&scenes::scene_from(&text, &load)).report.summary;
-                    let told = [summary.pass_m, summary.fail_m, summary.cannot_say_m];
-                    let told = told.map(|metres_m| format!("{}", (100.0 * metres_m).round() / 100.0));
-                    assert_eq!(row[2..5], told, "{}", row[1]);
+                    let metres = [summary.pass_m, summary.fail_m, summary.cannot_say_m];
+                    let metres = metres.map(|metres_m| format!("{}", (100.0 * metres_m).round() / 100.0));
+                    assert_eq!(row[2..5], metres, "{}", row[1]);
                 }
             });
         }

@@ -9,7 +9,7 @@ struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
     holes: Vec<f64>,
-    told: Vec<(RunId, RunChange)>,
+    changes: Vec<(RunId, RunChange)>,
 }
 
 impl Rig {
@@ -19,7 +19,7 @@ impl Rig {
             runs: Runs::new(-5, count, 0.25),
             failing: vec![None; count],
             holes: vec![0.0; count],
-            told: Vec::new(),
+            changes: Vec::new(),
         }
     }
 
@@ -33,7 +33,7 @@ impl Rig {
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
-        let Self { runs, holes, told, .. } = self;
+        let Self { runs, holes, changes, .. } = self;
         let hole = |index: i64| {
             let diameter_m = *holes.get(usize::try_from(index + 5).ok()?)?;
             Some(Hole {
@@ -45,7 +45,7 @@ impl Rig {
                 bounded: true,
             })
         };
-        let mut tell = |id, change| told.push((id, change));
+        let mut tell = |id, change| changes.push((id, change));
         runs.set(section, failing, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
@@ -118,7 +118,7 @@ fn missed_stretches_grow_merge_and_are_cleared() {
     for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);
     }
-    assert!(rig.told.contains(&(RunId(0), RunChange::Cleared)));
+    assert!(rig.changes.contains(&(RunId(0), RunChange::Cleared)));
     rig.check();
 }
 

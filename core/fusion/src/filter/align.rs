@@ -53,16 +53,16 @@ pub struct Listening {
     hears_wall: bool,
     attitude: Option<Rot<Tunnel, Body>>,
     force: Option<Vec3<Body>>,
-    told: Option<Told>,
+    counted: Option<Counted>,
     height_m: Option<f64>,
     echoes: [Heard; MAX_SOURCES],
 }
 
-stateful!(Listening { state: since, before, hears_wall, attitude, force, told, height_m; slots: echoes; });
+stateful!(Listening { state: since, before, hears_wall, attitude, force, counted, height_m; slots: echoes; });
 
 /// A reading of the cable counter.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Told {
+struct Counted {
     at: MonoNs,
     chainage_m: f64,
     /// Length of cable since the zero of the cable counter, m.
@@ -85,7 +85,7 @@ impl Default for Listening {
             hears_wall: false,
             attitude: None,
             force: None,
-            told: None,
+            counted: None,
             height_m: None,
             echoes: [Heard { sensor: None, ranges_m: [0.0; ECHOES], count: 0 }; MAX_SOURCES],
         }
@@ -116,7 +116,7 @@ impl Listening {
             (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
                 let way_m = scale * length.length_m;
                 let sd_m = with_quantum(context.settings.tether_sd_m, length.resolution_m * scale.abs());
-                self.told = Some(Told { at, chainage_m: zero_at_m + way_m, way_m, sd_m });
+                self.counted = Some(Counted { at, chainage_m: zero_at_m + way_m, way_m, sd_m });
             }
             (SensorKind::Depth, Reading::Pressure(water)) => {
                 let up_m = self.attitude.map_or(0.0, |attitude| (attitude * sensor.mount.position).z());
@@ -154,7 +154,7 @@ impl Listening {
     pub fn lacks(&self) -> NoFix {
         if self.attitude.is_none() && self.force.is_none() {
             NoFix::Heading
-        } else if self.told.is_none() {
+        } else if self.counted.is_none() {
             NoFix::Chainage
         } else {
             NoFix::Section
@@ -182,7 +182,7 @@ impl Listening {
         let echo_sd_m = context.settings.echo_sd_m;
         let place = settle(&context.profile, attitude, start, (start, weak), echo_sd_m, &echoes);
         let before_m = self.before.map_or(0.0, |(chainage_m, _)| chainage_m);
-        let chainage_m = self.told.map_or(before_m, |told| told.chainage_m);
+        let chainage_m = self.counted.map_or(before_m, |counted| counted.chainage_m);
         let body = Point3::new(chainage_m, place.at_m[0], place.at_m[1]);
         let mut state = State::at_rest(body + attitude * context.unit_at, attitude);
         if let (true, Some(height_m)) = (place.is_height_seen, self.height_m) {
@@ -200,9 +200,9 @@ impl Listening {
     /// the error of the slack rate.
     fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
-        let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
-        let chainage_sd_m = self.told.map_or(untold_sd_m, |told| {
-            math::hypot(told.sd_m, VELOCITY_SD_MPS * at.since(told.at).as_secs_f64())
+        let uncounted_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
+        let chainage_sd_m = self.counted.map_or(uncounted_sd_m, |counted| {
+            math::hypot(counted.sd_m, VELOCITY_SD_MPS * at.since(counted.at).as_secs_f64())
         });
         let yaw_sd = self.attitude.map_or(YAW_UNTOLD_SD_RAD, |_| settings.heading_sd_rad);
         let threes = [
@@ -223,7 +223,7 @@ impl Listening {
             (SLACK_RATE, settings.slack.drive()),
             // Standard deviation of the chainage error that the cable's scale has caused between the counter's zero and
             // the present position. Later scale errors add to it.
-            (CREEP, settings.scale_sd * self.told.map_or(0.0, |told| told.way_m.abs())),
+            (CREEP, settings.scale_sd * self.counted.map_or(0.0, |counted| counted.way_m.abs())),
             (SCALE, SCALE_SD),
             (DEPTH, settings.depth_offset_sd_m),
             (HEADING, settings.heading.reach),
@@ -239,7 +239,7 @@ impl Listening {
             let [slack, rate, creep, heading] =
                 [SLACK, SLACK_RATE, CREEP, HEADING].map(|i| e.get(i).copied().unwrap_or(0.0));
             let slack = slack + rate * settings.slack.time_s / 2.0;
-            let shown = self.told.map_or(0.0, |_| slack + creep);
+            let shown = self.counted.map_or(0.0, |_| slack + creep);
             let deviates = if self.attitude.is_some() { heading } else { 0.0 };
             for (i, change) in [(POSITION, -shown), (ATTITUDE + 2, -deviates)] {
                 if let Some(slot) = e.get_mut(i) {

@@ -119,7 +119,7 @@ impl DistanceComparison {
                 if *self.log_source.get_or_insert(source) == source =>
             {
                 let moved = sensor.mount.rotation * *moved;
-                let attitude = self.attitude.filter(|(told, _)| at.since(*told).0 < SILENT.0);
+                let attitude = self.attitude.filter(|(measured_at, _)| at.since(*measured_at).0 < SILENT.0);
                 let along_mps = attitude.map_or(moved.x(), |(_, attitude)| (attitude * moved).x());
                 let is_near = |then: MonoNs| (0..SILENT.0).contains(&at.since(then).0);
                 let before = self.log.last().copied().filter(|(then, _)| is_near(*then));
@@ -360,8 +360,8 @@ mod tests {
         assert!((61.0..63.0).contains(&first_s.unwrap()), "{first_s:?}");
         let doubt = doubt.unwrap();
         assert!(doubt.log.is_none() && (4.0..5.0).contains(&doubt.differs_m), "{doubt:?}");
-        let told = |t: f64| runs(t).filter(|_| t < 60.0);
-        assert_eq!(compared(70, way_m, |_| None, told), (None, None));
+        let until_60_s = |t: f64| runs(t).filter(|_| t < 60.0);
+        assert_eq!(compared(70, way_m, |_| None, until_60_s), (None, None));
     }
 
     #[test]

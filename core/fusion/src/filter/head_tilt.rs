@@ -236,8 +236,8 @@ mod tests {
             let n = blocks.len() as f64;
             let scatter = blocks.iter().map(pull).sum::<f64>() * n / (n - 2.0);
             let sd_rad = (math::sqrt(scatter) / (whole / pp)).max(math::sqrt(pp / whole));
-            let (told_rad, sure_sd) = fit.certain(0.01, 1.0).unwrap();
-            assert!((told_rad - found_rad).abs() < 1e-9 && (told_rad - tilt_rad).abs() < 0.01);
+            let (certain_rad, sure_sd) = fit.certain(0.01, 1.0).unwrap();
+            assert!((certain_rad - found_rad).abs() < 1e-9 && (certain_rad - tilt_rad).abs() < 0.01);
             assert!(
                 (sure_sd / (found_rad.abs() / sd_rad) - 1.0).abs() < 1e-6,
                 "{sure_sd} {found_rad} {sd_rad}"

@@ -194,8 +194,8 @@ impl FilterNavigation {
                 self.running.rest(mean.map(|(rate, unit)| unit.sensor.mount.rotation * rate));
             }
             self.window.forget(to);
-            let is_told = self.dispute().is_some() || self.has_jumped();
-            let estimate_m = (!is_told).then(|| self.running.state.position.x());
+            let is_reported = self.dispute().is_some() || self.has_jumped();
+            let estimate_m = (!is_reported).then(|| self.running.state.position.x());
             self.raw_ways.compare(to, estimate_m, self.running.ties, &self.context.settings);
             self.write_steps();
             if is_silent {

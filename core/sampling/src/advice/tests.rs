@@ -518,15 +518,15 @@ fn faster_speed_interval_is_advised_once_it_meets_the_target_with_a_margin_of_2_
         if let Some(last_mps) = last_mps.filter(|last_mps| fresh_mps > 1.06 * last_mps) {
             let above = (0..400).map(|k| last_mps * (1.05 + 0.005 * f64::from(k)));
             let least_m = above.map(|mps| case.t_at_m(&advice, mps)).fold(f64::INFINITY, f64::min);
-            let is_told = now_mps > 1.05 * last_mps;
-            jumps += u32::from(is_told);
-            waited += u32::from(!is_told);
+            let is_raised = now_mps > 1.05 * last_mps;
+            jumps += u32::from(is_raised);
+            waited += u32::from(!is_raised);
             assert!(
-                !is_told || least_m < 0.985 * 0.5,
+                !is_raised || least_m < 0.985 * 0.5,
                 "{k}: {last_mps} to {now_mps}, T {least_m} m at best above"
             );
             assert!(
-                is_told || least_m > 0.975 * 0.5,
+                is_raised || least_m > 0.975 * 0.5,
                 "{k}: {last_mps} is kept as {now_mps}, T {least_m} m above"
             );
         }
@@ -588,20 +588,20 @@ fn speed_margin_is_larger_where_the_spacing_grows_faster_than_speed() {
         let started_deg = 180.0 - 360.0 * apart_m / (started_mps * 8.0);
         let case = Case::new(&[0.0, started_deg], &[0.0, -apart_m], started_mps, 0.6);
         let advice = case.advice();
-        let (t_m, told_mps) = (|mps: f64| case.t_at_m(&advice, mps), advice.v_max_mps);
-        let beyond = (1..400).map(|k| told_mps * (1.0 + 1e-4 * f64::from(k)));
+        let (t_m, advised_mps) = (|mps: f64| case.t_at_m(&advice, mps), advice.v_max_mps);
+        let beyond = (1..400).map(|k| advised_mps * (1.0 + 1e-4 * f64::from(k)));
         let fastest_mps = { beyond }.take_while(|mps| t_m(*mps) <= 0.6).last().unwrap();
-        let kept = 1.0 - told_mps / fastest_mps;
-        let over = t_m(1.02 * told_mps) / 0.6;
+        let kept = 1.0 - advised_mps / fastest_mps;
+        let over = t_m(1.02 * advised_mps) / 0.6;
         if t_m(fastest_mps * 0.98) > 0.6 {
-            assert!(kept < 0.0203 && t_m(told_mps) <= 0.6, "{started_mps}: {kept} in a narrow interval");
+            assert!(kept < 0.0203 && t_m(advised_mps) <= 0.6, "{started_mps}: {kept} in a narrow interval");
             continue;
         }
         assert!((0.0097..0.0203).contains(&kept), "{started_mps}: {kept} of {fastest_mps} held back");
         if kept < 0.0103 {
             assert!(
                 over <= 1.0203,
-                "{started_mps}: {kept}, at 1.02 of {told_mps} m/s T is {over} of the target"
+                "{started_mps}: {kept}, at 1.02 of {advised_mps} m/s T is {over} of the target"
             );
             even += 1;
         } else {

@@ -18,7 +18,7 @@ pub struct DbcEmulator {
     rate_hz: f64,
     start: MonoNs,
     begun: u64,
-    told: u64,
+    sent: u64,
 }
 
 /// A kind of frame that each sample has: identifier, length and multiplexer value.
@@ -46,7 +46,7 @@ impl DbcEmulator {
         // In a multiplexed message, every frame also carries the unmultiplexed signals.
         let switched: Vec<CanId> = frames.iter().filter(|f| f.switch.is_some()).map(|f| f.id).collect();
         frames.retain(|frame| frame.switch.is_some() || !switched.contains(&frame.id));
-        Self { mapping, frames, rate_hz, start, begun: 0, told: 0 }
+        Self { mapping, frames, rate_hz, start, begun: 0, sent: 0 }
     }
 
     /// Time of a sample on the unit's clock, counted from the start.
@@ -119,8 +119,8 @@ impl Emulator<Inertia> for DbcEmulator {
     }
 
     fn tell(&mut self, motion: &Inertia, line: LineSink<'_>) {
-        let elapsed = self.elapsed(self.told);
-        self.told += 1;
+        let elapsed = self.elapsed(self.sent);
+        self.sent += 1;
         let values = self.values(motion);
         for frame in self.frames.iter().filter_map(|frame| self.frame(*frame, &values, elapsed)) {
             line(Direction::Received, motion.at + self.mapping.latency, &frame.encode());

@@ -121,8 +121,8 @@ fn every_message_length_and_id_matches_the_table() {
 fn profile_with_a_false_count_is_refused() {
     let (_, _, Message::Profile(profile)) = examples().swap_remove(6) else { panic!() };
     let message = Message::Profile(profile);
-    let told = Addressed { source: 1, destination: 0, message }.encode().unwrap();
-    let mut payload = Frame::parse(told.as_slice()).unwrap().payload.to_vec();
+    let message_bytes = Addressed { source: 1, destination: 0, message }.encode().unwrap();
+    let mut payload = Frame::parse(message_bytes.as_slice()).unwrap().payload.to_vec();
     payload[24] = 200;
     let bytes = frame(id::PROFILE, &payload);
     let parsed = Frame::parse(&bytes).unwrap();

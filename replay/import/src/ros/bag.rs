@@ -211,21 +211,21 @@ impl Format for Bag {
         }
     }
 
-    fn told(&self) -> ImportReport {
-        let mut told = self.feeds.told();
-        told.losses.extend(self.lost.iter().map(|(why, count)| format!("{count} {why}")));
+    fn report(&self) -> ImportReport {
+        let mut report = self.feeds.report();
+        report.losses.extend(self.lost.iter().map(|(why, count)| format!("{count} {why}")));
         if self.begun && self.stated.is_none() {
-            told.losses.push("the bag's own header is missing".to_owned());
+            report.losses.push("the bag's own header is missing".to_owned());
         }
         if let Some(Stated { index_at, chunks, .. }) = self.stated {
             if index_at == 0 {
-                told.losses.push("the bag was not closed; its end may be missing".to_owned());
+                report.losses.push("the bag was not closed; its end may be missing".to_owned());
             } else if self.chunks != u64::from(chunks) {
                 let found = self.chunks;
-                told.losses.push(format!("the bag states {chunks} chunks; it has {found}"));
+                report.losses.push(format!("the bag states {chunks} chunks; it has {found}"));
             }
         }
-        told
+        report
     }
 }
 

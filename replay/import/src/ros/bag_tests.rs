@@ -61,7 +61,7 @@ fn read(file: &[u8]) -> (usize, Vec<String>) {
             count += 1;
         }
     }
-    (count, input.told().losses)
+    (count, input.report().losses)
 }
 
 fn three() -> [Vec<u8>; 2] {

@@ -154,25 +154,25 @@ impl Feed {
     ///
     /// The message is recorded after the last beam was measured. Its timestamp is the time of the first beam.
     fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
-        let told = beams.told(self.manner.plane)?;
-        for (count, what) in [(told.nowhere, "points without a position: no echo, at an unknown angle")] {
+        let valid = beams.valid(self.manner.plane)?;
+        for (count, what) in [(valid.nowhere, "points without a position: no echo, at an unknown angle")] {
             if count > 0 {
                 *self.noted.entry(what).or_default() += count;
             }
         }
-        if told.off_plane > 0 {
+        if valid.off_plane > 0 {
             *self.lost.entry("points outside the beam's plane of rotation (`plane`)").or_default() +=
-                told.off_plane;
+                valid.off_plane;
         }
-        let last_s = told.beams.last().map_or(0.0, |beam| beam.after_s);
-        let first_s = told.beams.first().map_or(0.0, |beam| beam.after_s);
-        if told.beams.len() > 1 && last_s <= first_s {
+        let last_s = valid.beams.last().map_or(0.0, |beam| beam.after_s);
+        let first_s = valid.beams.first().map_or(0.0, |beam| beam.after_s);
+        if valid.beams.len() > 1 && last_s <= first_s {
             *self.noted.entry("with several beams and no times: all beams get the same time").or_default() +=
                 1;
         }
         let mut unsaid = 0_u64;
         let mut beyond = 0_u64;
-        for Beam { angle_rad, range_m, after_s } in &told.beams {
+        for Beam { angle_rad, range_m, after_s } in &valid.beams {
             let from_s = if at.1 { *after_s } else { after_s - last_s };
             let at_ns = at.0.saturating_add_signed(headrace_geometry::time::DurNs::from_secs_f64(from_s).0);
             let (value, is_beyond) = self.sensor.within_reach(Value::Beam(*angle_rad, *range_m));
@@ -204,13 +204,13 @@ impl Feed {
     }
 
     /// Adds the topic's losses and remarks to the report.
-    pub(super) fn tell(&self, topic: &str, told: &mut ImportReport) {
+    pub(super) fn tell(&self, topic: &str, report: &mut ImportReport) {
         let counted = |counts: &BTreeMap<&'static str, u64>| -> Vec<String> {
             counts.iter().map(|(why, count)| format!("{topic}: {count} {}{why}", messages(why))).collect()
         };
-        told.losses.extend(counted(&self.lost));
-        told.remarks.extend(counted(&self.noted));
-        let mut remark = |words: String| told.remarks.push(format!("{topic}: {words}"));
+        report.losses.extend(counted(&self.lost));
+        report.remarks.extend(counted(&self.noted));
+        let mut remark = |words: String| report.remarks.push(format!("{topic}: {words}"));
         for words in self.clocks.words() {
             remark(words);
         }

@@ -60,11 +60,11 @@ impl Feeds {
         }
     }
 
-    pub(super) fn told(&self) -> ImportReport {
-        let mut told = ImportReport::default();
+    pub(super) fn report(&self) -> ImportReport {
+        let mut report = ImportReport::default();
         for (topic, feed) in &self.by_topic {
-            feed.tell(topic, &mut told);
+            feed.tell(topic, &mut report);
         }
-        told
+        report
     }
 }

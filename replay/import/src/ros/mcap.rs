@@ -130,21 +130,22 @@ impl<R: Read + Seek> Source for Mcap<R> {
         self.bytes
     }
 
-    fn told(&self) -> ImportReport {
-        let mut told = self.feeds.told();
-        told.losses.extend(self.reader.losses().iter().map(ToString::to_string));
+    fn report(&self) -> ImportReport {
+        let mut report = self.feeds.report();
+        report.losses.extend(self.reader.losses().iter().map(ToString::to_string));
         if let Some(stated) = self.stated.filter(|stated| self.is_at_end && *stated > self.read) {
             let missing = stated - self.read;
-            told.losses
+            report
+                .losses
                 .push(format!("{missing} of the {stated} messages that its summary states are missing"));
         }
         if self.reader.late() > 0 {
-            told.losses.push(format!(
+            report.losses.push(format!(
                 "{} messages come too late in the file to be put in order",
                 self.reader.late()
             ));
         }
-        told
+        report
     }
 }
 

@@ -149,12 +149,12 @@ fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static
 /// Parses an inertial message. A covariance whose first element is -1 marks a missing value.
 fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let [x, y, z, w] = wire.doubles()?;
-    let told = |covariance: [f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
-    let wxyz = told(wire.doubles()?).then_some([w, x, y, z]);
+    let is_known = |covariance: [f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
+    let wxyz = is_known(wire.doubles()?).then_some([w, x, y, z]);
     let rate: [f64; 3] = wire.doubles()?;
-    let rate_radps = told(wire.doubles()?).then_some(rate);
+    let rate_radps = is_known(wire.doubles()?).then_some(rate);
     let force: [f64; 3] = wire.doubles()?;
-    let force_mps2 = told(wire.doubles()?).then_some(force);
+    let force_mps2 = is_known(wire.doubles()?).then_some(force);
     let whole = |values: &[f64]| values.iter().all(|value| value.is_finite());
     // Senders without an orientation leave its default, which is all zeros.
     let wxyz = wxyz.filter(|wxyz| whole(wxyz) && wxyz.iter().any(|part| part.abs() > 0.0));

@@ -59,7 +59,7 @@ pub(super) enum Beams {
 
 /// Valid beams of a message, and counts of the invalid points.
 #[derive(Debug, Default)]
-pub(super) struct Told {
+pub(super) struct ValidBeams {
     /// Valid beams, sorted by time.
     pub(super) beams: Vec<Beam>,
     /// Number of points that are too far from the plane in which the beam rotates.
@@ -72,33 +72,33 @@ impl Beams {
     /// Returns the valid beams, in the axes of a head.
     ///
     /// Errors: the reason, as text, why no head can have measured the beams.
-    pub(super) fn told(&self, plane: Plane) -> Result<Told, &'static str> {
-        let mut told = Told::default();
+    pub(super) fn valid(&self, plane: Plane) -> Result<ValidBeams, &'static str> {
+        let mut valid = ValidBeams::default();
         match self {
             Self::Turned(beams) => {
                 if beams.iter().any(|beam| !beam.angle_rad.is_finite() || beam.angle_rad.abs() > 1e3) {
                     return Err("with angles that aren't numbers");
                 }
-                told.beams.clone_from(beams);
+                valid.beams.clone_from(beams);
             }
             Self::Points(points) => {
                 for (point, after_s) in points {
-                    told.point(*point, *after_s, plane);
+                    valid.point(*point, *after_s, plane);
                 }
             }
         }
-        if told.beams.len() > MOST_BEAMS {
+        if valid.beams.len() > MOST_BEAMS {
             return Err("with more than 65536 beams, the maximum for a turn of a head");
         }
-        if told.beams.iter().any(|beam| !(-LONGEST_S..=LONGEST_S).contains(&beam.after_s)) {
+        if valid.beams.iter().any(|beam| !(-LONGEST_S..=LONGEST_S).contains(&beam.after_s)) {
             return Err("whose beams take more than 120 s");
         }
-        told.beams.sort_by(|one, other| one.after_s.total_cmp(&other.after_s));
-        Ok(told)
+        valid.beams.sort_by(|one, other| one.after_s.total_cmp(&other.after_s));
+        Ok(valid)
     }
 }
 
-impl Told {
+impl ValidBeams {
     fn point(&mut self, [x, y, z]: [f64; 3], after_s: f64, plane: Plane) {
         let (across, along, off) = match plane {
             Plane::Yz => (y, -z, x),
@@ -279,21 +279,21 @@ mod tests {
         for quarter in -3_i32..=4 {
             let angle_rad = f64::from(quarter) * FRAC_PI_2 / 2.0;
             let at = head_direction(angle_rad).scaled(3.0);
-            let told = Beams::Points(vec![([at.x(), at.y(), at.z()], 0.0)]).told(Plane::Yz).unwrap();
-            let beam = told.beams[0];
+            let valid = Beams::Points(vec![([at.x(), at.y(), at.z()], 0.0)]).valid(Plane::Yz).unwrap();
+            let beam = valid.beams[0];
             assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
             assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
             // The same point in the axes of a scanner: x is the head's zero angle, and y is the head's y.
-            let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
-            assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
+            let valid = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).valid(Plane::Xy).unwrap();
+            assert!((valid.beams[0].angle_rad - angle_rad).abs() < 1e-12);
         }
     }
 
     #[test]
     fn invalid_and_off_plane_points_are_counted() {
         let all = [[3.0, 0.0, 1.0], [0.0, f64::NAN, 1.0], [0.0; 3], [0.0, 1.0, 1.0]];
-        let told = Beams::Points(all.map(|point| (point, 0.0)).to_vec()).told(Plane::Yz).unwrap();
-        assert_eq!((told.beams.len(), told.off_plane, told.nowhere), (1, 1, 2));
+        let valid = Beams::Points(all.map(|point| (point, 0.0)).to_vec()).valid(Plane::Yz).unwrap();
+        assert_eq!((valid.beams.len(), valid.off_plane, valid.nowhere), (1, 1, 2));
     }
 
     #[test]

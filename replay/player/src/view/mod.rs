@@ -73,7 +73,7 @@ pub struct View {
     /// Chainage, m, and speed, m/s, of the vehicle at its latest known position.
     last: Option<(f64, f64)>,
     v_max_mps: f64,
-    told: Option<LastAdvice>,
+    last_advice: Option<LastAdvice>,
     at: MonoNs,
 }
 
@@ -100,7 +100,7 @@ impl View {
             sections: Sections::default(),
             last: None,
             v_max_mps: 0.0,
-            told: None,
+            last_advice: None,
             at: MonoNs(0),
             site,
         }
@@ -225,13 +225,14 @@ impl View {
         let remedy = Remedy::of(remedy, &text_of(mode));
         self.v_max_mps = v_max_mps;
         let speed_mps = self.last.map(|(_, speed_mps)| speed_mps);
-        let told = self.told.as_ref();
-        let turned = told.is_none_or(|told| told.reason != reason || told.will_exceed != will_exceed);
-        let same = |told: &LastAdvice| {
-            (told.v_max_mps - v_max_mps).abs() < SAME_MPS
-                && (0..ADVICE_EVERY.0).contains(&at.since(told.at).0)
+        let last_advice = self.last_advice.as_ref();
+        let turned = last_advice
+            .is_none_or(|last_advice| last_advice.reason != reason || last_advice.will_exceed != will_exceed);
+        let same = |last_advice: &LastAdvice| {
+            (last_advice.v_max_mps - v_max_mps).abs() < SAME_MPS
+                && (0..ADVICE_EVERY.0).contains(&at.since(last_advice.at).0)
         };
-        if !turned && told.is_some_and(same) {
+        if !turned && last_advice.is_some_and(same) {
             return Some(());
         }
         let figures = AdviceFigures {
@@ -261,7 +262,7 @@ impl View {
                 words: said,
             },
         );
-        self.told = Some(LastAdvice { at, v_max_mps, reason, will_exceed });
+        self.last_advice = Some(LastAdvice { at, v_max_mps, reason, will_exceed });
         Some(())
     }
 

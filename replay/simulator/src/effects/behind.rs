@@ -14,9 +14,9 @@ pub(super) struct Behind {
 impl Behind {
     /// Applies the head's offset to a ping.
     ///
-    /// `made` is false if the head missed the step to this ping. `told` is true if the head reports its true angle,
+    /// `made` is false if the head missed the step to this ping. `is_reported` is true if the head reports its true angle,
     /// which includes the offset.
-    pub(super) fn step(&mut self, sounding: &mut Sounding, made: bool, told: bool) {
+    pub(super) fn step(&mut self, sounding: &mut Sounding, made: bool, is_reported: bool) {
         let commanded_rad = sounding.angle_rad;
         let step_rad =
             self.commanded_rad.map_or(0.0, |before| math::wrap_signed(commanded_rad - before, TAU));
@@ -25,7 +25,7 @@ impl Behind {
             self.off_rad = math::wrap_signed(self.off_rad - step_rad, TAU);
         }
         sounding.angle_rad += self.off_rad;
-        if told {
+        if is_reported {
             sounding.reported_rad += self.off_rad;
         }
     }

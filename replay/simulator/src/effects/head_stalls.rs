@@ -33,7 +33,7 @@ pub(super) struct HeadStallsKind;
 struct Parameters {
     per_hour: f64,
     seconds: [f64; 2],
-    told: bool,
+    is_reported: bool,
 }
 
 #[derive(Component)]
@@ -66,7 +66,7 @@ impl EffectKind for HeadStallsKind {
             let per_hour = keys::or_zero(table, "per_hour", 0.0..=3600.0)?;
             keys::some_not_zero(table, &[("per_hour", per_hour)])?;
             let seconds = keys::span(table, "seconds", 0.1..=3600.0, [2.0, 20.0])?;
-            Ok(Parameters { per_hour, seconds, told: table.boolean("told")?.unwrap_or(true) })
+            Ok(Parameters { per_hour, seconds, is_reported: table.boolean("told")?.unwrap_or(true) })
         })?))
     }
 }
@@ -111,7 +111,7 @@ fn stall(mut heads: Query<'_, '_, (&mut Samples<Sounding>, &mut HeadStalls)>) {
         let HeadStalls { parameters, stalls, behind } = &mut *stalling;
         for sounding in &mut samples.list {
             let stands = stalls.at(sounding.at);
-            behind.step(sounding, !stands, parameters.told);
+            behind.step(sounding, !stands, parameters.is_reported);
         }
     }
 }
@@ -126,7 +126,7 @@ mod tests {
     /// If stalls may overlap, the share of time without a stall is exp(-rate x mean length).
     #[test]
     fn stalls_have_the_given_rate_and_length() {
-        let parameters = Parameters { per_hour: 60.0, seconds: [2.0, 10.0], told: true };
+        let parameters = Parameters { per_hour: 60.0, seconds: [2.0, 10.0], is_reported: true };
         let mut stalls = Stalls::new(Stream::new(5, "head_stalls", "head"), &parameters);
         let (hours, step_s) = (200, 0.1);
         let count = hours * 36_000;
@@ -146,8 +146,9 @@ mod tests {
 
     #[test]
     fn stalled_head_repeats_one_angle_and_continues_in_whole_steps() {
-        for told in [true, false] {
-            let keys = format!("[effects.head_stalls]\nper_hour = 600\nseconds = [1, 1]\ntold = {told}\n");
+        for is_reported in [true, false] {
+            let keys =
+                format!("[effects.head_stalls]\nper_hour = 600\nseconds = [1, 1]\ntold = {is_reported}\n");
             let (plain, pings) = (
                 Bench::turning("").run::<Sounding>("head_a"),
                 Bench::turning(&keys).run::<Sounding>("head_a"),
@@ -158,7 +159,7 @@ mod tests {
             assert!(steps.iter().all(|s| s.abs() < 1e-9 || (s - step_rad).abs() < 1e-9));
             assert!(steps.iter().any(|s| s.abs() < 1e-9));
             for (ping, plain) in pings.iter().zip(&plain) {
-                let wanted = if told { ping.angle_rad } else { plain.angle_rad };
+                let wanted = if is_reported { ping.angle_rad } else { plain.angle_rad };
                 assert!(step(ping.reported_rad, wanted).abs() < 1e-9);
             }
         }

@@ -19,14 +19,14 @@ use crate::stages::Stage;
 /// From time to time a head misses a commanded step. From then on it lags by that step, since hosts command steps and
 /// not angles.
 ///
-/// `per_thousand` is the mean number of missed steps in a thousand. Each step is missed independently. If `told` is
+/// `per_thousand` is the mean number of missed steps in a thousand. Each step is missed independently. If `is_reported` is
 /// true, the head reports its true angle; otherwise, as by default, it reports the commanded angle.
 pub(super) struct SkippedStepsKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
     share: f64,
-    told: bool,
+    is_reported: bool,
 }
 
 #[derive(Component)]
@@ -49,7 +49,10 @@ impl EffectKind for SkippedStepsKind {
         Ok(Box::new(PerSensor::read(tables, facts, &[Sense::Head], |table| {
             let per_thousand = keys::or_zero(table, "per_thousand", 0.0..=500.0)?;
             keys::some_not_zero(table, &[("per_thousand", per_thousand)])?;
-            Ok(Parameters { share: per_thousand * 1e-3, told: table.boolean("told")?.unwrap_or(false) })
+            Ok(Parameters {
+                share: per_thousand * 1e-3,
+                is_reported: table.boolean("told")?.unwrap_or(false),
+            })
         })?))
     }
 }
@@ -71,7 +74,7 @@ fn skip(mut heads: Query<'_, '_, (&mut Samples<Sounding>, &mut SkippedSteps)>) {
         let SkippedSteps { parameters, stream, behind } = &mut *skipped;
         for (step, sounding) in samples.steps() {
             let [chance, _] = stream.at(step).uniform();
-            behind.step(sounding, chance >= parameters.share, parameters.told);
+            behind.step(sounding, chance >= parameters.share, parameters.is_reported);
         }
     }
 }
@@ -87,8 +90,8 @@ mod tests {
     fn skipped_steps_have_the_given_rate_and_are_not_caught_up_later() {
         let plain: Vec<Sounding> = Bench::long("").run("head_a");
         let step_rad = plain[1].angle_rad - plain[0].angle_rad;
-        for told in [false, true] {
-            let keys = format!("[effects.skipped_steps]\nper_thousand = 20\ntold = {told}\n");
+        for is_reported in [false, true] {
+            let keys = format!("[effects.skipped_steps]\nper_thousand = 20\ntold = {is_reported}\n");
             let pings: Vec<Sounding> = Bench::long(&keys).run("head_a");
             let mut missing = 0;
             let off = |k: usize| math::wrap_signed(pings[k].angle_rad - plain[k].angle_rad, math::TAU);
@@ -97,8 +100,8 @@ mod tests {
                 let skipped = fell_rad.abs() > 1e-9;
                 assert!(!skipped || (fell_rad - step_rad).abs() < 1e-9, "{k}: {fell_rad}");
                 missing += usize::from(skipped);
-                let told_rad = if told { pings[k].angle_rad } else { plain[k].angle_rad };
-                assert!(math::wrap_signed(pings[k].reported_rad - told_rad, math::TAU).abs() < 1e-9);
+                let reported_rad = if is_reported { pings[k].angle_rad } else { plain[k].angle_rad };
+                assert!(math::wrap_signed(pings[k].reported_rad - reported_rad, math::TAU).abs() < 1e-9);
             }
             let wanted = 0.02 * (pings.len() - 1) as f64;
             assert!((missing as f64 - wanted).abs() < 5.0 * math::sqrt(wanted), "{missing} of {wanted}");

@@ -94,7 +94,7 @@ pub(super) struct Advised {
     beside: Knots,
     hold: Knots,
     flow: Flow,
-    heard: Vec<PilotAdvice>,
+    advice_list: Vec<PilotAdvice>,
     doing: Doing,
     x_m: f64,
     speed_mps: f64,
@@ -123,7 +123,7 @@ impl Advised {
             beside,
             hold,
             flow: Flow::default(),
-            heard: Vec::new(),
+            advice_list: Vec::new(),
             doing: Doing::Going,
             x_m: from_m,
             speed_mps: 0.0,
@@ -153,8 +153,8 @@ impl Advised {
     }
 
     /// Processes advice and decides the motion until `until_s` seconds after the start.
-    pub(super) fn lead(&mut self, told: Vec<PilotAdvice>, until_s: f64) {
-        self.heard.extend(told);
+    pub(super) fn lead(&mut self, advice: Vec<PilotAdvice>, until_s: f64) {
+        self.advice_list.extend(advice);
         let last = math::floor_to_i64(until_s / STEP_S) + KNOTS_AHEAD;
         while self.next <= last {
             let at_s = self.next as f64 * STEP_S;
@@ -167,12 +167,12 @@ impl Advised {
     }
 
     fn step(&mut self, at_s: f64) {
-        let told = self.told_at(at_s);
-        let missed_m = told.as_ref().and_then(|told| self.to_go_back_for(told));
+        let advice = self.advice_at(at_s);
+        let missed_m = advice.as_ref().and_then(|advice| self.to_go_back_for(advice));
         self.doing = self.decide(at_s, missed_m);
         let wanted_mps = match self.doing {
             Doing::Going if at_s < self.pilot.waits_s => 0.0,
-            Doing::Going => self.wanted_mps(at_s, told.as_ref()),
+            Doing::Going => self.wanted_mps(at_s, advice.as_ref()),
             Doing::Back { .. } => -BACK_MPS,
             Doing::Waiting { .. } | Doing::Done => 0.0,
         };
@@ -202,17 +202,17 @@ impl Advised {
     }
 
     /// The latest advice that was given at least `lag_s` before `at_s`, if any.
-    fn told_at(&self, at_s: f64) -> Option<PilotAdvice> {
+    fn advice_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
-        let heard = |told: &&PilotAdvice| told.at <= by && by > MonoNs(START.0);
-        self.heard.iter().rev().find(heard).cloned()
+        let advice_list = |advice: &&PilotAdvice| advice.at <= by && by > MonoNs(START.0);
+        self.advice_list.iter().rev().find(advice_list).cloned()
     }
 
     /// The missed stretch farthest behind the vehicle that the pilot has not gone back for. It must lie at least
     /// [`BEHIND_M`] behind, unless the pilot waits at the end.
-    fn to_go_back_for(&self, told: &PilotAdvice) -> Option<[f64; 2]> {
+    fn to_go_back_for(&self, advice: &PilotAdvice) -> Option<[f64; 2]> {
         let behind_m = if matches!(self.doing, Doing::Waiting { .. }) { 0.0 } else { BEHIND_M };
-        let missed = told.missed_m.iter().filter(|[from_m, to_m]| {
+        let missed = advice.missed_m.iter().filter(|[from_m, to_m]| {
             let tried = |[first_m, last_m]: &[f64; 2]| from_m < last_m && to_m > first_m;
             *to_m < self.x_m - behind_m && !self.tried_m.iter().any(tried)
         });
@@ -221,13 +221,14 @@ impl Advised {
     }
 
     /// Whether the pilot keeps the vehicle stationary. The total time is limited to [`MOST_STOOD_S`].
-    fn stands(&mut self, told: Option<&PilotAdvice>) -> bool {
-        let stands = self.pilot.stands && self.stood_s < MOST_STOOD_S && told.is_none_or(|told| told.stand);
+    fn stands(&mut self, advice: Option<&PilotAdvice>) -> bool {
+        let stands =
+            self.pilot.stands && self.stood_s < MOST_STOOD_S && advice.is_none_or(|advice| advice.stand);
         self.stood_s += if stands { STEP_S } else { 0.0 };
         stands
     }
 
-    fn wanted_mps(&mut self, at_s: f64, told: Option<&PilotAdvice>) -> f64 {
+    fn wanted_mps(&mut self, at_s: f64, advice: Option<&PilotAdvice>) -> f64 {
         let pilot = &self.pilot;
         let anew = self.x_m > self.farthest_m - 0.5;
         let hurry = pilot.hurries.iter().find(|hurry| (hurry.from_m..hurry.to_m).contains(&self.x_m));
@@ -236,12 +237,12 @@ impl Advised {
         if let Some(hurry) = hurry.filter(|_| anew) {
             return hurry.speed_mps * (1.0 + hold);
         }
-        if self.stands(told) {
+        if self.stands(advice) {
             return 0.0;
         }
         let pilot = &self.pilot;
         // If no speed meets the target, or the speed is unknown, the pilot continues at his own speed.
-        let v_max_mps = told.and_then(|told| told.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0);
+        let v_max_mps = advice.and_then(|advice| advice.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0);
         v_max_mps.map_or(pilot.speed_mps, |v_max_mps| (v_max_mps * (1.0 + hold)).min(pilot.speed_mps))
     }
 }

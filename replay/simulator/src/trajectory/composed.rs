@@ -53,9 +53,9 @@ impl Trajectory {
 
     /// Passes advice to the pilot and decides the motion until `until_s` seconds after the start. Other kinds of
     /// trajectory stay as they are.
-    pub(crate) fn lead(&mut self, told: Vec<PilotAdvice>, until_s: f64) {
+    pub(crate) fn lead(&mut self, advice: Vec<PilotAdvice>, until_s: f64) {
         if let Base::Advised(advised) = &mut self.base {
-            advised.lead(told, until_s);
+            advised.lead(advice, until_s);
             self.duration_s = advised.duration_s();
         }
     }

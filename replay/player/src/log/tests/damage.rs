@@ -58,8 +58,8 @@ fn log_that_follows_another_one_in_a_file_is_reported_and_not_read() {
         let (got, losses) = read(&[&bytes[..cut], &bytes].concat());
         assert_eq!(got, alone, "cut at {cut}");
         assert_eq!(got, seen[..got.len()], "cut at {cut}");
-        let is_told = losses.iter().any(|loss| loss.kind == LossKind::AnotherLog);
-        assert!(is_told, "cut at {cut}: {losses:?}");
+        let is_reported = losses.iter().any(|loss| loss.kind == LossKind::AnotherLog);
+        assert!(is_reported, "cut at {cut}: {losses:?}");
     }
 }
 
@@ -122,7 +122,7 @@ fn long_log() -> (Vec<u8>, Vec<Seen>) {
 fn unreadable_bytes_are_reported_as_a_loss_and_the_rest_is_read() {
     let (bytes, seen) = long_log();
     let chunks = places(&bytes, op::CHUNK);
-    let mut told = 0;
+    let mut reported = 0;
     for bad in (0..bytes.len()).step_by(197) {
         let sector = bad / 512 * 512..(bad / 512 + 1) * 512;
         let medium = Worn { bytes: std::io::Cursor::new(&bytes), bad: bad..bad + 1 };
@@ -140,10 +140,10 @@ fn unreadable_bytes_are_reported_as_a_loss_and_the_rest_is_read() {
             let losses = reader.losses().to_vec();
             assert!(is_subsequence(&got, &seen), "byte {bad}");
             missing_are_covered(&got, &seen, &losses);
-            let is_told = losses
+            let is_reported = losses
                 .iter()
                 .any(|loss| matches!(&loss.kind, LossKind::Unreadable(why) if why.contains("os error 5")));
-            told += usize::from(is_told);
+            reported += usize::from(is_reported);
             // All messages of chunks outside the unreadable sector are read.
             let hit = chunks
                 .iter()
@@ -156,13 +156,13 @@ fn unreadable_bytes_are_reported_as_a_loss_and_the_rest_is_read() {
                 got.len(),
                 seen.len()
             );
-            assert!(is_told || hit == 0, "byte {bad}: {losses:?}");
+            assert!(is_reported || hit == 0, "byte {bad}: {losses:?}");
             if again == 0 {
                 reader.go_to(&before).unwrap();
             }
         }
     }
-    assert!(told > 100, "{told}");
+    assert!(reported > 100, "{reported}");
 }
 
 #[test]

@@ -172,8 +172,8 @@ fn swapped_chunks_are_reported_as_out_of_order() {
             let mut records = without_summary(records.clone());
             records.swap(places[one], places[other]);
             let (kinds, texts) = losses(&joined(&records));
-            let is_told = kinds.iter().any(|kind| matches!(kind, LossKind::Disordered { .. }));
-            assert!(is_told, "{what}, {one} and {other}: {texts:?}");
+            let is_reported = kinds.iter().any(|kind| matches!(kind, LossKind::Disordered { .. }));
+            assert!(is_reported, "{what}, {one} and {other}: {texts:?}");
             assert_eq!(missing(&kinds), 0, "{what}: {texts:?}");
         }
     });

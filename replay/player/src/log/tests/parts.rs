@@ -147,9 +147,9 @@ fn missing_or_replaced_part_is_reported_by_number() {
     log.end_part(true).unwrap();
     std::fs::write(other.part(2), log.finish().unwrap().0).unwrap();
     let mixed = [files[0].clone(), other.part(2), files[2].clone(), files[3].clone()];
-    let told = losses(&mixed);
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert!(told[0].starts_with("part 2 is not the one that was recorded: it states 401"), "{told:?}");
+    let texts = losses(&mixed);
+    assert_eq!(texts.len(), 1, "{texts:?}");
+    assert!(texts[0].starts_with("part 2 is not the one that was recorded: it states 401"), "{texts:?}");
 }
 
 #[test]
@@ -186,10 +186,10 @@ fn damaged_parts_lose_only_their_damaged_messages() {
     let mut log = DiveLog::open(&folder.files()).unwrap();
     let seen = all(&mut log);
     assert!(seen.len() > 1000 && whole.starts_with(&seen), "{}", seen.len());
-    let told: Vec<String> = log.losses().iter().map(ToString::to_string).collect();
-    assert_eq!(told.len(), 2, "{told:?}");
-    assert!(told[0].starts_with("the file that is named like part 4 can't be read: "), "{told:?}");
-    assert!(told[1].starts_with("part 3, byte ") && told[1].contains("the file ends before"), "{told:?}");
+    let texts: Vec<String> = log.losses().iter().map(ToString::to_string).collect();
+    assert_eq!(texts.len(), 2, "{texts:?}");
+    assert!(texts[0].starts_with("the file that is named like part 4 can't be read: "), "{texts:?}");
+    assert!(texts[1].starts_with("part 3, byte ") && texts[1].contains("the file ends before"), "{texts:?}");
 
     let mut output = Vec::new();
     let files = folder.files();

@@ -480,12 +480,14 @@ fn skipped_ticks_are_stated_in_the_log() {
     drop(port);
     assert_eq!(handle.finish().unwrap().skipped, 8);
     let (seen, losses) = read(&flushed.iter().last().unwrap());
-    let told: Vec<String> = losses.iter().map(ToString::to_string).collect();
-    assert_eq!((seen.len(), told.len()), (2, 2), "{told:?}");
+    let texts: Vec<String> = losses.iter().map(ToString::to_string).collect();
+    assert_eq!((seen.len(), texts.len()), (2, 2), "{texts:?}");
     assert!(
-        told[0].starts_with("7 packets not recorded") && told[0].ends_with("(after 2.000 s, before 3.000 s)")
+        texts[0].starts_with("7 packets not recorded")
+            && texts[0].ends_with("(after 2.000 s, before 3.000 s)")
     );
     assert!(
-        told[1].starts_with("1 packets not recorded") && told[1].ends_with("(after 5.000 s, before 5.000 s)")
+        texts[1].starts_with("1 packets not recorded")
+            && texts[1].ends_with("(after 5.000 s, before 5.000 s)")
     );
 }

@@ -219,9 +219,9 @@ fn single_storage_fault_is_recorded_and_loses_no_message() {
                 continue;
             }
             assert!(!losses.is_empty(), "{which}");
-            let told: Vec<String> = losses.iter().map(ToString::to_string).collect();
-            let is_told = told.iter().any(|told| told.contains(&fault.words()));
-            assert!(is_told || fault.continued.is_none(), "{which}: {told:?}");
+            let texts: Vec<String> = losses.iter().map(ToString::to_string).collect();
+            let is_reported = texts.iter().any(|text| text.contains(&fault.words()));
+            assert!(is_reported || fault.continued.is_none(), "{which}: {texts:?}");
             // The part in which the fault occurred must have no end record.
             let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
             let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
@@ -390,8 +390,8 @@ fn recording_with_a_fault_is_recovered_as_one_log_that_lists_the_fault() {
     assert_eq!(done.messages, 4 * TICKS);
     let (recovered, losses) = read(&output);
     assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
-    let told = losses[0].to_string();
-    assert!(told.contains(&summary.faults[0].words()), "{told}");
+    let text = losses[0].to_string();
+    assert!(text.contains(&summary.faults[0].words()), "{text}");
     // The first part alone lacks the rest of the dive, and is reported as cut off.
     let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
     assert!(first.messages < 4 * TICKS);
