@@ -57,8 +57,8 @@ const MOST_S: f64 = 600.0;
 impl Default for AlertTiming {
     /// Default delays before alerts become active and clear.
     ///
-    /// Speed and position fluctuate about their limits within seconds, so their alerts are delayed. The situations of
-    /// all other classes have their own hysteresis.
+    /// Speed and position fluctuate about their limits within seconds, so their alerts wait. All other classes have
+    /// situations with their own hysteresis.
     fn default() -> Self {
         let timing = |hold_s: f64, off_s: f64| ClassTiming {
             hold: DurNs::from_secs_f64(hold_s),
@@ -87,7 +87,7 @@ impl AlertTiming {
         }
     }
 
-    /// Returns a copy of the timing in which the delays of one alert class are replaced.
+    /// Returns a copy of the timing with other delays for one alert class.
     #[must_use]
     pub fn with(mut self, class: AlertClass, timing: ClassTiming) -> Self {
         if let Some(slot) = self.0.get_mut(class as usize) {
