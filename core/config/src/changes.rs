@@ -49,7 +49,7 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
     Ok(changed)
 }
 
-/// Whether a value is an inline array. Tables under `[[headers]]` are none, and cannot be added at the start.
+/// Whether a value is an inline array. Tables under `[[headers]]` are not, and cannot be added at the start.
 fn is_array(value: &str) -> bool {
     value.starts_with('[') && !value.starts_with("[[")
 }

@@ -5,8 +5,8 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
-/// Maximum length of a TOML text, bytes. Parsing takes many times this length in memory. A long vehicle file has about
-/// a hundredth of it.
+/// Maximum length of a TOML text, bytes. A limit is needed because parsing takes many times the text's length in
+/// memory. A long vehicle file has about a hundredth of this length.
 const MAX_TEXT_BYTES: usize = 1 << 20;
 
 /// A TOML text and its file name.

@@ -389,7 +389,6 @@ impl<'a> Section<'a> {
     /// The problem may be a mere consequence of an error that was already noted. If an error about the same key was
     /// noted, returns that error instead. If the key is absent from a table below the root, returns a noted error of
     /// that table, or an error about a key with a similar name, if there is one.
-    /// error of that table, or an error about a key with a similar name.
     pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
         let (name, value) = (self.full(key), self.table.get(key));
         let is_below = value.is_none() && !self.path.is_empty();

@@ -20,7 +20,8 @@ pub struct Evidence {
     pub speed_mps: f64,
     /// Largest speed that would have met the target from the tunnel's centre, m/s. Zero if no speed does.
     ///
-    /// All heads are assumed to turn as scheduled. If the planned speed meets the target, it is taken.
+    /// All heads are assumed to turn as scheduled. If the planned speed meets the target, the value is the planned
+    /// speed.
     pub fits_mps: f64,
     /// Largest speed that would have met the target despite lost returns, m/s. It is never above `fits_mps`.
     ///

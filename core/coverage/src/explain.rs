@@ -23,7 +23,7 @@ use trial::Trial;
 pub use case::Case;
 use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 
-/// Multiple of the target above which the spacing T makes speed a factor, even if the vehicle kept to the planned
+/// Speed is a factor if the spacing T exceeds this multiple of the target, even if the vehicle kept to the planned
 /// speed.
 ///
 /// T is the sample spacing at the driven speed with all heads at their scheduled angles. No hole is then larger than T.
@@ -34,22 +34,20 @@ const OVER_PLAN: f64 = 1.15;
 ///
 /// The speed then comes only from the inertial unit, and is less accurate.
 const OVER_LOST: f64 = 1.4;
-/// Speed is a factor if it is this many times both the planned speed and the largest speed that meets the target.
+/// Speed is a factor if it exceeds this multiple of the planned speed, and of the largest speed that meets the target.
 ///
 /// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;
-/// Share of the actual distance between passes below which that distance must fall without swing, for swing to be a
-/// factor.
+/// Swing of the beams is a factor if, without it, passes are closer together than this share of their actual distance.
 ///
-/// It is below 1 because even a steady vehicle sways.
+/// The share is below 1 because even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
-/// Share of the target above which the step along the wall makes the angular step a factor. The step is that seen from
-/// the tunnel's centre.
+/// The angular step is a factor if it is longer on the wall than this share of the target, as seen from the tunnel's
+/// centre.
 const COARSE: f64 = 0.75;
 
 /// Determines the causes of a section's hole. `passages` are those of all sections within the target T of it.
 ///
-/// Allocates: never.
 /// Allocates: never.
 pub fn explain<'a>(
     case: &Case<'_>,

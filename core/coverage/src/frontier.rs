@@ -106,7 +106,7 @@ pub struct Frontier {
 /// Direction of travel along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Course {
-    /// Farthest chainage on this course of the centre of the heads' combined reach, m.
+    /// Farthest chainage that the centre of the heads' combined reach has had on this course, m.
     farthest_m: f64,
     astern: bool,
     /// Number of heads in the combined reach.
@@ -381,7 +381,6 @@ impl Moved {
     /// Whether nothing has changed since the previous ping or update: no section left the zone, and the coverage extent
     /// has not grown.
     ///
-    /// Also true if the place of no head is known.
     /// Also true if no head's place is known.
     pub fn is_nothing(&self) -> bool {
         let stayed = self.left_behind.is_empty() && self.left_ahead.is_empty() && !self.way_grown;

@@ -1,6 +1,6 @@
 //! Declared openings of the wall, such as side tunnels and gates.
 //!
-//! Openings are no holes. The report lists them.
+//! Openings do not count as holes. The report lists them.
 
 use super::store::{SampleStore, StoreError, WallSample};
 use headrace_geometry::math;

@@ -16,7 +16,7 @@ pub(super) struct Extent {
     pub(super) width_m: f64,
     /// Largest distance of the run from the design profile, m.
     pub(super) off_m: f64,
-    /// Mean number of earlier passes that met the run's returns too.
+    /// Mean number of earlier passes that met the same thing.
     pub(super) confirmed: f64,
     /// Number of the run's ends that slope to the wall, from 0 to 2.
     pub(super) slopes: u8,

@@ -25,8 +25,8 @@ impl Measured {
 impl Sections {
     /// Returns the index of each section with a measured hole, and its verdict for another target.
     ///
-    /// It is still the dive's own target that decides which visits count and which sections are settled. Only a replay
-    /// with the other target gives the verdicts that the dive would have reported.
+    /// The dive's own target still decides which visits count and which sections are settled. Only a replay with the
+    /// other target gives the verdicts that the dive would have reported.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
         let target = Target { max_hole_m: target_m, ..self.target() };
         self.sections_of(outlook.way).filter_map(move |index| {

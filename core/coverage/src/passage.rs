@@ -75,7 +75,8 @@ pub struct Drive {
     pub middle_t_y_m: f64,
     /// Largest speed that meets the target from the tunnel's centre, m/s. Zero if no speed does.
     ///
-    /// All heads are assumed to turn as scheduled. If the planned speed meets the target, it is taken.
+    /// All heads are assumed to turn as scheduled. If the planned speed meets the target, the value is the planned
+    /// speed.
     pub fits_mps: f64,
     /// Largest distance between passes along the tunnel that meets the target, m.
     pub fits_along_m: f64,
@@ -100,8 +101,8 @@ pub struct Drive {
 pub struct OtherSettings {
     /// Step of a finer mode, divided by the present step.
     ///
-    /// Of the modes with a finer step, it is the one that allows the highest speed. If no mode meets the target, it is
-    /// the finest one.
+    /// The mode is the one with a finer step that allows the highest speed. If no mode meets the target, it is the
+    /// finest mode.
     pub finer_step: f64,
     /// Turn period of this finer mode, divided by the present turn period.
     pub finer_turn: f64,
@@ -149,7 +150,7 @@ impl Drive {
         is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
-    /// Returns that of two movements which has the larger distance between passes.
+    /// Returns the movement with the larger distance between passes.
     #[must_use]
     pub fn or_worse(self, other: Self) -> Self {
         if other.along_m() > self.along_m() { other } else { self }

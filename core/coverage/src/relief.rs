@@ -3,7 +3,6 @@
 //!
 //! A vote compares the returns of two heads in the same bin of the wall. If one head contradicts the design there and
 //! another agrees with it, the first is outvoted.
-//! outvoted if another head agrees with the design.
 
 use serde::{Deserialize, Serialize};
 

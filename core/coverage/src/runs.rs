@@ -21,7 +21,7 @@ pub struct RunId(pub u32);
 /// A missed stretch: neighbouring failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Most frequent cause among the stretch's sections. After a tie, it stays as it was.
+    /// Most frequent cause among the stretch's sections. In a tie, the cause stays as it was.
     pub cause: Cause,
     /// Number of the stretch's sections with each cause, in the order of [`Cause::ALL`].
     counts: [u32; Cause::ALL.len()],

@@ -1,7 +1,7 @@
 //! Decides which returns are wall: returns near the design profile, and returns that agree with other returns.
 //!
 //! A return within the tolerance of the design is wall. A return is also wall if an earlier pass found wall with the
-//! same deviation nearby. Other returns that succeed and agree with one another are a *run*, which has odds of being
+//! same deviation nearby. Other successive returns that agree with one another are a *run*, which has odds of being
 //! wall; see `origin`.
 //!
 //! A boulder begins with a single return. So a return waits for the head's next returns before it is classified.

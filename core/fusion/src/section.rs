@@ -34,7 +34,6 @@ pub struct Place {
 /// Minimises sum((measured - predicted)^2 / sd^2) plus a prior term with the position `prior` and the standard
 /// deviations `prior_sd_m`. The derivative of a range with respect to the position is -n / (n . beam). The iteration
 /// stops before a step that leaves the cross-section.
-/// leave the cross-section.
 pub fn settle(
     profile: &Profile,
     attitude: Rot<Tunnel, Body>,

@@ -216,6 +216,7 @@ pub enum OptionalPayload {
 }
 
 /// Converts bytes to readings: a codec with the device's configuration.
+///
 /// A decoder is pure and runs in the loop. Its saved state depends only on the decoded bytes; it does not include the
 /// configuration.
 pub trait Decoder: Stateful + Send + Sync {

@@ -57,8 +57,8 @@ const MOST_S: f64 = 600.0;
 impl Default for AlertTiming {
     /// Default delays before alerts become active and clear.
     ///
-    /// Speed and position fluctuate about their limits within seconds, so their alerts wait. All other classes have
-    /// situations with their own hysteresis.
+    /// Speed and position fluctuate about their limits within seconds, so their alerts are delayed. The situations of
+    /// all other classes have their own hysteresis.
     fn default() -> Self {
         let timing = |hold_s: f64, off_s: f64| ClassTiming {
             hold: DurNs::from_secs_f64(hold_s),

@@ -21,7 +21,7 @@ use crate::vehicle::VehicleConfig;
 pub enum Grade {
     /// The vehicle file cannot work as written.
     Error,
-    /// The vehicle file works, but at a cost. Or it works as intended only if an unusual setting is meant.
+    /// The vehicle file works, but at a cost, or works as intended only if an unusual setting is meant.
     Warning,
 }
 

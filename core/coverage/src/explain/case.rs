@@ -84,8 +84,8 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole. In a hole larger than the target, this is asked only of the central
-/// part, as large as the target.
+/// Whether every live head has swept the hole. In a hole larger than the target, only the central part, as large as the
+/// target, must be swept.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];

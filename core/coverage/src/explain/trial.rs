@@ -18,7 +18,7 @@ const MARGIN: f64 = 0.85;
 /// A finer step or a longer range takes longer per turn, which stretches the wall.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// Multiple of the target above which the hole's cause is unknown, if all present factors are removed.
+/// If a hole exceeds this multiple of the target even without all present factors, its cause is unknown.
 const AT_MOST: f64 = 1.3;
 /// Maximum number of bisection steps in the search for the hole's diameter, if all missing samples are put back.
 const SEARCHED: u32 = 5;

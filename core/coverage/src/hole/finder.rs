@@ -73,7 +73,6 @@ pub(super) struct Tile {
     ///
     /// A search for an empty circle of given size stores any nearby sample here instead: its chainage from the start of
     /// the section, and its arc length.
-    /// start of the section, and its arc length.
     pub(super) owner: (f64, f64),
     /// Upper bound of the distance from a point of the tile to the nearest sample, m.
     pub(super) bound_m: f64,

@@ -118,7 +118,7 @@ impl Window {
 
     fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
         let cells = (to_m - from_m) * perimeter_m;
-        // If there were more cells than the capacity allows, larger cells are used.
+        // Larger cells are used if there is no room for all cells of this size.
         let cell_m = cell_m.max(1.5 * math::sqrt(cells / CELLS as f64));
         (self.perimeter_m, self.origin_m, self.from_m, self.cell_m) = (perimeter_m, origin_m, from_m, cell_m);
         self.rows = whole((to_m - from_m) / cell_m) + 1;

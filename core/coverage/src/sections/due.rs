@@ -61,7 +61,7 @@ impl Sections {
             }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        // Of the sections at the zone's ends, the heads may have passed only a part.
+        // The heads may have passed only a part of each section at the zone's ends.
         let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
         let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
         for range in [behind, ahead] {

@@ -98,7 +98,7 @@ impl Agreement {
 }
 
 /// Increases the variances of chainage, speed and tilt when the chainage is lost. The chainage's variance may increase
-/// by 100 m squared, because no model is linearised about the chainage.
+/// by (100 m)^2, because no model is linearised about the chainage.
 pub fn seek_way(variances: &mut Errors) {
     add(variances, POSITION..POSITION + 1, LOST_WAY_M);
     add(variances, VELOCITY..VELOCITY + 1, LOST_WAY_MPS);

@@ -195,6 +195,7 @@ impl Listening {
     }
 
     /// Builds the initial covariance.
+    ///
     /// The chainage error is correlated with the cable's errors, and the yaw error with the compass's. So repeated
     /// readings of cable and compass do not reduce the uncertainty of chainage and yaw below these errors. The slack
     /// error is correlated with the error of the slack rate.

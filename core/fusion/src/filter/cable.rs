@@ -22,8 +22,7 @@ const RECENT_S: f64 = 1.0;
 const DISPUTED_SDS: f64 = 5.0;
 /// Each innovation is clipped at this many standard deviations.
 const MOST_SDS: f64 = 6.0;
-/// Minimum size of the latest innovation, m. Without it, a mean innovation beyond `DISPUTED_SDS` starts no
-/// disagreement.
+/// Minimum size of the latest innovation, m. With a smaller one, a mean beyond `DISPUTED_SDS` starts no disagreement.
 const LEAST_M: f64 = 0.01;
 /// Time without a change of the count that shows a stuck counter, if slack has kept the count changing before.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);

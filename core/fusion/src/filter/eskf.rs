@@ -61,7 +61,7 @@ pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
 const SMOOTH: f64 = 4.0;
 /// Largest ratio of a counter's step to its noise at which the rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
-/// Time after the start of an estimate in which its yaw becomes certain: the estimate settles.
+/// Time after its start in which an estimate settles. Its yaw then becomes certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Standard deviation of yaw at which an estimate counts as settled, radians.
 ///
@@ -89,8 +89,7 @@ pub struct Eskf {
     slipped_m2: f64,
     /// Number of times that the offset between earlier and later soundings has become unknown.
     pub ties: u32,
-    /// Start time of the estimate. Then the standard deviation of yaw at the start, or when it had last halved,
-    /// radians.
+    /// Start time of the estimate, and standard deviation of yaw at the start or when it had last halved, radians.
     begun: (MonoNs, f64),
     /// Number of times that the standard deviation of yaw has halved while the estimate settled.
     pub settled: u32,

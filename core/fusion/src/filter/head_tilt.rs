@@ -134,6 +134,7 @@ impl TiltFit {
     }
 
     /// Returns the standard deviation of the head's tilt, radians; `None` if the vehicle has not turned enough.
+    ///
     /// The value comes from the scatter of pose windows. It is at least the sd that range noise causes, whose variance
     /// is `level` times the declared variance.
     pub(super) fn sd_rad(&self, level: f64) -> Option<f64> {

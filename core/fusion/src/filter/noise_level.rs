@@ -86,8 +86,8 @@ impl NoiseLevel {
     }
 
     /// Processes the squared normalised innovation of any measurement, whether fused or rejected.
+    ///
     /// Returns the square divided by the mean of earlier squares. A mean below its expected value of 1 counts as 1.
-    /// Returns the square divided by the earlier mean. A mean below its expected value of 1 counts as 1.
     pub fn relative(&mut self, nis: f64) -> f64 {
         let usual = if self.seen >= FEW { self.nis.max(1.0) } else { 1.0 };
         self.seen = (self.seen + 1).min(MEMORY);

@@ -74,8 +74,8 @@ impl Roughness {
             let noise_m2 = look.white_m2 + other.white_m2 + scale_m2;
             let sum_m = look.left_m + other.left_m;
             let most_m2 = MOST * (noise_m2 + 2.0 * self.variance_m2(settings).max(declared_m2));
-            // The sum contains the bumps of both echosounders, so the variance of one echosounder's bumps is half of
-            // it.
+            // The sum contains the bumps of both echosounders, so its variance is twice that of one echosounder's
+            // bumps.
             let found_m2 = ((sum_m * sum_m).min(most_m2) - noise_m2) / 2.0;
             let share = bump / 2.0;
             self.seen = (self.seen + share).min(MEMORY);

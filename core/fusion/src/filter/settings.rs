@@ -22,14 +22,14 @@ pub struct GaussMarkov {
 impl GaussMarkov {
     /// Creates the process of a bias that has a constant part and a drifting part.
     ///
-    /// The variance of the process is the sum of both parts' variances. It drifts as fast as the drifting part alone.
+    /// The variance of the process is the sum of both parts' variances. The process drifts as fast as the drifting part
+    /// alone.
     pub fn of_bias(bias: &BiasSpec) -> Self {
         let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance per second that the driving white noise adds to this process. It is valid for a process with a single
-    /// lag.
+    /// Variance per second that the driving white noise adds to this process, if the process has a single lag.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }

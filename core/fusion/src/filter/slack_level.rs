@@ -37,7 +37,7 @@ const KNOTS: usize = 256;
 const MEMORY_S: f64 = 40.0;
 /// Multiple of the rms at which a third difference is clipped. Rare large values come from faults, not from slack.
 const MOST_SDS: f64 = 3.0;
-/// Number of sds of a mean square by which its noise is raised before it is subtracted.
+/// Before noise is subtracted from a mean square, the noise is raised by this many sds of the mean square.
 ///
 /// The margin is needed because few of the averaged differences are independent.
 const MARGIN_SDS: f64 = 1.5;

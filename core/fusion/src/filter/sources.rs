@@ -32,8 +32,8 @@ pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
 pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
 /// Number of velocity readings that share one error. Errors of the log's scale, mount and bottom track last for 10 s.
 ///
-/// An assumption of only 3 s would let a log that shows a fifth too much pull the estimate away
-/// (`docs/why/navigation.md`, "Seeded dives").
+/// If only 3 s are assumed, a log that shows a fifth too much pulls the estimate away (`docs/why/navigation.md`,
+/// "Seeded dives").
 pub const VELOCITY_LOOKS: f64 = 20.0;
 /// Weight of a new measurement of a head's turn rate in the running mean.
 const RATE_SHARE: f64 = 0.05;

@@ -120,7 +120,6 @@ impl Window {
     /// Returns the inertial data that are valid from `from` on, and the end of their validity, at the latest `until`.
     ///
     /// An inertial sample is the mean over the time before its timestamp.
-    /// An inertial sample is the mean over the time before its timestamp.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (InertialSample, MonoNs) {
         let next = self.felt.partition_point(|felt| felt.at <= from);
         let speaking = |number: Option<usize>| {

@@ -24,7 +24,6 @@ const ASKS_FOR: DurNs = DurNs(60_000_000_000);
 ///
 /// Pauses matter if a winch operator winds the cable in half a metre at a time. Between pulls, the cable is then
 /// stationary while the vehicle moves on.
-/// between pulls while the vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
 /// Largest difference between two means at rest: `SAME_RATE` for turn rates, rad/s, `SAME_FORCE` for specific forces,

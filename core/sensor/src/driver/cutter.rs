@@ -1,6 +1,6 @@
 //! Splits a device's byte stream into frames.
 //!
-//! So each log message contains one frame, stamped with the receive time of its first byte.
+//! Each log message then contains one frame, stamped with the receive time of its first byte.
 
 use std::collections::VecDeque;
 

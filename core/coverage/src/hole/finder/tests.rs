@@ -278,7 +278,6 @@ fn hole_is_the_same_at_7_km_and_at_1000_km() {
 /// The reference values are for `ceran` at 0.197 m/s, with heads in phase shift at the circle's centre.
 ///
 /// The samples have positions only, and no steps.
-/// The samples are positions only, without steps.
 #[test]
 fn largest_holes_of_ideal_helices_match_reference_values() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();

@@ -141,7 +141,7 @@ fn beam_row_on_flat_walls_equals_finite_differences() {
 #[test]
 fn expected_range_of_a_cone_equals_its_shortest_ray() {
     // The rays lie on rings around the axis, spaced by 5e-3 rad. The shortest ray is longer than the true shortest
-    // range by at most the square of half this spacing, as a share.
+    // range, by a share of at most the square of half this spacing.
     const RINGS: u32 = 200;
     let profile = shapes::rectangle(60.0, 60.0).unwrap();
     let mut draws = Draws::new(11);

@@ -126,8 +126,8 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// If a sensor sends too often, its used readings are at least one period apart, and no more are skipped than that
-    /// needs.
+    /// If a sensor sends too often, its used readings are at least one period apart. Every skipped reading is less than
+    /// a period after a used one.
     #[test]
     fn readings_of_a_source_are_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
@@ -268,7 +268,7 @@ impl Augmented {
 
 #[test]
 fn relative_covariance_from_clones_equals_an_augmented_filter() {
-    // Eight propagation legs between clones, and then so many clones that they fill the ring buffer.
+    // The first case has eight propagation legs between clones. The second has enough clones to fill the ring buffer.
     for (legs, leg_s, times) in [(8, 0.25, 12), (1, 2.0, 70)] {
         let settings = Settings::default();
         let rig = Rig::new(super::rig::cruise, 5);

@@ -59,7 +59,7 @@ fn rotated_head_is_reported_with_its_angle() {
     }
 }
 
-/// Feeds the readings of a dive to a filter with this declared mount error, and only those of sources with `is_heard`.
+/// Feeds the readings of a dive to a filter with this declared mount error. `is_heard` selects the sources.
 fn dived(rig: &Rig, to_s: f64, mount_sd_deg: f64, is_heard: &dyn Fn(usize) -> bool) -> FilterNavigation {
     let mut nav = rig.navigation();
     nav.context.settings.mount_sd_rad = mount_sd_deg.to_radians();
@@ -101,7 +101,7 @@ fn mounts_stay_unverified_without_a_swing() {
     assert!(!is_unverified(&|source| source < HEADS), "no head");
 }
 
-/// Between two heads, the mount error has twice the variance of one head's, in pitch and in yaw.
+/// The mount error between two heads has twice the variance of a single head's, in pitch and in yaw.
 #[test]
 fn declared_mount_error_widens_the_error_between_passes_of_several_heads() {
     let adds_deg = |rig: &Rig, declared_deg: f64, is_heard: &dyn Fn(usize) -> bool| {

@@ -169,7 +169,6 @@ impl Profile {
     ///
     /// From inside, there is always such a point. If rounding lets a ray slip between two elements, their common vertex
     /// is used. From outside, the result is `None`.
-    /// used. From outside the result is `None`.
     pub fn cast(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         if !self.contains(origin) {
             return None;

@@ -11,7 +11,6 @@ const DIRECTIONS: usize = 128;
 /// Between two directions of the table, both entries together give an upper bound. It is too large by at most half the
 /// longest edge of the points' convex hull times tan(pi / [`DIRECTIONS`]) = 0.025. For a flat wall, this is 12 mm per
 /// metre.
-/// this is 12 mm per metre.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Support(Vec<(Yz, f64)>);
 
