@@ -84,7 +84,7 @@ pub struct Frontier {
     way: Option<Reach>,
     /// Stretch where all heads have been, whether they ping or not. All of their combined reach has moved across it.
     ///
-    /// It is empty (`from_m` above `to_m`) until there is such a place.
+    /// It is empty (`from_m` above `to_m`) until all heads have passed the same wall.
     through: Option<Reach>,
     /// Zone: index range of the sections within reach of the awaited heads, plus a margin.
     ///

@@ -40,8 +40,8 @@ const PASSES_S: f64 = 20.0;
 pub struct CounterCorrections {
     /// Sums of the corrections of chainage and speed in the last second, m and m/s.
     recent: [f64; 2],
-    /// Sums of the corrections since shortly before the count stopped changing, m and m/s. The chainage sum includes
-    /// the integral of the speed sum.
+    /// Sums of the corrections since shortly before the cable count stopped changing, m and m/s. The chainage sum
+    /// includes the integral of the speed sum.
     sums: [f64; 2],
     /// Standard deviations of the sums of corrections, as predicted by the filter's covariance, m and m/s.
     by_chance: [f64; 2],

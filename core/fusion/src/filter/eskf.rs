@@ -61,7 +61,7 @@ pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
 const SMOOTH: f64 = 4.0;
 /// Largest ratio of a counter's step to its noise at which the rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
-/// Time after its start in which an estimate settles. Its yaw then becomes certain.
+/// Maximum time for which an estimate settles after its start. While it settles, its yaw becomes more certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Standard deviation of yaw at which an estimate counts as settled, radians.
 ///
