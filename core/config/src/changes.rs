@@ -1,4 +1,4 @@
-//! Overrides of values in a TOML text, for instance the values of a vehicle file that a scene changes.
+//! Overrides of values in a TOML text. For instance, a scene changes values of a vehicle file.
 
 use core::ops::Range;
 
@@ -17,10 +17,10 @@ const ID: &str = "id";
 ///
 /// - `heads.layout = "x"` changes a key of a table.
 /// - `sensors.ID.key` changes a key of the table with this id in an array of tables.
-/// - `sensors.all.key` changes the key in every table of the array in which the key is present.
-/// - An array that is missing from `text`, such as `openings = [{ .. }]`, is added at the start.
+/// - `sensors.all.key` changes the key in each table of the array that has it.
+/// - An inline array that is missing from `text`, such as `openings = [{ .. }]`, is added at the start.
 ///
-/// Errors: `text` is not TOML, or a key in `changes` is missing from `text` and is no such array.
+/// Errors: `text` is not TOML. Or a key in `changes` is missing from `text` and cannot be added.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
     let mut changed = String::new();
@@ -49,7 +49,7 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
     Ok(changed)
 }
 
-/// Whether a value is an inline array. Tables under `[[headers]]` are not inline arrays, and cannot be moved.
+/// Whether a value is an inline array. Tables under `[[headers]]` are not, and cannot be added at the start.
 fn is_array(value: &str) -> bool {
     value.starts_with('[') && !value.starts_with("[[")
 }

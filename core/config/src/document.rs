@@ -5,8 +5,8 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
-/// Maximum length of a TOML text, bytes: about a hundred times the length of a long vehicle file. The limit is needed
-/// because parsing takes many times the text's length in memory.
+/// Maximum length of a TOML text, bytes. A limit is needed because parsing takes many times the text's length in
+/// memory. A long vehicle file has about a hundredth of this length.
 const MAX_TEXT_BYTES: usize = 1 << 20;
 
 /// A TOML text and its file name.
@@ -17,7 +17,7 @@ pub struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Creates a document; error messages call its file `file`.
+    /// Creates a document. `file` is the file's name in error messages.
     pub fn new(file: &'a str, text: &'a str) -> Self {
         Self { file, text }
     }

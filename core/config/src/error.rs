@@ -31,15 +31,15 @@ impl ConfigError {
     }
 }
 
-/// All errors of a file, in the order of its lines; at least one.
+/// All errors of a file, at least one, in the order of its lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConfigErrors(Vec<ConfigError>);
 
 impl ConfigErrors {
-    /// Sorts the errors by line and removes duplicates; `None` if there are no errors.
+    /// Sorts the errors by line and removes duplicates. `None` if there are no errors.
     pub(super) fn of(mut errors: Vec<ConfigError>) -> Option<Self> {
-        // The sort is stable: errors of one line stay in the order of discovery. If the errors come from several files,
-        // they are not sorted.
+        // The sort is stable, so errors of one line stay in the order of discovery. Errors of several files are not
+        // sorted.
         let file = errors.first()?.file.clone();
         if errors.iter().all(|error| error.file == file) {
             errors.sort_by_key(|error| error.line);
@@ -92,11 +92,10 @@ impl fmt::Display for ConfigErrors {
 
 impl std::error::Error for ConfigErrors {}
 
-/// Maximum number of reported errors of a file. A file that is not TOML may have an error in each line, and nobody
-/// reads so many.
+/// Maximum number of reported errors of a file. A file that is not TOML may have an error in each line.
 pub(super) const MOST_ERRORS: usize = 100;
 
-/// Errors found so far in one document; `None` if reading stops at the first error.
+/// Errors found so far in one document. `None` if reading stops at the first error.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Notes(Option<Rc<RefCell<Vec<ConfigError>>>>);
 
@@ -124,7 +123,7 @@ impl Notes {
         self.0.as_ref()?.borrow().iter().find(|error| is_so(error)).cloned()
     }
 
-    /// Whether more errors were found than are reported at most.
+    /// Whether more errors were found than will be reported.
     pub(super) fn are_enough(&self) -> bool {
         self.count() > MOST_ERRORS
     }

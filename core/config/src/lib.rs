@@ -1,7 +1,7 @@
-//! TOML files that people write: typed access whose errors name the file, line, key, value and allowed values.
+//! Typed access to TOML files that people write. Errors name the file, line, key, value and allowed values.
 //!
-//! The caller reads the file itself. [`Section::finish`] reports unread keys as errors. [`Document::read`] finds
-//! all errors of a file in one pass; [`Document::root`] stops at the first.
+//! The caller reads the file's text. [`Section::finish`] reports unread keys as errors. [`Document::read`] finds all
+//! errors of a file in one pass; [`Document::root`] stops at the first.
 //!
 //! ```
 //! use headrace_config::Document;

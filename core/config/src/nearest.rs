@@ -1,13 +1,13 @@
 //! Search for the known word that the author of a file may have intended.
 
-/// Maximum number of edits between a word and the intended word: `MORE` if the word has at least `LONG` letters, else
-/// `FEW`.
+/// Maximum number of edits between a word and the known word that may have been intended: `MORE` if both words have at
+/// least `LONG` letters, else `FEW`.
 const FEW: usize = 1;
 const MORE: usize = 2;
 const LONG: usize = 6;
 
-/// Returns the known word nearest to `word`; `None` if no known word is near. If several words are equally near,
-/// returns the first.
+/// Returns the known word nearest to `word`. If several are equally near, returns the first. `None` if no known word is
+/// near.
 pub(super) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
     let near = |candidate: &&str| {
         if stem(word) == stem(candidate) {

@@ -7,12 +7,12 @@ use std::borrow::Cow;
 
 /// Returns a text as one visible line. A JSON text remains valid JSON.
 ///
-/// JSON escapes replace control characters, line ends, and characters that reverse or hide other characters.
+/// Control characters, line ends, and characters that reverse or hide others are replaced by JSON escapes.
 pub fn one_line(text: &str) -> Cow<'_, str> {
     escaped(text, acts)
 }
 
-/// Returns a text of several lines with each line sanitised as by [`one_line`]; line ends are kept.
+/// Returns a text with each of its lines sanitised as by [`one_line`]. Line ends are kept.
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c != '\n' && acts(c))
 }
@@ -22,7 +22,7 @@ pub fn is_plain(text: &str) -> bool {
     !text.contains(acts)
 }
 
-/// Whether a character acts on the terminal or the text layout instead of being displayed.
+/// Whether a character changes the terminal or the text layout instead of being displayed.
 ///
 /// Source: Unicode 16, categories Cc, Zl and Zp; Bidi_Control; and the invisible characters of Cf.
 fn acts(c: char) -> bool {

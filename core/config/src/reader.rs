@@ -11,10 +11,10 @@ use super::error::{ConfigError, ConfigErrors, MOST_ERRORS, Notes};
 use super::nearest::nearest;
 use super::plain::is_plain;
 
-/// Function that reads a file whose name is the value of a key, for instance a polyline profile or a DBC file.
+/// Function that returns the text of a file named by a key, for instance a polyline profile or a DBC file.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 
-/// Maximum number of tables in an array. The number is limited because each table is compared with all others.
+/// Maximum number of tables in an array. A limit is needed because each table is compared with all others.
 const MOST_TABLES: usize = 2000;
 
 /// A file whose name is the value of a key.
@@ -26,7 +26,7 @@ pub struct NamedFile {
     pub text: String,
 }
 
-/// Loader of the files referenced by keys, if any.
+/// Loader of the files that keys refer to. `None` if keys may not refer to files.
 #[derive(Clone, Copy)]
 struct Files<'a>(Option<Loader<'a>>);
 
@@ -39,7 +39,7 @@ impl core::fmt::Debug for Files<'_> {
 /// Key path of a value, text of the value, and a constructor for errors about the value.
 pub(super) type Leaf<'s> = (Vec<String>, &'s str, Box<dyn Fn(&str) -> ConfigError + 's>);
 
-/// One table of a document. [`Section::finish`] reports keys that were never read.
+/// One table of a document. [`Section::finish`] reports the keys that were never read.
 #[derive(Debug)]
 pub struct Section<'a> {
     document: Document<'a>,
@@ -59,10 +59,10 @@ impl<'a> Document<'a> {
         Ok(Section::of_root(self, self.table()?, Notes::default()))
     }
 
-    /// Reads the whole TOML text by calling `read`, and finds all errors in the text.
+    /// Reads the whole TOML text by calling `read`, and finds all of its errors.
     ///
-    /// The table and its subtables note each error, and reading continues as if the wrong key were absent. Keys that
-    /// were never read are also errors.
+    /// The table and its subtables note each error. Reading continues as if the key with the error were absent. Keys
+    /// that were never read are errors too.
     ///
     /// Errors: all noted errors, and the error that `read` returned.
     pub fn read<T>(
@@ -71,10 +71,9 @@ impl<'a> Document<'a> {
     ) -> Result<T, ConfigErrors> {
         self.is_short()?;
         let (table, broken) = DeTable::parse_recoverable(self.text);
-        // Only the first syntax error of a line is reported, because further errors on the same line follow from the
-        // first.
-        let reported = broken.iter().take(2 * MOST_ERRORS);
-        let mut broken: Vec<ConfigError> = reported.map(|error| self.broken(error)).collect();
+        // Only the first syntax error of a line is reported, because it causes the others on this line.
+        let told = broken.iter().take(2 * MOST_ERRORS);
+        let mut broken: Vec<ConfigError> = told.map(|error| self.broken(error)).collect();
         broken.dedup_by_key(|error| error.line);
         if let Some(errors) = ConfigErrors::of(broken) {
             return Err(errors);
@@ -101,14 +100,13 @@ impl<'a> Section<'a> {
         Self { document, path, at: 0, table, asked, files: Files(None), notes }
     }
 
-    /// Allows keys of this table and its subtables to refer to files. `load` reads such a file.
+    /// Allows keys of this table and its subtables to refer to files, which `load` reads.
     #[must_use]
     pub fn with_files(self, load: Loader<'a>) -> Self {
         Self { files: Files(Some(load)), ..self }
     }
 
-    /// Returns the name and text of the file referenced by a key. Logs contain the files referenced by a vehicle
-    /// file.
+    /// Returns the name and text of the file that a key refers to. A log contains the files of its vehicle file.
     ///
     /// Errors: the value is not a string, or the file cannot be read.
     pub fn named_file(&self, key: &'static str) -> Result<Option<NamedFile>, ConfigError> {
@@ -176,7 +174,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads one of the given words and returns the value associated with it.
+    /// Reads one of the words in `among`, and returns the value that belongs to it.
     ///
     /// Errors: the value is none of these words; the message lists them.
     pub fn choice<T: Copy>(&self, key: &'static str, among: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
@@ -225,8 +223,8 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads a number or an array of numbers, each within `allowed`; `wanted` describes the allowed values in
-    /// errors.
+    /// Reads a number or an array of numbers, each within `allowed`. Error messages contain `wanted`, a description of
+    /// the allowed values.
     ///
     /// Errors: the value is neither a number nor an array of numbers, or a number is outside `allowed`.
     pub fn number_or_numbers(
@@ -254,7 +252,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Reads the tables of an array of tables; returns no tables if the key is absent.
+    /// Reads the tables of an array of tables. Returns none if the key is absent.
     ///
     /// Errors: the value is not an array of tables, or it has too many tables.
     pub fn sections(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
@@ -278,7 +276,7 @@ impl<'a> Section<'a> {
         Ok(self.wrong(key, Some(value), problem)?.unwrap_or_default())
     }
 
-    /// Reads one table or an array of tables; returns no tables if the key is absent.
+    /// Reads one table or an array of tables. Returns none if the key is absent.
     ///
     /// Errors: the value is neither a table nor an array of tables, or it has too many tables.
     pub fn tables(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
@@ -298,7 +296,8 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Returns `value`, or an error that the key is missing. If an unread key has a similar name, the error names it.
+    /// Returns `value`, or an error that the key is missing. If an unread key has a similar name, the error suggests
+    /// that this key is meant.
     ///
     /// Errors: `value` is `None`.
     pub fn required<T>(&self, key: &'static str, value: Option<T>) -> Result<T, ConfigError> {
@@ -310,7 +309,7 @@ impl<'a> Section<'a> {
         let is_below = |error: &ConfigError| {
             error.key.strip_prefix(&name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
-        // The key is present, but its value is wrong. The error about this value was already noted, and is returned.
+        // The key is present, but its value is wrong. The error about it was already noted, and is returned again.
         if let Some(wrong) = self.noted(|error| self.table.contains_key(key) && is_below(error)) {
             return wrong;
         }
@@ -329,7 +328,7 @@ impl<'a> Section<'a> {
         Some(self.noting(self.unknown(other, &[key])))
     }
 
-    /// Reads a part of the file; `None` if the part has errors. These errors are noted, and reading continues.
+    /// Reads a part of the file. `None` if the part has errors; these are noted, and reading continues.
     ///
     /// Errors: the error of the part, if errors are not collected.
     pub fn part<T>(&self, read: impl FnOnce() -> Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
@@ -338,8 +337,7 @@ impl<'a> Section<'a> {
         Ok(part.filter(|_| self.notes.count() == before))
     }
 
-    /// Returns the value of `result`. If `result` is an error and errors are collected, notes the error and returns
-    /// `None`.
+    /// Returns the value of `result`. If `result` is an error and errors are collected, notes it and returns `None`.
     fn go_on<T>(&self, result: Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
         match result {
             Ok(result) => Ok(Some(result)),
@@ -364,7 +362,7 @@ impl<'a> Section<'a> {
                 break;
             }
             let name = self.full(key.get_ref());
-            // An error about this key may already be noted, because its name is similar to that of a missing key.
+            // A similar key may be missing. Then an error about this key is already noted.
             if self.noted(|error| error.key == name).is_none() {
                 self.go_on::<()>(Err(self.unknown(key, &asked)))?;
             }
@@ -388,9 +386,9 @@ impl<'a> Section<'a> {
 
     /// Returns an error about `key` in this table, for checks that only the caller can make.
     ///
-    /// The new error may be a mere consequence of an earlier error. If an error about the same key was already noted,
-    /// that error is returned instead. If the key is absent from a table below the root, the function returns a noted
-    /// error of that table, or an error about a key with a similar name.
+    /// The problem may be a mere consequence of an error that was already noted. If an error about the same key was
+    /// noted, returns that error instead. If the key is absent from a table below the root, returns a noted error of
+    /// that table, or an error about a key with a similar name, if there is one.
     pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
         let (name, value) = (self.full(key), self.table.get(key));
         let is_below = value.is_none() && !self.path.is_empty();
@@ -399,7 +397,7 @@ impl<'a> Section<'a> {
         follows.or_else(misnamed).unwrap_or_else(|| self.noting(self.error(key, value, problem.to_owned())))
     }
 
-    /// Returns an error about this table as a whole; if an error about one of its keys was noted, returns that error
+    /// Returns an error about this table as a whole. If an error about one of its keys was noted, returns that error
     /// instead.
     pub fn invalid_itself(&self, problem: &str) -> ConfigError {
         let error = || ConfigError {
@@ -412,7 +410,7 @@ impl<'a> Section<'a> {
         self.noted(|noted| self.is_of(noted)).unwrap_or_else(|| self.noting(error()))
     }
 
-    /// Whether an error concerns a key of this table.
+    /// Whether an error concerns a key directly in this table.
     fn is_of(&self, error: &ConfigError) -> bool {
         let key = if self.path.is_empty() {
             Some(error.key.as_str())
@@ -433,8 +431,8 @@ impl<'a> Section<'a> {
         error
     }
 
-    /// If errors are collected, notes an error about a wrong value and returns `None`, as for an absent key. Otherwise
-    /// returns the error.
+    /// Handles a wrong value. If errors are collected, notes an error and returns `None`, as for an absent key.
+    /// Otherwise returns the error.
     fn wrong<T>(
         &self,
         key: &str,
@@ -456,7 +454,8 @@ impl<'a> Section<'a> {
         keys.into_iter().map(|key| key.get_ref().as_ref()).collect()
     }
 
-    /// Returns all values in this table and its subtables, each with its path, its text and an error constructor.
+    /// Returns all values in this table and its subtables. Each comes with its path, its text, and a constructor for
+    /// errors about it.
     pub(super) fn leaves(&self) -> Vec<Leaf<'_>> {
         let mut leaves = Vec::new();
         self.collect_leaves(&self.table, &[], &mut leaves);

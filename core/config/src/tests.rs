@@ -74,7 +74,7 @@ fn all_errors_are_found_in_one_pass() {
         for part in root.sections("parts")? {
             root.part(|| {
                 let id = part.text("id")?;
-                // An error that may be a mere consequence of an earlier error is not reported.
+                // An error about the absent value is not reported if it follows from an earlier error.
                 part.number("rate_hz", 1.0..=9.0)?.ok_or_else(|| part.invalid("rate_hz", "is needed"))?;
                 part.required("id", id)
             })?;

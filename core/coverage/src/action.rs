@@ -9,29 +9,30 @@ use super::cause::Cause;
 pub enum Action {
     /// Drive slower.
     Slower,
-    /// Use a scan mode with a finer angular step, since a lower speed does not help.
+    /// Use a scan mode with a finer angular step, because a lower speed does not help.
     FinerMode,
     /// Set a longer range on the heads.
     LongerRange,
     /// Roll the vehicle so that it occludes another part of the wall.
     ///
-    /// Turning the vehicle round does not help: the vehicle then occludes the same part.
+    /// Turning the vehicle round does not help, because it then occludes the same part.
     OtherSide,
     /// Stay centred in the tunnel, with a steady heading.
     Middle,
     /// Restart the heads in phase.
     InPhase,
-    /// Repair the stalled head, or drive slower without that head.
+    /// Repair the stalled head, or drive slower without it.
     Head,
-    /// Get the silent heads pinging again.
+    /// Make the silent heads ping again.
     HeadBack,
     /// Restore the position fix first.
     Position,
     /// Raise the sonar gain.
     ///
-    /// The losses are so many, or so persistent on the same wall, that a lower speed does not help.
+    /// A lower speed does not help, because too many returns are lost or the same wall loses its returns again and
+    /// again.
     HigherGain,
-    /// Change nothing: pass the stretch again from end to end.
+    /// Change nothing. Pass the stretch again from end to end.
     Again,
 }
 
@@ -53,7 +54,7 @@ impl Action {
 
     /// Actions against several causes, in the order of the causes and without duplicates.
     ///
-    /// `is_beyond_speed` means that so many returns are missing that no speed makes up for them.
+    /// `is_beyond_speed` means that too many returns are missing for any speed to make up for them.
     pub fn against(causes: impl IntoIterator<Item = Cause>, is_beyond_speed: bool) -> Vec<Self> {
         let mut actions: Vec<Self> = Vec::new();
         for cause in causes {

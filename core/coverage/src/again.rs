@@ -7,15 +7,15 @@ use super::cause::{Cause, Causes};
 /// Speed for passing a missed stretch again, and whether a lower speed helps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Again {
-    /// Largest speed that meets the target in all sections in which some speed meets it, m/s.
+    /// Largest speed that meets the target in all sections in which any speed meets it, m/s.
     ///
-    /// Zero if more than half of the sections have no speed that meets the target.
+    /// Zero if no speed meets the target in more than half of the sections.
     pub at_most_mps: f64,
-    /// Whether at least a tenth of the sections lose so many returns that no speed makes up for them.
+    /// Whether at least a tenth of the sections lose too many returns for any speed to make up for them.
     pub is_beyond_speed: bool,
 }
 
-/// A remedy is advised for a missed stretch if at least one in `NAMED_OF` of its failed sections needs the remedy.
+/// Reciprocal of a share of a missed stretch's failed sections. A remedy is advised if at least this share needs it.
 pub(super) const NAMED_OF: u32 = 10;
 
 /// Causes and required speed of a failed section.
@@ -23,17 +23,17 @@ pub(super) const NAMED_OF: u32 = 10;
 pub struct Failing {
     /// Causes of the section's fail.
     pub causes: Causes,
-    /// Speed that meets the target in the section, m/s; zero if no speed does.
+    /// Speed that meets the target in the section, m/s. Zero if no speed does.
     pub again_mps: f64,
 }
 
 /// Counts of failed sections by remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
-    /// Number of sections in which some speed meets the target, and the lowest of these sections' speeds, m/s.
+    /// Number of sections in which some speed meets the target (`mended`), and the lowest of their speeds, m/s.
     mended: u32,
     least_mps: f64,
-    /// Number of sections that lose so many returns that no speed makes up for the losses.
+    /// Number of sections that lose too many returns for any speed to make up for them.
     beyond: u32,
 }
 
@@ -68,8 +68,8 @@ impl Tally {
 
     /// Removes a section from the counts.
     ///
-    /// Returns true if the section may have been the only one with the lowest speed. The caller must then find the
-    /// lowest speed again.
+    /// Returns true if it may have been the only section with the lowest speed. The caller must then find the lowest
+    /// speed of the other sections.
     pub(super) fn remove(&mut self, section: &Failing) -> bool {
         let is_counted =
             self.mended >= section.is_mended().into() && self.beyond >= section.is_beyond().into();
@@ -79,12 +79,12 @@ impl Tally {
         section.is_mended() && section.again_mps <= self.least_mps
     }
 
-    /// Whether these counts are possible for a missed stretch with `failed` failed sections.
+    /// Whether these counts can be those of a missed stretch with `failed` failed sections.
     pub(super) fn is_of(&self, failed: u32) -> bool {
         self.mended.checked_add(self.beyond).is_some_and(|counted| counted <= failed)
     }
 
-    /// Whether the section's speed is the lowest of the counted speeds.
+    /// Whether the section's speed is the lowest one counted, or lower.
     pub(super) fn is_least(&self, section: &Failing) -> bool {
         section.is_mended() && section.again_mps <= self.least_mps
     }
@@ -99,7 +99,7 @@ impl Tally {
         self.beyond += other.beyond;
     }
 
-    /// Advice for passing all counted sections again; `failed` is their number.
+    /// Advice for passing all counted sections again. `failed` is the number of failed sections.
     pub(super) fn again(&self, failed: u32) -> Again {
         Again {
             at_most_mps: if self.mended > 0 && 2 * self.mended >= failed { self.least_mps } else { 0.0 },
@@ -131,11 +131,11 @@ mod tests {
         let lost = section(Cause::MissingReturns, 0.0);
         assert_eq!(again(&[fast[0], lost]), Again { at_most_mps: 0.12, is_beyond_speed: true });
         assert_eq!(again(&[fast[0], lost, lost]), Again { at_most_mps: 0.0, is_beyond_speed: true });
-        // In a scan mode in which no speed meets the target, the angular step is the cause, and not the
-        // missing returns.
+        // If no speed meets the target in the present scan mode, the angular step is the cause, not the missing
+        // returns.
         let coarse = section(Cause::AngularStep, 0.0);
         assert_eq!(again(&[coarse; 3]), Again::default());
-        // One section of twelve is too few for a remedy to be advised.
+        // One section of twelve is less than a tenth, so no remedy is advised for it.
         let mut many = [fast[1]; 12];
         many[3] = lost;
         assert_eq!(again(&many), Again { at_most_mps: 0.1, is_beyond_speed: false });

@@ -14,14 +14,13 @@ pub enum Cause {
     AngularStep,
     /// The wall was farther than the heads' range setting.
     OutOfRange,
-    /// The vehicle was off-centre, or it turned and its beams swung along the tunnel.
+    /// The vehicle was off-centre, or its turning swung the beams along the tunnel.
     OffAxis,
-    /// The heads' passes were unevenly spread in time. With all heads at their scheduled angles, the section would
-    /// have passed.
+    /// The heads' passes were unevenly spread in time. With all heads at their scheduled angles, the section passes.
     Phase,
     /// The hole extends beyond the stretch that all live heads have swept.
     NotPassed,
-    /// A head passed through the section without pinging.
+    /// A head passed through the section without pinging, or without an accepted return.
     HeadSilent,
     /// A head was stalled, or has been out of phase since a stall.
     HeadStalled,
@@ -36,9 +35,9 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All causes. Causes that the pilot can change come first.
+    /// All causes. Those that the pilot can change come first.
     ///
-    /// If two causes explain a hole equally well, the first in this order is named.
+    /// If two causes explain a hole equally well, the first one in this order is named.
     pub const ALL: [Self; 12] = [
         Self::TooFast,
         Self::AngularStep,
@@ -158,7 +157,7 @@ impl FromIterator<Cause> for Causes {
     }
 }
 
-/// Serialises as a list of words in text formats such as JSON, and as bits in snapshots.
+/// Serialises the set as a list of words in text formats such as JSON, and as bits in snapshots.
 impl Serialize for Causes {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         if serializer.is_human_readable() {

@@ -10,15 +10,15 @@ pub struct Deviation {
     samples: u32,
     /// Number of samples that deviate by more than the contradiction limit.
     contradicting: u32,
-    /// Number of contradicting samples at which another head has found the same wall.
+    /// Number of contradicting samples that confirm the wall which another head has found.
     confirming: u32,
     sum_m: f64,
     /// Largest inward deviation, m; never above zero.
     inmost_m: f64,
     /// Largest outward deviation, m; never below zero.
     outmost_m: f64,
-    /// Area between the reference point and the wall as sampled, m2, and the area of the design profile over the
-    /// same angles, m2.
+    /// Area between the reference point and the sampled wall (`swept_m2`), and area of the design profile over the same
+    /// angles, m2.
     swept_m2: f64,
     design_m2: f64,
 }
@@ -26,9 +26,9 @@ pub struct Deviation {
 impl Deviation {
     /// Adds a sample at `point` with arc length `arc_m`.
     ///
-    /// `before` is the previous sample of the same head, one step earlier, with its arc length. Deviation and arc
-    /// length are both measured along the ray from the profile's reference point. `is_confirming` means that another
-    /// head has found wall with the same deviation at the same place.
+    /// `before` is the same head's sample one step earlier, with its arc length. Deviation and arc length are both
+    /// measured along the ray from the profile's reference point. `is_confirming` means that another head has found
+    /// wall with the same deviation at the same place.
     pub fn add(
         &mut self,
         profile: &Profile,
@@ -79,11 +79,11 @@ impl Deviation {
         (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
     }
 
-    /// Whether most samples deviate from the design by more than the contradiction limit, and no other head has found
-    /// the same wall.
+    /// Whether most samples deviate from the design by more than the contradiction limit, and no other head confirms
+    /// them.
     ///
-    /// In that case, the profile, the position or the head may be wrong. A confirming sample counts for two samples:
-    /// for itself, and for the earlier sample that it confirms.
+    /// Then the profile, the position or the head may be wrong. A confirming sample counts for two: for itself, and for
+    /// the earlier sample that it confirms.
     pub fn contradicts(&self) -> bool {
         2 * self.contradicting.saturating_sub(2 * self.confirming) > self.samples
     }
@@ -112,7 +112,7 @@ mod tests {
     use headrace_geometry::math::{self, TAU};
     use headrace_geometry::tunnel::shapes;
 
-    /// One turn of `samples` samples at radius `true_m` about the reference point of a circle of 3 m radius.
+    /// Deviations of one turn of `samples` samples at radius `true_m`. The design is a circle with a radius of 3 m.
     fn turned(true_m: f64, samples: u32) -> Deviation {
         let profile = shapes::circle(3.0).unwrap();
         let [y, z] = profile.reference();

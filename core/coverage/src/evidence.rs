@@ -8,24 +8,24 @@ use headrace_sampling::head::HeadSet;
 
 /// Causes of a fail, and the figures behind them.
 ///
-/// The counts are sums over the sections within the distance T of the hole, where T is the target. The driving
-/// figures come from the same sections, at the moment with the largest distance between passes.
+/// T is the target. Counts are sums over the sections within the distance T of the hole. Driving figures come from the
+/// same sections, at the moment with the largest distance between passes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Main cause: the first cause in `causes`.
     pub cause: Cause,
-    /// Smallest set of causes without which the section would have passed, with the main cause first.
+    /// Smallest set of causes without which the section would have passed. The main cause comes first.
     pub causes: Causes,
     /// Speed of the vehicle along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Largest speed that would have met the target from the tunnel's centre, m/s.
+    /// Largest speed that would have met the target from the tunnel's centre, m/s. Zero if no speed does.
     ///
-    /// All heads are assumed to turn as scheduled. The value is the planned speed if the planned speed meets the
-    /// target, and zero if no speed does.
+    /// All heads are assumed to turn as scheduled. If the planned speed meets the target, the value is the planned
+    /// speed.
     pub fits_mps: f64,
-    /// Largest speed that would have met the target despite lost returns, m/s; never above `fits_mps`.
+    /// Largest speed that would have met the target despite lost returns, m/s. It is never above `fits_mps`.
     ///
-    /// The speed leaves time for the additional passes that replace lost returns.
+    /// It leaves time for the additional passes that replace lost returns.
     pub with_losses_mps: f64,
     /// Longest time between passes of heads over the same wall, seconds.
     pub pass_gap_s: f64,
@@ -33,21 +33,21 @@ pub struct Evidence {
     pub even_pass_gap_s: f64,
     /// Longest time between passes over the same wall if all heads had been turning and evenly spread, seconds.
     pub all_pass_gap_s: f64,
-    /// Share of pings without a return, including pings whose wall was out of range.
+    /// Share of pings without a return. It includes pings at wall that was out of range.
     pub missing_share: f64,
     /// Share of pings at which the vehicle occluded the beam.
     pub occluded_share: f64,
     /// Share of pings that a stalled head made.
     pub standing_share: f64,
-    /// Number of samples missing in the hole, for any reason: a ping gave no sample, or no ping was made.
+    /// Number of samples missing in the hole, because a ping gave no sample or was not made.
     pub lost_in_hole: u32,
-    /// Largest step along the perimeter between neighbouring samples of one turn of a head, m.
+    /// Largest step along the perimeter between neighbouring samples of a head's turn, m.
     pub t_y_m: f64,
-    /// Largest step along the perimeter predicted for a level vehicle in the centre of the tunnel, m.
+    /// Prediction of `t_y_m` for a level vehicle in the centre of the tunnel, m.
     pub middle_t_y_m: f64,
     /// Distance by which the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
-    /// Numbers of the heads that passed through the sections without pinging.
+    /// Numbers of the heads that passed through the sections without pinging, or without an accepted return.
     #[serde(with = "head_numbers")]
     pub silent_heads: HeadSet,
 }
@@ -68,9 +68,7 @@ impl Evidence {
     }
 }
 
-/// Serialises a set of heads in evidence.
-///
-/// The set becomes a list of numbers in text formats such as JSON, and bits in snapshots.
+/// Serialises a set of heads as a list of numbers in text formats such as JSON, and as bits in snapshots.
 mod head_numbers {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -1,7 +1,7 @@
 //! Explains a fail by the smallest set of factors without which the hole would have met the target.
 //!
-//! The geometry shows how large the hole would be without a factor. Samples that are missing because of the factor
-//! are put back. If the factor moved passes or steps apart, the wall is compressed by the same ratio.
+//! For each factor, the geometry shows how large the hole would be without it. Samples that are missing because of the
+//! factor are put back. If the factor moved passes or steps apart, the wall is compressed by the same ratio.
 //! `docs/why/coverage.md` states the order of the factors and the reasons for it.
 
 mod case;
@@ -23,33 +23,30 @@ use trial::Trial;
 pub use case::Case;
 use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 
-/// Speed counts as a factor if the spacing T exceeds this multiple of the target, even if the vehicle kept to the
-/// planned speed.
+/// Speed is a factor if the spacing T exceeds this multiple of the target, even if the vehicle kept to the planned
+/// speed.
 ///
 /// T is the sample spacing at the driven speed with all heads at their scheduled angles. No hole is then larger than T.
 const WELL_OVER: f64 = 1.2;
 /// Ratio of the speed to the planned speed above which the vehicle did not follow the plan.
 const OVER_PLAN: f64 = 1.15;
-/// Ratio that replaces `WELL_OVER` and `OVER_PLAN` if there is no position.
+/// Replaces `WELL_OVER` and `OVER_PLAN` if there is no position.
 ///
-/// The speed then comes from the inertial unit alone, and is less accurate.
+/// The speed then comes only from the inertial unit, and is less accurate.
 const OVER_LOST: f64 = 1.4;
-/// Least ratio of the speed to the planned speed, and to the largest speed that meets the target, at which speed counts
-/// as a factor.
+/// Speed is a factor if it exceeds this multiple of the planned speed, and of the largest speed that meets the target.
 ///
 /// The ratio is just above the measurement error of the speed.
 const OVER_ALL: f64 = 1.03;
-/// Swing of the beams counts as a factor if, without swing, the distance between passes is below this share of the
-/// actual distance.
+/// Swing of the beams is a factor if, without it, passes are closer together than this share of their actual distance.
 ///
 /// The share is below 1 because even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
-/// A coarse angular step counts as a factor if the step along the wall, seen from the tunnel's centre,
-/// exceeds this share of the target.
+/// The angular step is a factor if it is longer on the wall than this share of the target, as seen from the tunnel's
+/// centre.
 const COARSE: f64 = 0.75;
 
-/// Determines the causes of a section's hole. `passages` come from all sections within the target T of this
-/// section.
+/// Determines the causes of a section's hole. `passages` are those of all sections within the target T of it.
 ///
 /// Allocates: never.
 pub fn explain<'a>(
@@ -71,7 +68,7 @@ pub fn explain<'a>(
     let is_lossy = causes.has(Cause::MissingReturns);
     let here =
         if is_lossy { sampled.passes_needed(iter::once(LossRate::independent(missing_share))) } else { 1.0 };
-    // If other causes contribute, lost returns need to explain only a hole as large as the target.
+    // If other causes contribute too, lost returns must explain only a hole as large as the target.
     let times = if causes.len() > 1 { 1.0 } else { WIDEST };
     let hole_m = case.hole.diameter_m.min(times * case.target_m);
     let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);
@@ -105,7 +102,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let around_m = f64::midpoint(hole.diameter_m.min(WIDEST * target_m), target_m);
     let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
     let near = |lack: &&MissingSample| {
-        // If the hole extends all round the wall, missing samples at any arc length count.
+        // The hole may extend all round the wall. Then missing samples at any arc length count.
         let off_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m).abs();
         off_m < hole.diameter_m + target_m
     };
@@ -125,7 +122,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
-    // Without a position, the measured speed is less reliable.
+    // The measured speed is less reliable without a position.
     let well_over = if is_lost { OVER_LOST } else { WELL_OVER };
     let over_planned = if is_lost { OVER_LOST } else { OVER_PLAN };
     let is_over_all = !is_lost
@@ -136,8 +133,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(over > well_over || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
-    // Above the planned speed, the passes of heads at different places along the hull may be evenly spread by
-    // chance.
+    // Above the planned speed, passes of heads at different places along the hull may be evenly spread by chance.
     let is_fast = drive.speed_mps > OVER_PLAN * drive.planned_mps;
     add(is_slow || is_uneven || is_fast && drive.all_gap_s < HELPS * drive.healthy_at_plan_s, Cause::Phase);
     let steady = Drive { swing_m: 0.0, ..*drive };

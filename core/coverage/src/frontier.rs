@@ -1,7 +1,7 @@
 //! Frontier: the stretch where samples may still land.
 //!
-//! The frontier decides when a section is open and when it is judged. The *reach of the heads* (in the code: zone)
-//! contains the sections on which samples of the awaited heads may land now, plus a margin.
+//! It decides when a section is open and when it is judged. The *reach of the heads* (in the code: zone) contains the
+//! sections on which samples of the awaited heads may land now, plus a margin.
 
 use core::ops::Range;
 
@@ -20,22 +20,21 @@ pub struct Reach {
     pub to_m: f64,
 }
 
-/// Reach of one head: the stretch where its samples land now, and the stretch that all its samples have
-/// covered so far.
+/// Reach of one head: the stretch where its samples land now, and the stretch that they have covered so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
     /// Receive time of the head's latest ping, with or without a fix; `None` before the first ping.
     heard: Option<MonoNs>,
     /// Reach at the head's latest ping with a fix.
     ///
-    /// For a silent head, this is the reach at the latest advice update with a fix.
+    /// For a silent head, it is the reach at the latest advice update with a fix.
     latest: Reach,
     /// Chainages that the head's reach has covered; `None` before the first ping with a fix.
     swept: Option<Reach>,
 }
 
 impl HeadReach {
-    /// Creates the reach after a ping with a fix at `now`; `before` is the reach before this ping.
+    /// Creates the reach after a ping with a fix at `now`. `before` is the reach before this ping.
     pub fn after(before: Option<Self>, now: MonoNs, reach: Reach) -> Self {
         debug_assert!(reach.is_ordered(), "a reach begins before it ends: {reach:?}");
         let swept = before.and_then(|before| before.swept).map_or(reach, |swept| swept.with(reach));
@@ -53,7 +52,7 @@ impl HeadReach {
 
     /// Records a ping without a fix.
     ///
-    /// The head is alive, and its reach is unchanged since the latest fix.
+    /// The head is alive. Its reach stays that of the latest fix.
     pub fn heard(&mut self, now: MonoNs) {
         self.heard = Some(now);
     }
@@ -74,18 +73,18 @@ fn is_within_silence(since: MonoNs, now: MonoNs) -> bool {
 
 /// Tracks the reach of all heads along the tunnel, and the coverage extent.
 ///
-/// The caller stores the reach of each head and passes it to the functions.
+/// The caller stores the reach of each head, and passes it to the methods.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Frontier {
     /// Chainages that the reach of any head has covered.
     swept: Option<Reach>,
     /// Coverage extent: chainages where the vehicle and its heads have been, and chainages with samples.
     ///
-    /// Heads count whether they ping or not.
+    /// It also contains the places of heads that do not ping.
     way: Option<Reach>,
-    /// Stretch where all heads, pinging or not, have been: the whole combined reach has moved across this stretch.
+    /// Stretch where all heads have been, whether they ping or not. All of their combined reach has moved across it.
     ///
-    /// The stretch is empty (`from_m` above `to_m`) until such a place exists.
+    /// It is empty (`from_m` above `to_m`) until all heads have passed the same wall.
     through: Option<Reach>,
     /// Zone: index range of the sections within reach of the awaited heads, plus a margin.
     ///
@@ -95,9 +94,9 @@ pub struct Frontier {
     zone_moved: Option<MonoNs>,
     /// Time of the latest ping of any head.
     heard: Option<MonoNs>,
-    /// Time of the latest ping that ended a silence of all heads, or of the first ping.
+    /// Time of the first ping, or of the latest ping that ended a silence of all heads.
     ///
-    /// Before the first ping, this is the time of the first advice update.
+    /// Before the first ping, it is the time of the first advice update.
     woken: Option<MonoNs>,
     course: Option<Course>,
     /// Number of times that the vehicle has turned back.
@@ -110,17 +109,17 @@ struct Course {
     /// Farthest chainage that the centre of the heads' combined reach has had on this course, m.
     farthest_m: f64,
     astern: bool,
-    /// Number of heads that make up the combined reach.
+    /// Number of heads in the combined reach.
     heads: usize,
 }
 
-/// Hysteresis for a reversal of the course, m. Yaw and tether slack cause smaller back-and-forth movements.
+/// Hysteresis for a reversal of the course, m. Yaw and slack of the tether cause smaller movements back and forth.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
     /// Updates the course with the centre of the combined reach of `heads` heads.
     ///
-    /// If the number of heads changes, the centre moves although the vehicle does not. The direction is then kept.
+    /// If the number of heads changes, the centre moves although the vehicle does not, so the direction is kept.
     fn to(self, middle_m: f64, heads: usize) -> Self {
         if heads != self.heads {
             return Self { farthest_m: middle_m, heads, ..self };
@@ -141,35 +140,34 @@ pub struct Outlook {
     pub at: MonoNs,
     /// Coverage extent: chainages where the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
-    /// Stretch that every awaited head has covered; `None` if empty. A head is awaited if its samples may still land.
-    /// Heads that never pinged are left out.
+    /// Stretch that every awaited head has covered; `None` if there is none. A head is awaited if its samples may still
+    /// land. Heads that never pinged are left out.
     pub swept_by_all: Option<Reach>,
-    /// Whether no head is alive: no head has pinged for longer than [`SILENT_AFTER`].
+    /// Whether no head is alive: none has pinged for longer than [`SILENT_AFTER`].
     pub none_alive: bool,
-    /// Stretch where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land if the vehicle does not turn back.
     pub to_come: Option<Reach>,
-    /// Stretch behind the place where the vehicle began or turned back. Some heads have not been in this stretch.
+    /// Stretch behind the place where the vehicle began or turned back, where some heads have not been.
     ///
-    /// On the present course, these heads will not reach the stretch.
+    /// These heads will not reach it on the present course.
     pub not_passed: Option<Reach>,
     /// Stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
     pub through: Option<Reach>,
-    /// Zone of the sections within reach of the heads, if it has been unchanged for longer than [`SILENT_AFTER`].
-    ///
-    /// The vehicle is then nearly stationary.
+    /// Zone of the sections within reach of the heads, if it has been unchanged for longer than [`SILENT_AFTER`]. The
+    /// vehicle is then nearly stationary.
     pub still_zone: Option<Range<i64>>,
 }
 
 /// Change of the frontier by one ping or one advice update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections behind the vehicle that have just left the zone.
+    /// Sections that have just left the zone behind the vehicle.
     pub left_behind: Range<i64>,
-    /// Sections ahead of the vehicle that have just left the zone, because the vehicle moves backwards.
+    /// Sections that have just left the zone ahead of the vehicle, because it moves backwards.
     pub left_ahead: Range<i64>,
     /// Whether the coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
-    /// Stretch where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land if the vehicle does not turn back.
     pub to_come: Option<Reach>,
 }
 
@@ -189,7 +187,7 @@ impl Frontier {
         self.turns
     }
 
-    /// Returns the outlook at `at`; `heads` are the reaches of all heads.
+    /// Returns the outlook at `at`. `heads` are the reaches of all heads.
     pub fn outlook(&self, heads: impl Iterator<Item = HeadReach> + Clone, at: MonoNs) -> Outlook {
         let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
         let swept = self.awaited(heads.clone(), at).filter_map(|head| head.swept);
@@ -207,13 +205,13 @@ impl Frontier {
 
     /// Returns the zone of sections within reach of the heads if the vehicle is nearly stationary.
     ///
-    /// `None` within [`SILENT_AFTER`] of the first ping, because the live heads are not known yet.
+    /// `None` within [`SILENT_AFTER`] of the first ping, because it is not known yet which heads are alive.
     fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
         let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT_AFTER.0);
         self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
     }
 
-    /// Whether a head has been silent for so long that no section waits for its samples while other heads ping.
+    /// Whether a head has been silent for so long that sections no longer wait for it while other heads ping.
     pub fn is_silent(&self, head: Option<&HeadReach>, now: MonoNs) -> bool {
         match head.and_then(|head| head.heard) {
             Some(heard) => !is_within_silence(heard, now),
@@ -221,16 +219,16 @@ impl Frontier {
         }
     }
 
-    /// Whether the live heads are not known yet.
+    /// Whether it is not known yet which heads are alive.
     ///
     /// True for [`SILENT_AFTER`] after the first ping, and after a ping that ended a silence of all heads.
     fn is_waking(&self, now: MonoNs) -> bool {
         self.woken.is_none_or(|woken| is_within_silence(woken, now))
     }
 
-    /// Returns the awaited heads: those whose samples may still land.
+    /// Returns the awaited heads, whose samples may still land.
     ///
-    /// All heads are awaited if none is alive, or while the live heads are not known yet.
+    /// All heads are awaited if none is alive, or if it is not known yet which heads are alive.
     fn awaited(
         &self,
         heads: impl Iterator<Item = HeadReach> + Clone,
@@ -245,9 +243,9 @@ impl Frontier {
         self.awaited(heads, now).map(|head| head.latest).reduce(Reach::with)
     }
 
-    /// Returns the stretch where samples may still land without the vehicle turning back.
+    /// Returns the stretch where samples may still land if the vehicle does not turn back.
     ///
-    /// The stretch contains the current reach and everything ahead.
+    /// It contains the current reach and everything ahead.
     fn to_come(&self, heads: impl Iterator<Item = HeadReach> + Clone, now: MonoNs) -> Option<Reach> {
         let reach = self.reach(heads, now)?;
         Some(match self.course {
@@ -256,7 +254,7 @@ impl Frontier {
         })
     }
 
-    /// Records the combined reach of all heads, pinging or not, at an advice update.
+    /// Records the combined reach of all heads at an advice update, whether they ping or not.
     pub fn pass(&mut self, all: Reach) {
         debug_assert!(all.is_ordered(), "a reach begins before it ends: {all:?}");
         let through = self.through.unwrap_or(Reach { from_m: all.to_m, to_m: all.from_m });
@@ -264,7 +262,7 @@ impl Frontier {
             Some(Reach { from_m: through.from_m.min(all.to_m), to_m: through.to_m.max(all.from_m) });
     }
 
-    /// Returns the stretch where all heads, pinging or not, have been; `None` while there is no such stretch.
+    /// Returns the stretch where all heads have been, whether they ping or not. `None` while there is none.
     pub fn through(&self) -> Option<Reach> {
         self.through.filter(|through| through.from_m <= through.to_m)
     }
@@ -287,8 +285,8 @@ impl Frontier {
 
     /// Updates the frontier for a ping at `now` with reach `pinged`.
     ///
-    /// `heads` are the reaches of all heads, including the head that pinged. A section leaves the zone once it is
-    /// farther than `margin_m` from the reach of every awaited head.
+    /// `heads` are the reaches of all heads, including that of the head that pinged. A section leaves the zone once it
+    /// is farther than `margin_m` from the reach of every awaited head.
     pub fn advance(
         &mut self,
         pinged: Reach,
@@ -304,11 +302,11 @@ impl Frontier {
         self.move_zone(heads, now, section_m, margin_m)
     }
 
-    /// Updates the frontier for an advice update at `now`. `span` covers the vehicle and its heads, pinging
+    /// Updates the frontier for an advice update at `now`. `span` covers the vehicle and its heads, whether they ping
     /// or not.
     ///
-    /// `heads` are the reaches of all heads; silent heads are at the places where they would ping. While a
-    /// head is alive, only pings move the zone.
+    /// `heads` are the reaches of all heads; that of a silent head is where it would ping. While a head is alive, only
+    /// pings move the zone.
     pub fn beat(
         &mut self,
         span: Reach,
@@ -336,7 +334,7 @@ impl Frontier {
         Moved { way_grown, ..moved }
     }
 
-    /// Whether the chainages that the heads' reaches have covered are part of the coverage extent.
+    /// Whether the coverage extent contains all chainages that the heads' reaches have covered.
     fn has_been_where_it_swept(&self) -> bool {
         self.swept.zip(self.way).is_some_and(|(swept, way)| swept.is_ordered() && way.with(swept) == way)
     }
@@ -380,8 +378,8 @@ impl Moved {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }
 
-    /// Whether nothing has changed since the previous ping or update: no section left the zone or joined the coverage
-    /// extent.
+    /// Whether nothing has changed since the previous ping or update: no section left the zone, and the coverage extent
+    /// has not grown.
     ///
     /// Also true if no head's place is known.
     pub fn is_nothing(&self) -> bool {
@@ -401,7 +399,7 @@ impl Reach {
         f64::midpoint(self.from_m, self.to_m)
     }
 
-    /// Returns the smallest stretch that covers two stretches.
+    /// Returns the smallest stretch that covers both stretches.
     #[must_use]
     pub fn with(self, other: Self) -> Self {
         Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
@@ -486,7 +484,8 @@ mod tests {
     impl Fixture {
         /// Updates the test frontier at the time `now_s`, seconds.
         ///
-        /// One head is half a metre in front of the vehicle, the other half a metre behind, whether they ping or not.
+        /// One head is half a metre in front of the vehicle, and the other half a metre behind it, whether they ping or
+        /// not.
         fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {
             let now = MonoNs(now_s * 1_000_000_000);
             let places = [x_m + 0.5, x_m - 0.5].map(|x_m| Reach { from_m: x_m, to_m: x_m });
@@ -531,7 +530,7 @@ mod tests {
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
         assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "the heads' silence isn't known yet");
-        // The rear head, if it pinged, would be at 6 m: a quarter of a metre past section [5.5, 5.75).
+        // If the rear head pinged, it would be at 6 m: a quarter of a metre past section [5.5, 5.75).
         assert_eq!(frontier.beat(3, 6.5).left_behind, 9..23);
         let to_come = frontier.to_come(MonoNs(3_000_000_000));
         assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));

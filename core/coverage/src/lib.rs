@@ -1,7 +1,7 @@
 //! Coverage: samples on the unrolled wall, the holes between them, and the verdict on each section.
 //!
-//! [`SampleStore`] keeps samples, [`HoleFinder`] finds the largest empty circle of a section, [`Sections`] turns holes
-//! into verdicts and flags, [`explain`] finds why a section failed, [`Runs`] joins flagged sections into missed
+//! [`SampleStore`] keeps samples. [`HoleFinder`] finds the largest empty circle of a section. [`Sections`] turns holes
+//! into verdicts and flags. [`explain`] finds why a section failed. [`Runs`] joins flagged sections into missed
 //! stretches.
 //!
 //! ```

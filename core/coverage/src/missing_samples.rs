@@ -1,18 +1,18 @@
-//! Missing samples: places where a ping would have left a sample, and the causes of each loss.
+//! Missing samples: places where a ping would have left a sample, and the causes of the loss.
 //!
-//! If the samples that a factor has cost are put back, the hole is as it would have been without this factor. Only the
-//! most recent missing samples are kept, because a fail is explained soon after the vehicle has left the section.
+//! To find the hole without a factor, the samples that are missing because of it are put back. Only the most recent
+//! missing samples are kept, because a fail is explained soon after the vehicle has left the section.
 
 use serde::{Deserialize, Serialize};
 
 use super::cause::{Cause, Causes};
 use headrace_geometry::snapshot::stateful;
 
-/// Maximum number of missing samples kept: the pings of four heads in five minutes without any return.
+/// Maximum number of missing samples kept. Four heads without any return fill the list in five minutes.
 const ROOM: usize = 1 << 16;
-/// Number of missing samples per block. Each block has one extent along the tunnel.
+/// Number of missing samples per block. For each block, its extent along the tunnel is stored.
 ///
-/// A search over a few metres skips the blocks whose extent lies elsewhere. The capacity is a multiple of this number.
+/// A search over a few metres skips the blocks whose extent is elsewhere. The capacity is a multiple of this number.
 const BLOCK: usize = 1 << 8;
 
 /// A missing sample: a place where a ping would have left a sample.
@@ -24,7 +24,7 @@ pub struct MissingSample {
     pub arc_m: f64,
     /// Number of the head that would have made the sample.
     pub head: u8,
-    /// Causes of the missing sample. The sample would exist only if all these causes had been absent.
+    /// Causes of the missing sample. It would exist only if all of them had been absent.
     pub why: Causes,
     /// Whether there was a doubtful return, which may be wall.
     pub may_be_wall: bool,
@@ -34,7 +34,7 @@ pub struct MissingSample {
 #[derive(Debug)]
 pub struct MissingSamples {
     ring: Vec<MissingSample>,
-    /// Least and greatest chainage in each block of the ring, m.
+    /// Smallest and largest chainage in each block of the ring, m.
     extents_m: Vec<[f64; 2]>,
     /// Position of the next entry in the ring buffer once it is full.
     next: u32,
@@ -43,7 +43,7 @@ pub struct MissingSamples {
 stateful!(MissingSamples { state: next; lists: ring, extents_m; });
 
 impl Default for MissingSamples {
-    /// Creates an empty list. Allocates: at startup, all that the list will ever use.
+    /// Creates an empty list. Allocates: at startup, all memory that the list will ever use.
     fn default() -> Self {
         Self { ring: Vec::with_capacity(ROOM), extents_m: Vec::with_capacity(ROOM / BLOCK), next: 0 }
     }
@@ -69,9 +69,9 @@ impl MissingSamples {
         );
     }
 
-    /// Extends a block's extent by the entry at this position of the ring buffer.
+    /// Extends a block's extent by the entry at position `at` of the ring buffer.
     ///
-    /// Once all entries of a block have been overwritten, only the new entries determine the extent.
+    /// Once all entries of the block have been overwritten, its extent is that of the new entries only.
     fn extend(&mut self, at: usize, x_m: f64) {
         let block = at / BLOCK;
         let wider_m = |[from_m, to_m]: [f64; 2], x_m: f64| [from_m.min(x_m), to_m.max(x_m)];
@@ -88,9 +88,9 @@ impl MissingSamples {
         }
     }
 
-    /// Reassigns up to `count` of a head's latest missing samples from one cause to another.
+    /// Changes the cause of up to `count` of a head's latest missing samples.
     ///
-    /// Returns the chainages between which these samples lie, m, if there are any.
+    /// Returns the chainages between which the changed samples lie, m, if there are any.
     ///
     /// Allocates: never.
     pub fn revise(&mut self, head: u8, count: usize, [from, to]: [Cause; 2]) -> Option<[f64; 2]> {
@@ -153,7 +153,7 @@ mod tests {
             });
         }
         let last = (ROOM + 99) as f64;
-        // Every second missing sample is of head 1. Every fifth of these is occluded, including the very last.
+        // Every second missing sample is of head 1. Every fifth of those is occluded, including the very last.
         assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
         let revised = |lack: &&MissingSample| lack.why == Causes::of(silent);
         let revised: Vec<MissingSample> =
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(lacks.revise(2, 8, [missing, silent]), None);
     }
 
-    /// A search by blocks finds the same samples as a full search, while the ring fills and while it is overwritten.
+    /// While the ring fills and while it is overwritten, a search by blocks finds the same samples as a full search.
     ///
     /// The vehicle drives to and fro over 90 m.
     #[test]

@@ -16,7 +16,7 @@ pub struct Opening {
     pub from_m: f64,
     /// Chainage of the opening's end, m.
     pub to_m: f64,
-    /// Arc length at which the opening begins, and the opening's length along the perimeter, m.
+    /// Arc length at which the opening begins, and its length along the perimeter, m.
     ///
     /// `None` for the whole perimeter.
     pub arc_m: Option<(f64, f64)>,
@@ -33,8 +33,8 @@ impl Opening {
         self.arc_m.map_or((0.0, perimeter_m), |(from_m, length_m)| (from_m, length_m.min(perimeter_m)))
     }
 
-    /// Returns the number of intervals between filling samples, along the tunnel and along the perimeter, for a given
-    /// spacing.
+    /// Returns the numbers of intervals between filling samples, along the tunnel and along the perimeter. They are at
+    /// most `spacing_m` long.
     fn counts(&self, perimeter_m: f64, spacing_m: f64) -> (i64, i64) {
         let over = |length_m: f64| (-math::floor_to_i64(-length_m / spacing_m)).max(1);
         (over(self.to_m - self.from_m), over(self.arc(perimeter_m).1))
@@ -46,7 +46,7 @@ impl Opening {
         (along + 1) * (around + 1)
     }
 
-    /// Fills the opening with samples, so that a hole extends into the opening by at most half the samples' spacing.
+    /// Fills the opening with samples, so that a hole reaches into it by at most half the samples' spacing.
     ///
     /// Errors: the store is full, or the opening lies outside the store's extent.
     pub fn fill(&self, store: &mut SampleStore, target: Target) -> Result<(), StoreError> {

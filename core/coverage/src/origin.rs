@@ -1,15 +1,15 @@
-//! Origin of a run of neighbouring returns that does not continue known wall: a feature of the wall, an object in the
-//! water (a fish, bubbles, silt), or an echo by a second path.
+//! Odds that a run is wall. A run consists of neighbouring returns that do not continue known wall. It comes from a
+//! feature of the wall, from an object in the water (a fish, bubbles, silt), or from an echo by a second path.
 //!
 //! A feature of the wall is about as high or deep as it is wide. An object is small, and at any distance from the wall.
-//! The size of a run therefore gives the odds that the run is wall. The odds grow when a later pass meets the same
-//! thing at the same place.
+//! So the size of a run shows how likely it is wall. It becomes more likely if a later pass meets the same thing at the
+//! same place.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Size of a run: neighbouring returns of a head that agree with each other.
+/// Size of a run. Its returns are neighbours, come from one head and agree with each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extent {
     /// Width of the run across the beams, m.
@@ -25,45 +25,45 @@ pub(super) struct Extent {
 // The figures below are assumptions about tunnels and water. They are not fitted to data.
 // docs/decisions/0004-verdicts-and-causes.md describes their effect.
 
-/// Mean width of objects in the water and of echoes by a second path, m. In narrow tunnels, the width is at most the
-/// share below of the equivalent radius.
+/// Mean width of objects in the water and of echoes by a second path, m. In narrow tunnels, it is at most the share
+/// `OBJECT_WIDTH_SHARE` of the equivalent radius.
 const OBJECT_WIDTH_M: f64 = 0.3;
 const OBJECT_WIDTH_SHARE: f64 = 0.1;
 /// Median height or depth of a wall feature as a share of its width, and standard deviation of the natural logarithm of
 /// this share.
 ///
-/// A half-buried boulder has half its width as height, and a niche is about as deep as wide.
+/// The height of a half-buried boulder is half its width, and a niche is about as deep as wide.
 const HEIGHT_SHARE: f64 = 0.7;
 const HEIGHT_LN_SD: f64 = 0.7;
 /// Share of wall features whose height or depth does not depend on their width: posts, ladders and boreholes.
 const SLENDER_SHARE: f64 = 0.01;
-/// Natural logarithm of thirty, which is the ratio of the largest to the smallest width of wall features.
+/// Natural logarithm of the ratio of the largest to the smallest width of wall features, which is thirty.
 ///
-/// All logarithms of the width are equally likely.
+/// All logarithms of the width between them are equally likely.
 const WIDTHS_LN: f64 = 3.4;
-/// Growth of the log odds that a run is wall, for each pass that confirms the run.
+/// Growth of the log odds that a run is wall, for each earlier pass that met it.
 ///
-/// Nearly every pass meets wall again. For objects and second echoes, 3 % of passes are assumed to meet them again.
+/// Nearly every pass meets wall again. It is assumed that 3 % of passes meet objects and second echoes again.
 const CONFIRMS: f64 = 3.5;
 /// Growth of the log odds that a run is wall, for each of its ends that slopes to the wall.
 ///
-/// Half of the ends of wall features are assumed to slope, and 7 % of the ends of objects and second echoes.
+/// It is assumed that half of the ends of wall features slope, but only 7 % of those of objects and second echoes.
 const SLOPES: f64 = 2.0;
 
-/// Expected numbers of runs in this dive that were wall, and that were something else, computed from the runs' odds.
+/// Expected numbers of runs in this dive that were wall, and of runs that were something else.
 ///
-/// These numbers give the odds of the next run before its size is known. In murky water, few runs are wall.
+/// They give the odds of the next run before its size is known. In murky water, few runs are wall.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Experience {
     wall: f64,
     other: f64,
 }
 
-/// Number of later runs after which a run counts only a third (1/e) of its first weight.
+/// Number of later runs after which a run's weight has fallen to a third (1/e).
 const REMEMBERED_RUNS: f64 = 50.0;
-/// Runs that are added to the runs of the dive. They stand for clear water, in which five of six runs are wall.
+/// Runs that are added to those of the dive. They stand for clear water, where five of six runs are wall.
 ///
-/// They limit the odds: however many runs were wall, or were something else, the next run is never certain.
+/// Because of them, the odds of the next run stay limited, however many runs were wall or something else.
 const PRIOR: Experience = Experience { wall: 2.5, other: 0.5 };
 
 impl Experience {
@@ -74,11 +74,11 @@ impl Experience {
             width_m > 0.0 && off_m > 0.0 && radius_m > 0.0,
             "a run has a size: {run:?}, {radius_m} m"
         );
-        // Low features, such as a lining that bulges, are as likely as features of median height.
+        // Low features, such as a bulging lining, are as likely as features of median height.
         let excess = math::ln(off_m / (HEIGHT_SHARE * width_m)).max(0.0) / HEIGHT_LN_SD;
         let usual = math::exp(-excess * excess / 2.0) / (off_m * HEIGHT_LN_SD * math::sqrt(math::TAU));
         let height = math::ln((1.0 - SLENDER_SHARE) * usual + SLENDER_SHARE / radius_m);
-        // Objects are at any distance from the wall, up to the middle of the tunnel.
+        // Objects are equally likely at any distance from the wall, up to the middle of the tunnel.
         let distance = -math::ln(radius_m);
         let width = -math::ln(width_m * WIDTHS_LN);
         let mean_m = OBJECT_WIDTH_M.min(OBJECT_WIDTH_SHARE * radius_m);
@@ -113,8 +113,8 @@ mod tests {
         Experience::default().log_odds(&Extent { width_m, off_m, confirmed, slopes: 0 }, RADIUS_M)
     }
 
-    /// Checks the probability that a run is wall in clear water. A boulder is as high as it is wide, and a side tunnel
-    /// is wider than deep. Fish and second echoes are small and far from the wall.
+    /// Checks the probability that a run is wall in clear water. Boulders and side tunnels are wall. Fish and second
+    /// echoes, which are small and far from the wall, are not.
     #[test]
     fn wide_runs_near_the_wall_are_wall_but_small_runs_far_from_it_are_not() {
         for (width_m, off_m, confirmed, least, most) in [
@@ -149,9 +149,9 @@ mod tests {
             prop_assert!(murk.log_odds(&extent, RADIUS_M) < here);
         }
 
-        /// Experience fades, so the odds recover in clear water after murky water. Experience never decides alone, not
-        /// even after a long dive: a slender run remains doubtful in the clearest water, and a run that two earlier
-        /// passes have met is wall in the murkiest water.
+        /// Experience fades, so the odds recover in clear water after murky water. Even after a long dive, it never
+        /// decides alone. A slender run remains doubtful in the clearest water. A run that two earlier passes have met
+        /// is wall in the murkiest water.
         #[test]
         fn experience_from_earlier_runs_never_decides_alone(runs in 0usize..100_000) {
             let slender = Extent { width_m: 0.2, off_m: 3.0, confirmed: 0.0, slopes: 0 };

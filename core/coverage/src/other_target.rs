@@ -1,4 +1,4 @@
-//! Verdicts on the holes of a dive for a target that differs from the dive's own target.
+//! Verdicts on the holes of a dive for another target than the dive's own.
 
 use super::frontier::{Outlook, clear_of};
 use super::hole::Hole;
@@ -25,7 +25,7 @@ impl Measured {
 impl Sections {
     /// Returns the index of each section with a measured hole, and its verdict for another target.
     ///
-    /// The counted visits and the settled sections are still those for the dive's own target. Only a replay with the
+    /// The dive's own target still decides which visits count and which sections are settled. Only a replay with the
     /// other target gives the verdicts that the dive would have reported.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
         let target = Target { max_hole_m: target_m, ..self.target() };
@@ -57,7 +57,7 @@ mod tests {
 
     /// Sections of a pipe with samples every 0.2 m, except from 5 m to 5.6 m.
     ///
-    /// The coverage extent is 3 m to 7 m, judged in sections of a quarter of a metre.
+    /// The coverage extent is 3 m to 7 m. Sections are a quarter of a metre long.
     struct Seen {
         sections: Sections,
         outlook: Outlook,
@@ -101,9 +101,9 @@ mod tests {
         }
     }
 
-    /// The largest circle between 5 m and 5.6 m measures 0.63 m.
+    /// The largest circle in the stretch without samples, from 5 m to 5.6 m, measures 0.63 m.
     ///
-    /// If its centre lies between 5 m and 5.25 m, the largest circle measures 0.54 m.
+    /// The largest one with its centre between 5 m and 5.25 m measures 0.54 m.
     #[test]
     fn verdicts_for_another_target_use_the_measured_holes() {
         let seen = Seen::new();
@@ -115,7 +115,7 @@ mod tests {
         }
     }
 
-    /// The allowance for the position error is two standard deviations of 0.05 m each.
+    /// The allowance for the position error is two standard deviations, each 0.05 m.
     #[test]
     fn verdict_for_another_target_respects_position_error_and_doubtful_samples() {
         let mut seen = Seen::new();

@@ -17,9 +17,9 @@ pub struct Passage {
     pub pings: u32,
     /// Number of pings with a fix.
     pub placed: u32,
-    /// Number of pings without a fix, or without a return although the wall was within range.
+    /// Number of pings that either have no fix, or have no return although the wall was within range.
     pub missing: u32,
-    /// Number of pings without a return where the wall was farther than the range setting.
+    /// Number of pings without a return because the wall was farther than the range setting.
     pub out_of_range: u32,
     /// Number of pings occluded by the vehicle.
     pub occluded: u32,
@@ -27,15 +27,14 @@ pub struct Passage {
     pub unplaced: u32,
     /// Number of pings of a stalled head.
     pub standing: u32,
-    /// Heads that passed through the section without a ping.
+    /// Heads that passed through the section without a ping, or without an accepted return from the wall.
     pub silent: HeadSet,
     /// Driving figures at the moment of the largest spacing T.
     pub drive: Drive,
     /// Whether there were more pings without a fix than could be stored.
     pub unseen: bool,
-    /// Whether the position of a ping was too uncertain for the measured speed to count as evidence.
-    ///
-    /// The uncertainty is relative to the previous pass.
+    /// Whether the position of a ping was too uncertain, relative to the previous pass, for the measured speed to count
+    /// as evidence.
     pub adrift: bool,
     /// Error between passes in the newest visit with a ping in the section.
     pub pass_error: PassError,
@@ -46,27 +45,27 @@ pub struct Passage {
 pub struct Drive {
     /// Absolute speed along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Speed for which the heads are set in phase, m/s; zero if none is planned.
+    /// Speed for which the heads are set in phase, m/s. Zero if none is planned.
     pub planned_mps: f64,
-    /// Longest time between two passes of the heads that turned, seconds.
+    /// Longest time between two passes of the heads that turned, s.
     pub gap_s: f64,
-    /// Longest time between two passes if the heads that turned were evenly spread, seconds.
+    /// Longest time between two passes if the heads that turned had been evenly spread, s.
     pub even_gap_s: f64,
-    /// Longest time between two passes if all heads were turning, with none silent or stalled, seconds.
+    /// Longest time between two passes if all heads had turned, with none silent or stalled, s.
     pub healthy_gap_s: f64,
-    /// Longest time between two passes if all heads' angles were as scheduled, at the present speed, seconds.
+    /// Longest time between two passes at the present speed if all heads had been at their scheduled angles, s.
     pub planned_gap_s: f64,
-    /// Longest time between two passes if all configured heads were turning and evenly spread, seconds.
+    /// Longest time between two passes if all configured heads had turned and been evenly spread, s.
     pub all_gap_s: f64,
-    /// Longest time between two passes at the planned speed, or at the driven speed if no speed is planned, seconds.
+    /// Longest time between two passes at the planned speed, s. If no speed is planned, the driven speed is used.
     pub gap_at_plan_s: f64,
-    /// Longest time between two passes at the planned speed if all heads were turning, seconds.
+    /// Longest time between two passes at the planned speed if all heads had turned, s.
     pub healthy_at_plan_s: f64,
-    /// Longest time between two passes of the heads that turn and never stalled, seconds.
+    /// Longest time between two passes of the heads that turn and never stalled, s.
     ///
-    /// The value is for the planned speed, with these heads at their scheduled angles.
+    /// It is valid at the planned speed, with these heads at their scheduled angles.
     pub left_at_plan_s: f64,
-    /// Longest time between two pings of a head, seconds.
+    /// Longest time between two pings of a head, s.
     pub ping_period_s: f64,
     /// Largest distance that the beams have swung along the tunnel since the neighbouring passes, m.
     pub swing_m: f64,
@@ -74,14 +73,14 @@ pub struct Drive {
     pub t_y_m: f64,
     /// Largest step along the perimeter between two pings, computed from the tunnel's centre, m.
     pub middle_t_y_m: f64,
-    /// Largest speed that meets the target from the tunnel's centre, m/s.
+    /// Largest speed that meets the target from the tunnel's centre, m/s. Zero if no speed does.
     ///
-    /// All heads are assumed to turn as scheduled. The value is the planned speed if the planned speed meets the
-    /// target, and zero if no speed does.
+    /// All heads are assumed to turn as scheduled. If the planned speed meets the target, the value is the planned
+    /// speed.
     pub fits_mps: f64,
-    /// Largest distance between passes along the tunnel with which the target is met, m.
+    /// Largest distance between passes along the tunnel that meets the target, m.
     pub fits_along_m: f64,
-    /// Number of passes needed in place of a single pass because of lost returns.
+    /// Number of passes needed where one would do without lost returns.
     ///
     /// See [`headrace_sampling::losses`].
     pub passes_needed: f64,
@@ -95,26 +94,26 @@ pub struct Drive {
     pub other: OtherSettings,
 }
 
-/// Step and turn period with alternative head settings, relative to the present settings.
+/// Step and turn period with other head settings, as multiples of the present ones.
 ///
 /// A turn takes longer with a finer step or a longer range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherSettings {
-    /// Step of the alternative finer mode, divided by the present step.
+    /// Step of a finer mode, divided by the present step.
     ///
-    /// The finer mode is the mode with a finer step that allows the highest speed, or the finest mode if no mode meets
-    /// the target.
+    /// The mode is the one with a finer step that allows the highest speed. If no mode meets the target, it is the
+    /// finest mode.
     pub finer_step: f64,
-    /// Turn period of the alternative finer mode, divided by the present turn period.
+    /// Turn period of this finer mode, divided by the present turn period.
     pub finer_turn: f64,
     /// Turn period with a longer range setting, divided by the present turn period.
     ///
-    /// The longer setting is the shortest setting that reaches all wall from the tunnel's centre.
+    /// It is the shortest range setting that reaches all wall from the tunnel's centre.
     pub longer_turn: f64,
 }
 
 impl Default for OtherSettings {
-    /// Ratios for heads with unknown settings. The ratios assume a finer mode with the same turn period.
+    /// Ratios for heads with unknown settings. A finer mode is assumed to have the same turn period.
     fn default() -> Self {
         Self { finer_step: 0.375, finer_turn: 1.0, longer_turn: 1.0 }
     }
@@ -124,12 +123,12 @@ impl Default for OtherSettings {
 const SLOWER: f64 = 0.97;
 
 impl Drive {
-    /// Distance along the tunnel between passes, including swing, as if no head had been silent or stalled, m.
+    /// Distance along the tunnel between passes, swing included, if no head had been silent or stalled, m.
     pub fn along_m(&self) -> f64 {
         self.speed_mps * self.healthy_gap_s + self.swing_m + self.advance_m()
     }
 
-    /// Distance along the tunnel between passes if all heads turned as scheduled, m.
+    /// Distance along the tunnel between passes if all heads had turned as scheduled, m.
     pub fn planned_along_m(&self) -> f64 {
         self.speed_mps * self.planned_gap_s
     }
@@ -141,17 +140,17 @@ impl Drive {
 
     /// Whether the heads are out of phase because the vehicle is slower than planned.
     ///
-    /// True if the distance between passes is more than `over` times the distance at the planned speed with the heads
-    /// at their scheduled angles, and if the planned speed meets the target. Heads at different places along the hull
-    /// are in phase only near the planned speed. Heads that were started with wrong phases do not count, because no
-    /// speed helps them.
+    /// True if two conditions hold. The planned speed meets the target, and the distance between passes is more than
+    /// `over` times that at the planned speed with the heads at their scheduled angles. Heads at different places along
+    /// the hull are in phase only near the planned speed. Heads that were started with wrong phases do not count,
+    /// because no speed helps them.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;
         is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
-    /// Returns the worse of two movements: the movement with the larger distance between passes.
+    /// Returns the movement with the larger distance between passes.
     #[must_use]
     pub fn or_worse(self, other: Self) -> Self {
         if other.along_m() > self.along_m() { other } else { self }
@@ -176,14 +175,14 @@ impl Loss {
 
 /// Ratio of the error of a section's largest hole to the error of a single distance between passes.
 ///
-/// The ratio exceeds 1 because the largest hole is often a hole that errors have enlarged. It is measured over the
-/// field dives of `tests/tests/navigation/fusion.rs`.
+/// It exceeds 1 because the largest hole is often one that errors have enlarged. Its value was measured in the field
+/// dives of `tests/tests/navigation/fusion.rs`.
 const LARGEST_OF_MANY: f64 = 1.2;
 
 /// Error along the tunnel of the samples of one pass relative to the previous pass.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassError {
-    /// Covariance of the position and attitude errors of one pass relative to the previous pass.
+    /// Covariance of the position and attitude errors of the pass, relative to the previous pass.
     pub relative: Relative,
     /// Position of the vehicle in the cross-section, [y, z], m.
     pub from_m: [f64; 2],
@@ -207,11 +206,11 @@ impl PassError {
         profile.places().iter().map(|place| self.sd_m(*place)).fold(0.0, f64::max)
     }
 
-    /// Whether `worst_m` exceeds a limit, m.
+    /// Whether [`Self::worst_m`] exceeds a limit, m.
     ///
-    /// For most passes, an upper bound is already below the limit, so no search around the profile is needed.
+    /// For most passes, an upper bound is already below the limit. Then no search around the profile is needed.
     pub fn exceeds(&self, limit_m: f64, profile: &Profile) -> bool {
-        // The reference point lies within the profile, so no wall is farther from this point than half the perimeter.
+        // The reference point lies within the profile, so no wall is farther from it than half the perimeter.
         let [y_m, z_m] = profile.reference();
         let off_m = math::hypot(self.from_m[0] - y_m, self.from_m[1] - z_m);
         let here_m = LARGEST_OF_MANY * self.relative.sd_m(Vec3::zero());
@@ -292,8 +291,8 @@ mod tests {
         let worst_m = LARGEST_OF_MANY * 0.01 * (3.0 + (y_m - 0.5).abs());
         assert!((error.worst_m(&profile) - worst_m).abs() < 1e-4, "{}", error.worst_m(&profile));
         assert!((error.slope() - LARGEST_OF_MANY * 0.01).abs() < 1e-12);
-        // The first estimated position of the vehicle is inside the profile. The second is far outside, as it
-        // may be when navigation is lost.
+        // The vehicle's estimated position is first inside the profile, and then far outside, as it may be when
+        // navigation is lost.
         for from_m in [error.from_m, [40.0, -30.0]] {
             let error = PassError { from_m, ..error };
             let worst_m = error.worst_m(&profile);

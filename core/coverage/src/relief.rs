@@ -1,8 +1,8 @@
 //! Relief: places where heads recently found wall that deviates from the design. This module also counts votes of the
 //! heads on each other.
 //!
-//! A vote compares the returns of two heads in the same bin of the wall. A head that contradicts the design there is
-//! outvoted if another head agrees with the design.
+//! A vote compares the returns of two heads in the same bin of the wall. If one head contradicts the design there and
+//! another agrees with it, the first is outvoted.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,14 +11,15 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
 
-/// Number of bins around the perimeter; a bin is about as wide as the step of a head.
+/// Number of bins around the perimeter. A bin is about as wide as the step of a head.
 const BINS: i64 = 128;
 /// Number of bins along the tunnel. Each bin is half of `WallLimits::reach_m` long.
 ///
-/// In a tunnel of 6 m radius, all bins together are 9 m long, which exceeds the distance between heads.
+/// In a tunnel of 6 m radius, the bins are together 9 m long, which exceeds the distance between heads.
 const SLABS: i64 = 32;
 
-/// A pass that met something: the head, and the angle that it had turned since the start of the dive, rad.
+/// A pass that met something. It is given by the head, and by the angle that the head had turned since the dive began,
+/// rad.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Pass {
     pub(super) head: u8,
@@ -26,7 +27,7 @@ pub(super) struct Pass {
 }
 
 impl Pass {
-    /// Whether two passes differ: they are by different heads, or more than half a turn of one head apart.
+    /// Whether two passes differ: two heads made them, or one head made them more than half a turn apart.
     fn is_other(&self, other: &Self) -> bool {
         self.head != other.head || (self.turned_rad - other.turned_rad).abs() > math::TAU / 2.0
     }
@@ -38,13 +39,13 @@ pub(super) struct Found {
     placed: PlacedReturn,
     /// Whether the return was classified as wall.
     is_wall: bool,
-    /// Number of passes that met the same thing here, including this pass.
+    /// Number of passes that met the same thing here, including `pass`.
     passes: u8,
     pass: Pass,
 }
 
 impl Found {
-    /// Creates the record of a return, after `confirmed` earlier passes that met the same thing.
+    /// Creates the record of a return. `confirmed` is the number of earlier passes that met the same thing.
     pub(super) fn new(placed: &PlacedReturn, is_wall: bool, confirmed: u8, pass: Pass) -> Self {
         Self { placed: *placed, is_wall, passes: confirmed.saturating_add(1), pass }
     }
@@ -53,13 +54,12 @@ impl Found {
 /// Recent returns in one bin of the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Cell {
-    /// Number of the bin's slab (row of bins) since chainage zero. A bin with the number of another slab is
-    /// outdated.
+    /// Number of the slab (row of bins) to which the entries belong, counted from chainage zero. The entries are
+    /// outdated if the bin now belongs to another slab.
     slab: i64,
     /// The latest return that deviates from the design.
     off: Option<Found>,
-    /// Bitmasks of the heads whose returns in this bin agree with the design, and of those whose returns
-    /// contradict it.
+    /// Bitmasks of the heads whose returns in this bin agree with the design, and of those whose returns contradict it.
     as_designed: u8,
     contradicting: u8,
 }
@@ -67,17 +67,17 @@ struct Cell {
 /// Votes of the other heads on one head. Each vote comes from a bin of the wall that both heads have seen.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ballot {
-    /// Number of bins in which the head agrees with the design, as other heads do.
+    /// Number of bins in which the head and other heads agree with the design.
     agreed: u32,
-    /// Number of bins in which the head contradicts the design, while other heads agree with it.
+    /// Number of bins in which the head contradicts the design but other heads agree with it.
     outvoted: u32,
-    /// Sum of the deviations in the bins where the head was outvoted, m, and the chainages between which these bins
-    /// lie, m.
+    /// Sum of the deviations in the bins in which the head was outvoted, m, and smallest and largest chainage of these
+    /// bins, m.
     off_sum_m: f64,
     between_m: Option<[f64; 2]>,
 }
 
-/// Number of votes needed to decide whether a head is outvoted: about one vote for each bin of a turn.
+/// Number of votes that suffice to decide whether a head is outvoted: about one for each bin of a turn.
 const FULL_BALLOT: u32 = 128;
 
 impl Ballot {
@@ -99,9 +99,10 @@ impl Ballot {
         self.between_m = Some([from_m.min(placed.x_m), to_m.max(placed.x_m)]);
     }
 
-    /// Returns the mean deviation and the chainages of the bins where the head was outvoted, m.
+    /// Returns the mean deviation of the bins in which the head was outvoted, m, and their smallest and largest
+    /// chainage, m.
     ///
-    /// `None` unless enough bins have votes, and the head was outvoted in most of them.
+    /// `None` unless enough bins have votes and the head was outvoted in most of them.
     pub(super) fn verdict(&self) -> Option<(f64, [f64; 2])> {
         let lost = self.agreed + self.outvoted >= FULL_BALLOT && self.outvoted > self.agreed;
         lost.then(|| Some((self.off_sum_m / f64::from(self.outvoted), self.between_m?))).flatten()
@@ -118,9 +119,9 @@ impl Ballot {
 pub struct Relief {
     cells: Vec<Cell>,
     ballots: [Ballot; MAX_HEADS],
-    /// Bitmask of heads that aren't trusted.
+    /// Bitmask of heads that are not trusted.
     distrusted: u8,
-    /// Bitmask of heads whose range varies when the range to the design varies.
+    /// Bitmask of heads whose range varies when the range to the design does.
     changing: u8,
 }
 
@@ -129,7 +130,7 @@ stateful!(Relief { state: ballots, distrusted, changing; slots: cells; });
 impl Default for Relief {
     /// Creates an empty relief.
     ///
-    /// Allocates: all that it will ever use.
+    /// Allocates: all memory that it will ever use.
     fn default() -> Self {
         let nowhere = Cell { slab: i64::MIN, ..Cell::default() };
         let count = usize::try_from(BINS * SLABS).unwrap_or(0);
@@ -161,7 +162,7 @@ impl Relief {
         self.near(placed, limits, 1.0).any(|found| found.is_wall && found.pass.head != head)
     }
 
-    /// Number of earlier passes that met the same thing near this return, whether it is wall or not.
+    /// Number of earlier passes that met the same thing near this return, be it wall or not.
     pub(super) fn confirmed(&self, placed: &PlacedReturn, pass: &Pass, limits: &WallLimits) -> u8 {
         let others = self.near(placed, limits, 0.5).filter(|found| found.pass.is_other(pass));
         others.map(|found| found.passes).max().unwrap_or(0)
@@ -169,7 +170,7 @@ impl Relief {
 
     /// Earlier returns near this return with the same deviation from the design.
     ///
-    /// `share` reduces the limits: the reach along the tunnel, and the tolerance of the deviation.
+    /// `share` multiplies the limits: the reach along the tunnel, and the tolerance of the deviation.
     fn near(
         &self,
         placed: &PlacedReturn,
@@ -200,7 +201,7 @@ impl Relief {
     /// Counts the votes that follow from a head's return: on this head, and on other heads that have seen the same bin.
     pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
         let (slab, bin) = place(placed, limits);
-        // Returns that deviate by half to all of the contradiction limit don't vote. With a single limit, noise would
+        // Returns between half and all of the contradiction limit do not vote. With a single limit, mere noise would
         // make heads disagree.
         let as_designed = placed.off_m.abs() <= limits.contradiction_m / 2.0;
         if !as_designed && placed.off_m.abs() <= limits.contradiction_m {
@@ -212,8 +213,7 @@ impl Relief {
             return;
         };
         if as_designed && cell.off.is_some_and(|found| !found.is_wall) {
-            // This head agrees with the design here, so the unconfirmed object that earlier returns showed
-            // here is gone.
+            // This head agrees with the design here. So the unconfirmed object of earlier returns is gone.
             cell.off = None;
         }
         let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };
@@ -257,19 +257,19 @@ impl Relief {
         self.ballots.get(head).copied().unwrap_or_default()
     }
 
-    /// Sets whether the votes of a head on other heads count.
+    /// Sets whether the votes of this head on other heads count.
     pub(super) fn believe(&mut self, head: usize, believed: bool) {
         set(&mut self.distrusted, head, !believed);
     }
 
-    /// Records whether the range of a head varies when the range to the design varies.
+    /// Records whether the range of a head varies when the range to the design does.
     pub(super) fn note_changing(&mut self, head: usize, changes: bool) {
         set(&mut self.changing, head, changes);
     }
 
-    /// Whether the range of another head varies when the range to the design varies.
+    /// Whether the range of another head varies when the range to the design does.
     ///
-    /// If so, an error of the estimated position does not explain a constant range of `head`.
+    /// Then an error of the estimated position does not explain a constant range of `head`.
     pub(super) fn others_change(&self, head: usize) -> bool {
         self.changing & !bit(head) != 0
     }
@@ -278,7 +278,7 @@ impl Relief {
         self.cells.get(index(slab, bin)?).filter(|cell| cell.slab == slab)
     }
 
-    /// Returns the cell of a bin, emptied if it belonged to another slab.
+    /// Returns the cell of a bin, and empties it if it belonged to another slab.
     fn cell_mut(&mut self, slab: i64, bin: i64) -> Option<&mut Cell> {
         let cell = self.cells.get_mut(index(slab, bin)?)?;
         if cell.slab != slab {
@@ -302,7 +302,7 @@ fn index(slab: i64, bin: i64) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// A head that fails late is outvoted after two turns with wrong returns, but not yet after one turn.
+    /// A head that fails late in a dive is outvoted after two turns with wrong returns, but not after one.
     #[test]
     fn head_that_fails_late_is_outvoted_within_two_turns() {
         let wrong = PlacedReturn { x_m: 7.0, arc_m: 0.0, off_m: -0.5 };
@@ -316,7 +316,7 @@ mod tests {
         assert!(between_m.iter().all(|x_m| (x_m - 7.0).abs() < 1e-12), "{between_m:?}");
     }
 
-    /// A head that contradicts another head is outvoted, unless the other head is itself distrusted.
+    /// A head that contradicts another head is outvoted, unless that other head is itself distrusted.
     #[test]
     fn distrusted_head_does_not_outvote_other_heads() {
         let limits = WallLimits::new(20.0, 0.3, 2.0);

@@ -1,4 +1,5 @@
-//! Runs (missed stretches): neighbouring failed sections, reported as one event with a permanent number.
+//! Missed stretches (in the code: runs). Neighbouring failed sections are reported as one event with a permanent
+//! number.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +11,7 @@ use headrace_geometry::time::MonoNs;
 
 /// Maximum gap between neighbouring failed sections of one missed stretch, m.
 ///
-/// Across a wider gap, the speed that one section needs is no evidence for the next section.
+/// Beyond a wider gap, the speed that one section needs says nothing about the next one.
 const JOIN_M: f64 = 0.5;
 
 /// Number of a missed stretch. It is never used for another missed stretch.
@@ -20,9 +21,7 @@ pub struct RunId(pub u32);
 /// A missed stretch: neighbouring failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Most frequent cause among the stretch's sections.
-    ///
-    /// A tie leaves the current cause unchanged.
+    /// Most frequent cause among the stretch's sections. In a tie, the cause stays as it was.
     pub cause: Cause,
     /// Number of the stretch's sections with each cause, in the order of [`Cause::ALL`].
     counts: [u32; Cause::ALL.len()],
@@ -36,20 +35,20 @@ pub struct Run {
     pub failed: u32,
     /// Index of the section with the largest hole, and this hole.
     ///
-    /// In a cleared missed stretch, section and hole are from the time before the stretch was cleared.
+    /// In a cleared missed stretch, both are from the time before it was cleared.
     pub worst: (i64, Hole),
     /// Time at which the stretch was first flagged.
     pub raised: MonoNs,
     /// Time of the stretch's latest change.
     pub changed: MonoNs,
-    /// Time since which none of the stretch's sections fails.
+    /// Time at which the last of the stretch's sections stopped failing; `None` while one fails.
     pub cleared: Option<MonoNs>,
-    /// Stretch into which this stretch was merged.
+    /// Missed stretch into which this one was merged.
     pub merged_into: Option<RunId>,
 }
 
 impl Run {
-    /// Whether the figures of a missed stretch that isn't cleared agree: its ends, the counts of its sections, and its
+    /// Whether the figures of a stretch that is not cleared agree: its ends, the counts of its sections, and its
     /// largest hole.
     fn is_consistent(&self) -> bool {
         let Self { from, to, failed, .. } = *self;
@@ -64,13 +63,13 @@ impl Run {
         self.failed > 0
     }
 
-    /// Number of the stretch's sections with a cause.
+    /// Number of the stretch's sections that have this cause.
     pub fn count(&self, cause: Cause) -> u32 {
         self.counts.get(cause as usize).copied().unwrap_or(0)
     }
 
-    /// Causes named in texts: the main cause, and the next most frequent cause if at least a tenth of the
-    /// sections have it.
+    /// Causes named in texts: the main cause, and the next most frequent one if at least a tenth of the sections have
+    /// it.
     pub fn named(&self) -> Causes {
         let others = Cause::ALL.into_iter().filter(|cause| *cause != self.cause);
         let next = others.rev().max_by_key(|cause| self.count(*cause));
@@ -78,9 +77,9 @@ impl Run {
         next.map_or(Causes::of(self.cause), |next| Causes::of(self.cause).with(next))
     }
 
-    /// All causes of the stretch's sections: the main cause first, then the others by frequency.
+    /// All causes of the stretch's sections. The main cause comes first, and the others follow by frequency.
     ///
-    /// Allocates: the list. Only outlets call this function.
+    /// Allocates: the list. So only outputs call this function, never the loop.
     pub fn causes(&self) -> Vec<Cause> {
         let mut causes: Vec<Cause> =
             Cause::ALL.into_iter().filter(|cause| *cause == self.cause || self.count(*cause) > 0).collect();
@@ -103,7 +102,7 @@ impl Run {
         }
     }
 
-    /// Removes a section from the stretch's counts; returns true if the lowest speed must be found again.
+    /// Removes a section from the stretch's counts. Returns true if the lowest speed must be found again.
     fn count_out(&mut self, section: &Failing) -> bool {
         for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
@@ -148,13 +147,13 @@ pub struct Runs {
     runs: Vec<Run>,
     /// For each section: number of its stretch plus one, or zero.
     member: Vec<u32>,
-    /// Causes of the fail, and required speed, of each section that belongs to a missed stretch.
+    /// Causes and required speed of each section that belongs to a missed stretch.
     failing: Vec<Failing>,
 }
 
 stateful!(Runs { lists: runs; slots: member, failing; fixed: first, join; });
 
-/// Context for updating missed stretches, with the callback for changed missed stretches.
+/// Context for updating missed stretches, with a function to call for each that changes.
 pub struct Telling<'a> {
     /// Time of the change.
     pub at: MonoNs,
@@ -165,9 +164,9 @@ pub struct Telling<'a> {
 }
 
 impl Runs {
-    /// Creates an empty set of missed stretches for `count` sections of length `section_m` from index `first`.
+    /// Creates an empty set of missed stretches for `count` sections of length `section_m` from index `first` on.
     ///
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory that it will ever use.
     pub fn new(first: i64, count: usize, section_m: f64) -> Self {
         let join = headrace_geometry::math::floor_to_i64(JOIN_M / section_m + 1e-9).max(0) + 1;
         let (member, failing) = (vec![0; count], vec![Failing::default(); count]);
@@ -179,7 +178,7 @@ impl Runs {
         &self.runs
     }
 
-    /// Returns the missed stretch with this number.
+    /// Returns the missed stretch with the number `id`.
     pub fn get(&self, id: RunId) -> Option<&Run> {
         self.runs.get(id.0 as usize)
     }
@@ -194,7 +193,7 @@ impl Runs {
         section - run.to >= self.join || run.from - section > self.join
     }
 
-    /// Sets the state of a section: it fails for these causes, or it doesn't fail (`None`).
+    /// Sets the state of a section: it fails for the given causes, or does not fail (`None`).
     ///
     /// Allocates: never.
     pub fn set(&mut self, section: i64, failing: Option<Failing>, telling: &mut Telling<'_>) {
@@ -216,8 +215,8 @@ impl Runs {
         }
     }
 
-    /// Whether a stretch is consistent. An open stretch must begin and end with its own sections, and must be too far
-    /// from other stretches to be joined. A closed stretch is always consistent.
+    /// Whether a missed stretch is consistent. An open one must begin and end with its own sections, and must be too
+    /// far from others to be joined. A closed one is always consistent.
     fn is_consistent(&self, id: RunId) -> bool {
         let is_own = |section: i64| self.of(section) == Some(id);
         let is_apart = |section: i64| self.of(section).is_none_or(|of| of == id);
@@ -229,7 +228,7 @@ impl Runs {
         })
     }
 
-    /// Replaces a section's entry in the counts of its stretch.
+    /// Replaces a section's entry `before` in the counts of its missed stretch by `now`.
     fn count_again(&mut self, id: RunId, [before, now]: [&Failing; 2]) {
         let Some(mut run) = self.get(id).copied() else {
             debug_assert!(false, "{id:?} of a section is one of {} runs", self.runs.len());
@@ -249,7 +248,7 @@ impl Runs {
         }
     }
 
-    /// Causes for which a section fails, and the speed it requires.
+    /// Causes for which a section fails, and the speed that it needs.
     fn failing_at(&self, section: i64) -> Failing {
         debug_assert!(self.slot(section).is_some(), "section {section} is one of {}", self.member.len());
         self.slot(section).and_then(|slot| self.failing.get(slot)).copied().unwrap_or_default()
@@ -261,7 +260,8 @@ impl Runs {
         }
     }
 
-    /// Adds a failed section to the neighbouring missed stretches and merges them, or starts a missed stretch.
+    /// Adds a failed section to the neighbouring missed stretches, which it may merge. Without neighbours, starts a new
+    /// one.
     fn join(&mut self, section: i64, failing: Failing, telling: &mut Telling<'_>) {
         let near = |side: i64| (1..=self.join).find_map(|step| self.of(section + side * step));
         let (kept, other) = match (near(-1), near(1)) {
@@ -284,7 +284,7 @@ impl Runs {
         (telling.tell)(kept, RunChange::Changed);
     }
 
-    /// Removes a section from its stretch, which shrinks, splits or is cleared.
+    /// Removes a section from its missed stretch, which then shrinks, splits or is cleared.
     fn leave(&mut self, section: i64, id: RunId, telling: &mut Telling<'_>) {
         self.take_out(section);
         let Some(run) = self.get(id).copied() else {
@@ -362,7 +362,7 @@ impl Runs {
         }
     }
 
-    /// Updates a stretch's figures for a section that was just added to it.
+    /// Updates the figures of a missed stretch for a section that was just added to it.
     fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let (hole, failing) = ((telling.hole)(section), self.failing_at(section));
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
@@ -374,7 +374,7 @@ impl Runs {
         }
     }
 
-    /// Updates a missed stretch for a section whose hole has changed.
+    /// Updates the largest hole of a missed stretch, because the hole of this section has changed.
     fn measure_again(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (telling.hole)(section)) else {
             return;
@@ -387,7 +387,7 @@ impl Runs {
         }
     }
 
-    /// Recomputes a stretch's section count, causes, ends and largest hole.
+    /// Computes the section count, causes, ends and largest hole of a missed stretch again.
     fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
         let Some(run) = self.get(id).copied() else {
             debug_assert!(false, "{id:?} is one of {} runs", self.runs.len());
@@ -429,7 +429,7 @@ impl Runs {
     }
 }
 
-/// Returns the section with the larger hole; the first section if both holes are equal.
+/// Returns the section with the larger hole, or the first one if both holes are equal.
 fn larger(a: (i64, Hole), b: (i64, Hole)) -> (i64, Hole) {
     if b.1.diameter_m > a.1.diameter_m { b } else { a }
 }

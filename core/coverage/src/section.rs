@@ -1,4 +1,4 @@
-//! One section: its statistics, hole, verdict and flag. Also the length of tunnel by verdict.
+//! One section with its statistics, hole, verdict and flag. Also the lengths of tunnel by verdict.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,14 +16,14 @@ use headrace_sampling::Target;
 /// Coverage verdict on a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Undecided: more samples may land without the vehicle turning back, or some heads have not been in the section.
+    /// Undecided. More samples may land if the vehicle does not turn back, or some heads have not been in the section.
     #[default]
     Open,
     /// Pass: D + k sd <= T, with hole diameter D, its standard deviation sd, target T and confidence k.
     Pass,
     /// Fail: D - k sd > T, with the symbols of [`Verdict::Pass`].
     Fail,
-    /// Can't say: neither a pass nor a fail, although no more samples will land.
+    /// Can't say: the section neither passes nor fails, although no more samples will land.
     CannotSay,
 }
 
@@ -68,10 +68,10 @@ impl Spread {
         self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
     }
 
-    /// Adds all values of another spread to this spread.
+    /// Adds all values of another spread.
     ///
-    /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean avoid the cancellation of plain sums of
-    /// squares.
+    /// Sums of squares about the mean avoid the cancellation of plain sums of squares. Source: Chan, Golub, LeVeque
+    /// 1983.
     pub fn merge(&mut self, other: &Self) {
         if other.count == 0 {
             return;
@@ -123,12 +123,12 @@ pub struct Section {
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
-    /// Whether the verdict is final unless the vehicle turns back. No more samples can then change the verdict, or a
-    /// failed section's hole.
+    /// Whether the verdict is final unless the vehicle turns back. More samples can then change neither the verdict nor
+    /// a failed section's hole.
     pub settled: bool,
-    /// Whether the section is open and stays open unless the vehicle turns back.
+    /// Whether the section is open, and stays open unless the vehicle turns back.
     ///
-    /// The vehicle began or turned back in this section, so some heads have not been in it.
+    /// The vehicle began or turned back here, so some heads have not been in the section.
     pub not_inspected: bool,
     /// Time at which the fail was flagged.
     pub flagged: Option<MonoNs>,
@@ -136,7 +136,7 @@ pub struct Section {
     pub cleared: Option<MonoNs>,
     /// Evidence for the causes of the fail.
     pub evidence: Option<Evidence>,
-    /// Whether the causes were determined when the heads had passed only a part of the section.
+    /// Whether the causes were determined before the heads had passed all of the section.
     pub(super) explained_in_part: bool,
     /// Ping statistics of the passage through the section.
     pub passage: Passage,
@@ -152,28 +152,29 @@ pub struct Section {
     pub deviation: Deviation,
     /// Share of the section's wall that is a declared opening.
     pub masked_share: f64,
-    /// Whether the section must be judged again. Since its last judgement, a sample has landed within the target T of
-    /// the section, or the section became suspect.
+    /// Whether the section must be judged again. Since the last judgement, a sample has landed within the target T of
+    /// it, or the section has become suspect.
     pub(super) stale: bool,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful: u32,
-    /// Whether every hole over the target would be filled if the section's doubtful returns were wall.
+    /// Whether the section's doubtful returns, if they were wall, would fill every hole over the target.
     pub(super) filled_by_doubtful: bool,
-    /// Whether the section holds samples of a head that was distrusted soon after.
+    /// Whether the section has samples of a head that became distrusted soon after.
     pub suspect: bool,
-    /// Number of the vehicle's newest visit at the time when a head with samples in the section became distrusted.
+    /// Number of the vehicle's newest visit when a head with samples in the section became distrusted.
     suspected_in: u32,
     /// Visits of the vehicle with samples within the target T of the section.
     pub(super) visits: Visits,
-    /// Number of the visit that the pass error in `passage` belongs to.
+    /// Number of the visit to which the pass error in `passage` belongs.
     passed_in: u32,
 }
 
 /// Minimum number of samples with which a section can contradict the profile.
 const FEW: u32 = 20;
-/// Share of the wall covered by openings above which a section counts as having no wall.
+/// Share of the wall covered by openings above which the section counts as having no wall.
 const ALL_MASKED: f64 = 0.999;
-/// Plausible ratios of the measured cross-section area to the design's area. Beyond them, the section can't pass.
+/// Plausible ratios of the measured cross-section area to the design's area. With another ratio, the section cannot
+/// pass.
 ///
 /// A wall that deviates by a tenth of the radius has a ratio between 0.8 and 1.2.
 const AREA_RATIO: core::ops::RangeInclusive<f64> = 0.6..=1.6;
@@ -184,9 +185,9 @@ impl Section {
         self.flagged.is_some() && self.cleared.is_none()
     }
 
-    /// Whether verdict, hole, flag and evidence of a section that was just judged agree.
+    /// Whether verdict, hole, flag and evidence of a section agree just after it was judged.
     ///
-    /// A pass has a hole diameter D with D + k sd <= T. A fail has evidence and a flag. Only open sections are
+    /// A pass needs a hole diameter D with D + k sd <= T. A fail needs evidence and a flag. Only open sections are
     /// `not_inspected`.
     pub(super) fn is_consistent(&self, target: Target) -> bool {
         let error_m = target.error_m(self.hole_sd_m);
@@ -221,21 +222,21 @@ impl Section {
         self.passage.pass_error.add(&pass);
     }
 
-    /// Whether the section had earlier visits, and its newest visit has only samples of trusted heads.
+    /// Whether the section had earlier visits, and its newest visit contains no samples of a head distrusted since.
     pub(super) fn is_visited_anew(&self) -> bool {
         self.visits.are_several() && !(self.suspect && self.visits.newest() <= self.suspected_in)
     }
 
-    /// Discards the section's samples of all visits except the newest.
+    /// Keeps only the samples of the newest visit to the section, and discards those of all others.
     pub(super) fn keep_newest_visit(&mut self) {
         self.visits.keep_newest();
         self.suspect = false;
     }
 
-    /// Returns the reason why a small hole is no evidence of coverage; `None` if it is evidence.
+    /// Returns the reason why even a small hole does not prove coverage; `None` if it does.
     ///
-    /// The returns accepted as wall may come from something else, or the positions of the samples relative to
-    /// one another may be uncertain.
+    /// The returns accepted as wall may come from something else. Or the positions of the samples relative to each
+    /// other may be uncertain.
     pub(super) fn doubt(&self) -> Option<Unsure> {
         let of_heads = self.suspect.then_some(Unsure::DistrustedHead);
         let of_places = self.visits.are_unrelated().then_some(Unsure::SeveralStretches);
@@ -243,8 +244,7 @@ impl Section {
         self.wall_doubt().or(of_returns).or(of_heads).or(of_places)
     }
 
-    /// Returns the reason why most of the returns accepted as wall may come from something else; `None` if
-    /// there is no such reason.
+    /// Returns the reason why most returns accepted as wall may come from something else; `None` if there is none.
     pub(super) fn wall_doubt(&self) -> Option<Unsure> {
         Some(match self {
             _ if self.contradicts() => Unsure::ContradictedProfile,
@@ -257,7 +257,7 @@ impl Section {
 
     /// Returns the reason why the section neither passes nor fails although no more samples will come.
     ///
-    /// `None` if the section passes or fails, or if samples may still come.
+    /// `None` if it passes or fails, or if samples may still come.
     pub fn unsure(&self) -> Option<Unsure> {
         match self.verdict {
             Verdict::Open if self.not_inspected => Some(Unsure::NotInspected),
@@ -272,10 +272,9 @@ impl Section {
         ratio.is_some_and(|ratio| !AREA_RATIO.contains(&ratio))
     }
 
-    /// Records that the section holds samples of a distrusted head.
+    /// Records that the section has samples of a distrusted head.
     ///
-    /// The section then can't pass, and is due for judging. Returns false if its newest visit was recorded as suspect
-    /// before.
+    /// Then it cannot pass, and is due for judging. Returns false if its newest visit was already recorded as suspect.
     pub fn suspect(&mut self) -> bool {
         let is_new = !self.suspect || self.suspected_in != self.visits.newest();
         if is_new {
@@ -301,7 +300,7 @@ impl Section {
     }
 }
 
-/// Length of tunnel by verdict, m. Each metre counts for one verdict.
+/// Length of tunnel by verdict, m. Each metre counts for only one verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Metres {
     /// Length of the sections that passed.
@@ -310,7 +309,7 @@ pub struct Metres {
     pub fail_m: f64,
     /// Length of the sections that neither pass nor fail, although no more samples will land.
     pub cannot_say_m: f64,
-    /// Length of the sections that are still open: driving on may fill their holes.
+    /// Length of the sections that are still open, because driving on may fill their holes.
     pub open_m: f64,
     /// Length of the sections at the ends of the coverage extent where some heads have not been.
     ///

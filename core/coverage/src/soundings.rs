@@ -1,7 +1,7 @@
 //! Sounding density: number of samples per node of a square grid, as survey specifications require.
 //!
-//! A grid does not detect all gaps: a helix can satisfy the grid and leave strips wider than the target. The density is
-//! given in addition to the holes, and never replaces them. Source: docs/why/coverage.md, "For surveyors".
+//! A grid does not detect all gaps: a helix can fill every node and still leave strips wider than the target. So the
+//! density is given in addition to the holes, and never replaces them. Source: docs/why/coverage.md, "For surveyors".
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
@@ -17,7 +17,7 @@ pub const NODE_M: f64 = 0.5;
 pub struct GridLayout {
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
-    /// First chainage of the grid, m; rows are aligned to chainage zero.
+    /// First chainage of the grid, m. Rows are aligned to chainage zero.
     pub from_m: f64,
     /// Last chainage of the grid, m.
     pub to_m: f64,
@@ -70,7 +70,7 @@ impl GridSummary {
 impl Soundings {
     /// Creates an empty grid.
     ///
-    /// Allocates: at startup, two bytes per node; the OS maps a page on its first sample.
+    /// Allocates: at startup, two bytes per node. The OS maps a page when its first sample arrives.
     pub fn new(layout: GridLayout) -> Self {
         let first_row = math::floor_to_i64(layout.from_m / layout.node_m);
         let rows = (math::floor_to_i64(layout.to_m / layout.node_m) - first_row).max(0) + 1;
@@ -84,7 +84,7 @@ impl Soundings {
         [self.layout.node_m, self.layout.perimeter_m / self.columns as f64]
     }
 
-    /// Counts a sample in its node; returns false if the sample lies outside the grid or isn't finite.
+    /// Counts a sample in its node. Returns false if the sample lies outside the grid or is not finite.
     ///
     /// Allocates: never.
     pub fn add(&mut self, at: WallPoint) -> bool {
@@ -161,7 +161,7 @@ mod tests {
     }
 
     proptest! {
-        /// The expected counts come from the samples within each node's edges.
+        /// The expected counts come from the samples within the edges of each node.
         #[test]
         fn each_grid_node_counts_the_samples_within_its_edges(
             samples in proptest::collection::vec((-3.0f64..19.0, 0.0f64..7.3), 0..400),
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn all_grid_nodes_can_have_samples_despite_a_missed_strip() {
-        // Two passes run along the edges of each row of nodes. Every node has ten samples, but the strip of 0.4 m
+        // Two passes run along the edges of each row of nodes. So every node has ten samples, but the strip of 0.4 m
         // between the passes has none.
         let passes = (0..20).flat_map(|k| [0.05, 0.45].map(|x_m| f64::from(k) * 0.5 + x_m));
         let samples: Vec<_> =

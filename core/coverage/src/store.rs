@@ -1,9 +1,10 @@
-//! Samples on the unrolled wall, in bricks of several rows of square cells around the perimeter.
+//! Samples on the unrolled wall. The wall is divided into bricks; a brick has several rows of square cells around the
+//! perimeter.
 //!
-//! Bricks near the vehicle are open: they hold unpacked samples, listed by cell. Bricks farther away are packed to
-//! four bytes per sample. A packed brick is opened again when the vehicle comes back or a pass search needs it. Full
-//! cells are thinned, so memory in use grows with the wall seen, not with the duration of the dive. All memory is
-//! allocated before the loop is armed. The OS maps a page on first use.
+//! Bricks near the vehicle are open: they hold unpacked samples, listed by cell. In bricks farther away, samples are
+//! packed to four bytes each. A packed brick is opened again when the vehicle comes back or a pass search needs it.
+//! Full cells are thinned, so memory in use grows with the wall seen, not with the duration of the dive. All memory is
+//! allocated before the dive starts. The OS maps a page on first use.
 
 mod open;
 mod packed;

@@ -1,4 +1,4 @@
-//! Trust in heads: detects noise, a range that never changes, and wall that other heads do not see.
+//! Trust in heads. Detects noise, a range that never changes, and wall that no other head sees.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,38 +10,38 @@ use headrace_geometry::math;
 /// Reason for distrusting a head, with the figure that shows it, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Distrust {
-    /// Most successive returns of the head disagree; the value is their mean difference.
+    /// Most successive returns of the head disagree. The value is their mean difference.
     Scattered(f64),
-    /// The head's range is constant although the range to the design varies; the value is the head's range.
+    /// The head's range is constant although the range to the design varies. The value is this constant range.
     Constant(f64),
-    /// The head contradicts the design where other heads agree with it; the value is the mean deviation from
-    /// the design.
+    /// The head contradicts the design where other heads agree with it. The value is the mean deviation from the
+    /// design.
     Outvoted(f64),
 }
 
-/// Beam of a return: range, direction and motion of the head.
+/// Beam of a return: its range, its direction, and whether the head turns.
 pub struct Beam<'a> {
     /// Range of the return, m.
     pub range_m: f64,
     /// Direction of the beam across the tunnel, rad.
     pub angle_rad: f64,
-    /// Whether the head is not turning.
+    /// Whether the head is stalled.
     pub standing: bool,
-    /// Range to the design profile, m; `None` if the beam doesn't meet the profile.
+    /// Range to the design profile, m. `None` if the beam does not meet the profile.
     pub design_range_m: &'a dyn Fn() -> Option<f64>,
 }
 
-/// Evidence on one head from the vehicle's other heads.
+/// Evidence about one head from the vehicle's other heads.
 pub(super) struct Others {
-    /// Votes of other heads on this head, see [`Ballot`].
+    /// Votes of other heads on this head; see [`Ballot`].
     pub(super) ballot: Ballot,
-    /// Whether another head's range varies when the range to the design varies.
+    /// Whether another head's range varies when the range to the design does.
     pub(super) change: bool,
 }
 
 /// Disagreement of a return with the returns before it.
 pub(super) struct Disagreement {
-    /// Difference from the previous return, m; `None` if the two returns agree.
+    /// Difference from the previous return, m. `None` if the two returns agree.
     pub(super) jump_m: Option<f64>,
     /// Number of waiting returns that this return made doubtful.
     pub(super) doubtful: u32,
@@ -52,20 +52,21 @@ pub(super) struct Disagreement {
 struct HalfTurn {
     returns: u32,
     doubtful: u32,
-    /// Number of returns that disagree with the previous return, and the sum of the differences, m.
+    /// Number of returns that disagree with the return before (`jumps`), and sum of these differences, m.
     jumps: u32,
     jump_sum_m: f64,
     turned_rad: f64,
-    /// Sums over the half turn, m and m2: range, squared range, and squared change of range from the previous return.
+    /// Sums over the half turn, m and m2: of the range, of its square, and of the squared change since the previous
+    /// return.
     range_sum_m: f64,
     range_square_m2: f64,
     change_square_m2: f64,
-    /// Least and greatest chainage of the half turn's returns, m.
+    /// Smallest and largest chainage of the half turn's returns, m.
     between_m: Option<[f64; 2]>,
     /// Number of returns within runs of constant range.
     ///
-    /// The next fields are the smallest and largest range of these returns, m, and the smallest and largest range to
-    /// the design in the same directions, m.
+    /// The next two fields belong to these returns: the smallest and largest range, m, and the smallest and largest
+    /// range to the design in the same directions, m.
     unchanged: u32,
     unchanged_m: Option<[f64; 2]>,
     design_m: Option<[f64; 2]>,
@@ -101,11 +102,11 @@ impl HalfTurn {
             && span_m(self.design_m) > VARIES * limits.tolerance_m
     }
 
-    /// Whether the range follows a wall: over all directions, it varies more than from one return to the next.
+    /// Whether the range follows a wall, so that it varies more over all directions than from one return to the next.
     ///
     /// For a constant range with independent noise, the ratio of squared changes to squared deviations from the mean is
     /// about 2, however strong the noise (von Neumann 1941, doi 10.1214/aoms/1177731677). A head in the centre of a
-    /// round pipe looks like a frozen head, and counts as frozen.
+    /// round pipe looks like a frozen head, so it counts as frozen.
     fn follows_a_wall(&self) -> bool {
         let mean_m = self.range_sum_m / f64::from(self.returns.max(1));
         let variation_m2 = self.range_square_m2 - mean_m * self.range_sum_m;
@@ -119,35 +120,32 @@ impl HalfTurn {
     }
 }
 
-/// Least ratio of squared changes to squared deviations from the mean at which a range counts as noise.
+/// Ratio of squared changes to squared deviations from the mean from which a range counts as noise.
 ///
 /// Over half a turn, independent noise has a ratio of 2 +- 0.2. The range to a wall has a much smaller ratio, unless
 /// the vehicle is in the centre of a round tunnel.
 const NOISE_RATIO: f64 = 1.0;
-/// Resolution of a profiling sonar's range, m. Smaller changes of range are no evidence.
+/// Resolution of a profiling sonar's range, m. Smaller changes of range show nothing.
 const RESOLUTION_M: f64 = 0.002;
-/// Minimum number of returns in half a turn for a decision on the head.
+/// Minimum number of returns in half a turn from which a head is judged.
 const FEW: u32 = 20;
-/// A range counts as unchanged if it varies by less than this share of the tolerance.
+/// Share of the tolerance by which an unchanged range may vary.
 ///
-/// The share corresponds to some quanta of a profiling sonar.
+/// It corresponds to some quanta of a profiling sonar.
 const UNCHANGED: f64 = 0.2;
-/// Maximum difference between runs of unchanged range that count as one constant range, as a share of the
-/// tolerance.
+/// Share of the tolerance by which runs of unchanged range may differ to count as one constant range.
 const CONSTANT: f64 = 0.6;
-/// A constant range contradicts the design if the range to the design varies by more than this multiple of
-/// the tolerance.
+/// Multiple of the tolerance by which the range to the design must vary for a constant range to contradict it.
 const VARIES: f64 = 2.0;
-/// Number of successive returns that make a run of unchanged range.
+/// Number of successive returns from which on they make a run of unchanged range.
 ///
-/// A few neighbouring returns of a wall may have nearly the same range.
+/// It must be large, because a few neighbouring returns of a wall may have nearly the same range.
 const RUN: u32 = 8;
-/// An exactly constant range contradicts the design if the range to the design varies by more than this
-/// multiple of the tolerance.
+/// Multiple of the tolerance by which the range to the design must vary for an exactly constant range to contradict it.
 ///
-/// This limit applies if another head's range varies when the range to the design varies. Without this
-/// condition, a constant range may be correct: in a round tunnel, the range to the design also varies if the
-/// vehicle is beside its estimated place.
+/// The limit applies only if another head's range varies when the range to the design does. Otherwise a constant range
+/// may be correct, because in a round tunnel the range to the design also varies if the vehicle is beside its estimated
+/// place.
 const STUCK_VARIES: f64 = 1.0;
 
 fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
@@ -166,7 +164,7 @@ struct Unchanged {
 }
 
 impl Unchanged {
-    /// Adds a return; returns true if the return is within a run of unchanged range.
+    /// Adds a return. Returns true if it is within a run of unchanged range.
     fn add(&mut self, range_m: f64, limits: &WallLimits) -> bool {
         let [least_m, most_m] = self.range_m;
         let span_m = [least_m.min(range_m), most_m.max(range_m)];
@@ -188,9 +186,8 @@ pub(super) struct HeadTrust {
     range_m: Option<f64>,
     unchanged: Unchanged,
     one_range: ConstantRange,
-    /// Chainages of the returns with an exactly constant range, m.
-    ///
-    /// The next field is the angle turned since the first of these returns.
+    /// Smallest and largest chainage of the returns with an exactly constant range, m. The next field is the angle that
+    /// the head has turned since the first of them, rad.
     one_range_at_m: [f64; 2],
     one_range_rad: f64,
     distrusted: Option<Distrust>,
@@ -203,7 +200,7 @@ impl HeadTrust {
 
     /// Adds a return.
     ///
-    /// Returns the reason if the head is distrusted from now on, with the chainages of its recent returns.
+    /// If the head is distrusted from now on, returns the reason and the chainages of its recent returns.
     pub(super) fn note(
         &mut self,
         placed: &PlacedReturn,
@@ -212,7 +209,7 @@ impl HeadTrust {
         limits: &WallLimits,
         others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {
-        // A stalled head sees only one place, and the wall there may well deviate from the design.
+        // A stalled head sees only one place, where the wall may well deviate from the design.
         if beam.standing {
             return None;
         }
@@ -283,7 +280,7 @@ impl HeadTrust {
 
     /// Records a return for the check of an exactly constant range.
     ///
-    /// After half a turn, the record starts again, unless the constant range contradicts the design.
+    /// The record starts again after half a turn, unless the constant range contradicts the design.
     fn note_range(&mut self, placed: &PlacedReturn, beam: &Beam<'_>, turned_rad: f64, limits: &WallLimits) {
         if self.one_range_rad > math::TAU / 2.0 && !self.is_stuck(limits) {
             self.one_range = ConstantRange::default();
@@ -298,7 +295,7 @@ impl HeadTrust {
         self.one_range_rad += turned_rad;
     }
 
-    /// Whether the ranges of the latest turn show that the head isn't frozen, see [`HalfTurn::follows_a_wall`].
+    /// Whether the ranges of the latest turn show that the head is not frozen; see [`HalfTurn::follows_a_wall`].
     pub(super) fn follows_a_wall(&self) -> bool {
         self.halves[0].with(&self.halves[1]).follows_a_wall()
     }

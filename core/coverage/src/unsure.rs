@@ -7,22 +7,21 @@ use super::passage::{Drive, Passage};
 
 /// Reason why a section neither passes nor fails although no more samples will come.
 ///
-/// Samples may come again if the vehicle turns back.
+/// More samples come only if the vehicle turns back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Unsure {
-    /// The coverage extent begins, or the vehicle turned back, in the section.
+    /// The coverage extent begins in the section, or the vehicle turned back in it.
     ///
-    /// Some heads have not been in the section.
+    /// So some heads have not been in the section.
     NotInspected,
-    /// The difference between hole diameter and target is less than the diameter's error, because position errors are
-    /// too large.
+    /// Because of position errors, the error of the hole's diameter is larger than its difference from the target.
     Position,
-    /// The section holds samples of several navigation segments.
+    /// The section has samples of several navigation segments, whose offset is unknown.
     SeveralStretches,
-    /// More returns are doubtful than were accepted as wall.
+    /// More returns are doubtful than were accepted as wall, or doubtful returns may fill the hole.
     DoubtfulReturns,
-    /// The section holds samples of a head that was distrusted soon after.
+    /// The section has samples of a head that was distrusted soon after.
     DistrustedHead,
     /// The section's samples contradict the design profile.
     ContradictedProfile,
@@ -63,7 +62,7 @@ impl Unsure {
 /// Neighbouring sections that are unsure for the same reason.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {
-    /// Reason that all sections in the stretch share.
+    /// Reason why the sections of the stretch are unsure.
     pub why: Unsure,
     /// Index of the stretch's first section.
     pub from: i64,
@@ -71,8 +70,8 @@ pub struct Stretch {
     pub to: i64,
     /// The stretch's sections, in two groups.
     ///
-    /// Sections of the first group are unsure mainly because of the size of their hole. Sections of the second group
-    /// are unsure mainly because of the error of their hole.
+    /// Those of the first group are unsure mainly because of the size of their hole. Those of the second group are
+    /// unsure mainly because of its error.
     of: [Largest; 2],
 }
 
@@ -81,29 +80,27 @@ pub struct Stretch {
 pub struct Largest {
     /// Number of sections in the group.
     pub sections: u32,
-    /// Diameter of the group's largest hole, and its standard deviation, m.
+    /// Diameter of the group's largest hole, and standard deviation of this diameter, m.
     pub hole_m: [f64; 2],
     /// Driving figures of the section with the largest hole.
     pub driven: Driven,
 }
 
-/// Speed at which a section was driven, and the largest speed that would meet the target there.
+/// Speed at which a section was driven, and the largest speed that meets the target there.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Driven {
-    /// Speed along the tunnel, m/s; zero if no head passed.
+    /// Speed along the tunnel, m/s. Zero if no head passed.
     pub speed_mps: f64,
-    /// Largest speed that meets the target with all heads turning as scheduled, m/s; zero if no speed does.
+    /// Largest speed that meets the target with all heads turning as scheduled, m/s. Zero if no speed does.
     pub fits_mps: f64,
-    /// Whether heads at their scheduled angles pass unevenly at this speed.
-    ///
-    /// Heads at different places along the hull are then out of phase.
+    /// Whether the heads pass unevenly at this speed, even at their scheduled angles. They are then at different places
+    /// along the hull, and so are out of phase.
     pub is_uneven: bool,
-    /// Whether some heads were silent or detected no wall. The speeds nevertheless assume that all heads
-    /// work.
+    /// Whether some heads were silent or detected no wall. The speeds nevertheless assume that all heads work.
     pub is_short: bool,
 }
 
-/// Passes are uneven if the longest time between them exceeds the time between evenly spread passes by this ratio.
+/// Ratio of the longest time between passes to that between evenly spread passes above which passes are uneven.
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
@@ -119,19 +116,18 @@ impl Driven {
     }
 }
 
-/// Ratio of the hole's error to its diameter above which a section counts as unsure mainly because of the
-/// error.
+/// Ratio of the hole's error to its diameter above which the error, not the size, is the main reason for a section to
+/// be unsure.
 const MOSTLY_ERROR: f64 = 0.2;
 /// Maximum gap between sections of one unsure stretch, m.
 ///
-/// If a vehicle repeats one section, it also passes the sections within this distance.
+/// A vehicle that repeats one section also passes the sections within this distance.
 const JOIN_M: f64 = 2.0;
 
 impl Stretch {
     /// Creates an unsure stretch from one section.
     ///
-    /// The figures are the diameter of the section's hole, the diameter's error, and the diameter's standard deviation,
-    /// m.
+    /// The figures are the diameter of the section's hole, its error, and its standard deviation, m.
     pub fn one(why: Unsure, index: i64, [hole_m, error_m, sd_m]: [f64; 3], driven: Driven) -> Self {
         let section = Largest { sections: 1, hole_m: [hole_m, sd_m], driven };
         let is_error = error_m > MOSTLY_ERROR * hole_m;
@@ -149,20 +145,19 @@ impl Stretch {
         self.of[1].sections > self.of[0].sections
     }
 
-    /// Returns the figures that represent the stretch.
-    ///
-    /// The figures are those of the largest hole in the larger group of sections.
+    /// Returns the figures that represent the stretch. They are those of the largest hole in the larger group of
+    /// sections.
     pub fn largest(&self) -> &Largest {
         &self.of[usize::from(self.is_mostly_error())]
     }
 
-    /// Whether sections are too far away to belong to this unsure stretch.
+    /// Whether `sections` are too far away to belong to this unsure stretch.
     pub fn is_beyond(&self, sections: Range<i64>, section_m: f64) -> bool {
         let apart = (sections.start - self.to).max(self.from - sections.end);
         apart as f64 * section_m > JOIN_M + 1e-9
     }
 
-    /// Adds a stretch to this stretch. Returns false if the added stretch has another reason, or is too far away.
+    /// Adds another stretch to this one. Returns false if it has another reason, or is too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
         if self.why != other.why || self.is_beyond(other.from..other.to, section_m) {
@@ -203,7 +198,7 @@ mod tests {
         assert_eq!(*stretch.largest(), largest);
     }
 
-    /// A single section with a large error does not represent the stretch, however large its hole is.
+    /// A single section with a large error does not represent its stretch, whatever the size of its hole.
     #[test]
     fn single_section_with_a_large_error_does_not_set_the_figures_of_its_stretch() {
         let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());

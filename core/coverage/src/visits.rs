@@ -1,8 +1,7 @@
 //! Visits of the vehicle to a place in the tunnel.
 //!
-//! The error between passes of one visit is known. The error between passes of different visits may be larger.
-//!
-//! A visit ends where the vehicle turns back, and where navigation breaks off.
+//! A visit ends where the vehicle turns back, and where navigation breaks off. The error between passes of one visit is
+//! known. The error between passes of different visits may be larger.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,17 +10,16 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Limits for the time between two samples. Up to the first limit, the error between successive passes applies.
+/// Limits of the time between two samples. Up to `SAME_PASS`, the error between successive passes applies.
 ///
-/// From the second limit on, the error relative to a much earlier visit applies. Between the limits, both errors are
-/// mixed.
+/// From `LONG_BEFORE` on, the error relative to a much earlier visit applies. In between, both errors are mixed.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 
 /// The visit during which a sample was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Visit {
-    /// Number of the visit, from zero. The number never decreases.
+    /// Number of the visit, from zero. Later visits never have a lower number.
     pub number: u32,
     /// Number of the visit's navigation segment.
     pub tie: u32,
@@ -44,9 +42,9 @@ impl Visit {
         }
     }
 
-    /// Largest standard deviation of the diameter of a hole between samples of this visit and of an earlier visit, m.
+    /// Largest standard deviation of the diameter of a hole between samples of this and an earlier visit, m.
     ///
-    /// The latest sample of the earlier visit is from the time `then`.
+    /// `then` is the time of the earlier visit's latest sample.
     fn apart_sd_m(&self, then: MonoNs, profile: &Profile) -> f64 {
         let over = (self.at.since(then) + DurNs(-SAME_PASS.0)).as_secs_f64();
         let share = (over / (LONG_BEFORE.0 - SAME_PASS.0) as f64 * 1e9).clamp(0.0, 1.0);
@@ -56,7 +54,7 @@ impl Visit {
     }
 }
 
-/// The visits of a section: visits with samples within the target T of the section.
+/// The visits of a section. They have samples within the target T of the section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Visits {
     /// Number of the newest visit, its navigation segment, and the time of its latest sample.
@@ -69,7 +67,7 @@ pub struct Visits {
     several: bool,
     /// Whether the visits belong to several navigation segments.
     unrelated: bool,
-    /// The largest standard deviation of a hole's diameter between samples of different visits, m.
+    /// Largest standard deviation of a hole's diameter between samples of different visits, m.
     apart_sd_m: f64,
 }
 
@@ -106,21 +104,21 @@ impl Visits {
         self.several
     }
 
-    /// Whether the relation between the visits is uncertain.
+    /// Whether the offset between the visits is unknown.
     ///
-    /// In that case, samples of one visit may only seem to fill the holes of another visit.
+    /// Then samples of one visit may only seem to fill the holes of another.
     pub(super) fn are_unrelated(&self) -> bool {
         self.unrelated
     }
 
-    /// Keeps only the newest visit, which alone shows that the section passes.
+    /// Keeps only the newest visit, which is enough to show that the section passes.
     pub(super) fn keep_newest(&mut self) {
         (self.first, self.several, self.unrelated, self.apart_sd_m) = (self.newest(), false, false, 0.0);
     }
 
-    /// Returns the standard deviation of the diameter of a hole among the samples of all visits, m.
+    /// Returns the standard deviation of the diameter of a hole among the samples of all counted visits, m.
     ///
-    /// `pass_sd_m` is the standard deviation of the newest visit.
+    /// `pass_sd_m` is the standard deviation by the newest visit alone.
     pub(super) fn sd_m(&self, pass_sd_m: f64) -> f64 {
         if self.several { pass_sd_m.max(self.apart_sd_m) } else { pass_sd_m }
     }
@@ -134,7 +132,7 @@ mod tests {
 
     /// Creates a visit with this number and navigation segment.
     ///
-    /// The error (1 sd) is 1 cm between the visit's passes, and 10 cm relative to a much earlier visit.
+    /// The error between its passes is 1 cm, and its error relative to a much earlier visit is 10 cm (1 sd each).
     fn visit(number: u32, tie: u32, at_s: u64) -> Visit {
         let error = |sd_m: f64| PassError { relative: Relative::along(sd_m), from_m: [0.0; 2] };
         Visit { number, tie, at: MonoNs(at_s * 1_000_000_000), errors: [error(0.01), error(0.1)] }
@@ -164,7 +162,7 @@ mod tests {
         assert_eq!((visits.first(), visits.are_several(), visits.are_unrelated()), (4, false, false));
     }
 
-    /// The error between two visits grows with the time since the earlier visit, between 20 s and 40 s.
+    /// The error between two visits grows with the time between them, from 20 s to 40 s.
     #[test]
     fn error_between_visits_grows_with_the_time_between_them() {
         let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);

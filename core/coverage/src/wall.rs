@@ -2,9 +2,9 @@
 //!
 //! A return within the tolerance of the design is wall. A return is also wall if an earlier pass found wall with the
 //! same deviation nearby. Other successive returns that agree with one another are a *run*, which has odds of being
-//! wall, see `origin`.
+//! wall; see `origin`.
 //!
-//! A return waits for the head's next returns before it is decided, since a boulder begins with a single return.
+//! A boulder begins with a single return. So a return waits for the head's next returns before it is classified.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ use super::wall_limits::{PlacedReturn, WallLimits};
 pub enum Taken {
     /// The return came from wall.
     Wall,
-    /// Uncertain: wall, or something in the water.
+    /// Uncertain: either wall, or something in the water.
     Doubtful,
     /// The return came from something in the water, or by a second path.
     Other,
@@ -28,18 +28,16 @@ pub enum Taken {
     Waits,
 }
 
-/// Decisions on a head's returns that follow from its newest return.
+/// Decisions on a head's returns, made when its newest return arrives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sorted {
-    /// Classification of all waiting returns; `None` if no return waits, or if the returns still wait.
+    /// Classification of all waiting returns. `None` if no return waits, or if they go on waiting.
     pub waiting: Option<Taken>,
     /// Classification of the newest return.
     pub this: Taken,
-    /// Whether another head has found wall with the same deviation at the newest return, and this head's range follows
-    /// a wall.
+    /// Whether another head has found the same wall as the newest return. This head's range must also follow a wall.
     pub is_confirming: bool,
-    /// Reason if the newest return makes the head distrusted, and the chainages of the head's recent returns,
-    /// m.
+    /// Reason for distrusting the head from the newest return on, and chainages of its recent returns, m.
     pub distrusted: Option<(Distrust, [f64; 2])>,
 }
 
@@ -50,19 +48,19 @@ pub const MOST_WAITING: usize = 24;
 struct Run {
     waiting: [PlacedReturn; MOST_WAITING],
     waits: u8,
-    /// First return and number of returns of the run. Both include returns that have already been classified.
+    /// First return and number of returns of the run, including returns that have already been classified.
     first: Option<PlacedReturn>,
     all: u32,
     /// Largest distance of the run from the design, and its width, m.
     off_m: f64,
     width_m: f64,
-    /// Number of earlier passes that met the same thing at a return, summed over all returns of the run.
+    /// Number of earlier passes that met the same thing, summed over all returns of the run.
     confirmed: u32,
     /// Number of earlier passes that met the same thing, for each waiting return.
     confirmed_each: [u8; MOST_WAITING],
     /// Number of the run's ends that slope to the wall.
     slopes: u8,
-    /// Whether the run is certain to be wall. Its next returns then don't wait.
+    /// Whether the run is certain to be wall, so that its next returns need not wait.
     is_wall: bool,
 }
 
@@ -72,19 +70,19 @@ impl Run {
         u32::from(self.waits)
     }
 
-    /// Returns the waiting returns of the run, each with the number of earlier passes that met the same thing.
+    /// Returns the run's waiting returns, each with the number of earlier passes that met the same thing.
     fn returns(&self) -> impl Iterator<Item = (&PlacedReturn, u8)> {
         self.waiting.iter().zip(self.confirmed_each).take(usize::from(self.waits))
     }
 
-    /// Adds a return that waits for classification to the run.
+    /// Adds a return to the run. It waits for classification.
     fn add(&mut self, placed: &PlacedReturn, confirmed: u8, limits: &WallLimits) {
         debug_assert!(!self.is_full(), "a run is given up when {MOST_WAITING} returns wait: {}", self.waits);
         let first = *self.first.get_or_insert(*placed);
         self.all += 1;
         self.confirmed += u32::from(confirmed);
         self.off_m = self.off_m.max(placed.off_m.abs());
-        // Each return represents one step of width: half a step on either side.
+        // Each return represents a width of one step, half a step on either side of it.
         let steps = f64::from(self.all.max(2)) / f64::from(self.all.max(2) - 1);
         self.width_m = self.width_m.max(steps * limits.width_m(&first, placed)).max(limits.step_m(placed));
         let at = usize::from(self.waits);
@@ -100,12 +98,12 @@ impl Run {
         Extent { width_m: self.width_m, off_m: self.off_m, confirmed, slopes: self.slopes }
     }
 
-    /// Whether the run is behind the design profile.
+    /// Whether the run is farther out than the design profile.
     fn is_behind(&self) -> bool {
         self.first.is_some_and(|first| first.off_m > 0.0)
     }
 
-    /// Whether there is no room for another waiting return.
+    /// Whether no more returns can wait.
     fn is_full(&self) -> bool {
         usize::from(self.waits) == MOST_WAITING
     }
@@ -118,14 +116,14 @@ impl Run {
     }
 }
 
-/// The latest returns of a head, and the trust in this head.
+/// The latest returns of a head, and the trust in it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeadWall {
-    /// The two latest returns, the newer one first, and their classification.
+    /// The two latest returns with their classification. The newer one comes first.
     last: [Option<(PlacedReturn, Taken)>; 2],
     /// The run of returns that wait for classification.
     run: Run,
-    /// Experience with runs in front of the design profile, and with runs behind it.
+    /// Experience with runs inside the design profile, and with runs outside it.
     experience: [Experience; 2],
     /// Angle of the latest beam, and angle turned since the start of the dive, rad.
     angle_rad: f64,
@@ -139,7 +137,7 @@ impl HeadWall {
         self.trust.distrusted()
     }
 
-    /// Classifies the head's next return and the returns that waited for it.
+    /// Classifies the head's next return, and the returns that have waited for it.
     ///
     /// `beam` is the beam of the next return.
     ///
@@ -180,7 +178,7 @@ impl HeadWall {
             let waiting = (waited.count() > 0).then_some(Taken::Other);
             return Sorted { waiting, this: Taken::Other, is_confirming: false, distrusted };
         }
-        // Heads that are frozen at one range don't confirm each other.
+        // Heads that are frozen at one range must not confirm each other.
         let is_confirming = this == Taken::Wall
             && !is_design
             && self.trust.follows_a_wall()
@@ -195,7 +193,7 @@ impl HeadWall {
         Sorted { waiting, this, is_confirming, distrusted }
     }
 
-    /// Turns the head to the next beam; returns the head's pass.
+    /// Turns the head to the next beam, and returns the pass to which it belongs.
     fn pass(&mut self, head: usize, beam: &Beam<'_>) -> Pass {
         self.turned_rad += math::wrap_signed(beam.angle_rad - self.angle_rad, math::TAU).abs();
         self.angle_rad = beam.angle_rad;
@@ -205,9 +203,9 @@ impl HeadWall {
     /// Classifies a head's new return and the returns that wait for it.
     ///
     /// `confirmed` is the number of earlier passes that met the same thing. `agrees` means that the new return agrees
-    /// with the head's previous return. `slopes` means that the new return agrees with one of the two previous returns,
-    /// and that this previous return is wall. Returns the run of waiting returns, its classification (`None` if
-    /// undecided), and the classification of the new return.
+    /// with the head's previous return. `slopes` means that it agrees with one of the two previous returns, and that
+    /// this one is wall. Returns the run of waiting returns, its classification (`None` if undecided), and the
+    /// classification of the new return.
     fn decide(
         &mut self,
         (placed, confirmed): (&PlacedReturn, u8),
@@ -255,7 +253,7 @@ impl HeadWall {
         experience.log_odds(&run.extent(), limits.radius_m)
     }
 
-    /// Classification of a run that has ended, or that is too long to wait.
+    /// Classification of a run that has ended or cannot wait longer.
     fn taken(&self, run: &Run, limits: &WallLimits) -> Taken {
         let log_odds = self.log_odds(run, limits);
         if log_odds >= limits.sure_log_odds {
@@ -267,7 +265,7 @@ impl HeadWall {
         }
     }
 
-    /// Adds a decided run to the experience with runs on its side of the design profile.
+    /// Adds a classified run to the experience with runs on its side of the design profile.
     fn note(&mut self, run: &Run, limits: &WallLimits) {
         let log_odds = self.log_odds(run, limits);
         let [front, behind] = &mut self.experience;

@@ -1,14 +1,13 @@
-//! Limits for accepting returns as wall: on their deviation from the design profile, and on their deviation
-//! from one another.
+//! Limits for accepting returns as wall: for their deviation from the design profile, and from one another.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Limits for accepting returns as wall, m. They scale with the cross-section.
+/// Limits for accepting returns as wall, m. They are larger in a larger cross-section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallLimits {
-    /// Tolerance: returns within this distance of the design, or of neighbouring wall returns, are wall.
+    /// Tolerance: largest difference from the design, or from neighbouring wall returns, at which a return is wall.
     pub tolerance_m: f64,
     /// Deviation from the design above which a return contradicts the design.
     pub contradiction_m: f64,
@@ -16,35 +15,32 @@ pub struct WallLimits {
     pub perimeter_m: f64,
     /// Radius of a circle with this perimeter.
     pub radius_m: f64,
-    /// Distance along the tunnel within which returns of an earlier pass count as neighbours.
+    /// Distance along the tunnel within which returns of an earlier pass are neighbours.
     ///
-    /// The distance doesn't depend on the target T, so the samples don't depend on T either.
+    /// It does not depend on the target T, so the samples do not depend on T either.
     pub reach_m: f64,
-    /// Log odds at which a run of returns counts as wall, computed from the confidence of verdicts.
+    /// Log odds from which on a run of returns counts as wall. They follow from the confidence of verdicts.
     ///
     /// At the opposite log odds, the run counts as something else.
     pub sure_log_odds: f64,
 }
 
-/// Tolerance as a share of the equivalent radius: the roughness of blasted rock, a tenth of a tunnel's
-/// radius.
+/// Tolerance as a share of the equivalent radius. The roughness of blasted rock is a tenth of a tunnel's radius.
 const TOLERANCE_SHARE: f64 = 0.1;
-/// Minimum tolerance, m: three times the resolution and noise of profiling sonars.
+/// Minimum tolerance, m. It is three times the resolution and noise of profiling sonars.
 const LEAST_TOLERANCE_M: f64 = 0.03;
 
-/// Approximate number of steps of a head in a turn, and least width of a step as a share of the step's width at the
-/// wall.
+/// Approximate number of steps of a head in a turn, and least width of a step as a share of its width at the wall.
 const STEPS: f64 = 128.0;
 const STEPS_SHARE: f64 = 0.05;
 
-/// Reach along the tunnel as a share of the equivalent radius, and minimum reach, m: about the distance
-/// between passes.
+/// Reach along the tunnel as a share of the equivalent radius, and minimum reach, m. Passes are about this far apart.
 const REACH_SHARE: f64 = 0.1;
 const LEAST_REACH_M: f64 = 0.2;
 
 impl WallLimits {
-    /// Limits for a design profile of this perimeter, and verdicts with this confidence, as a number of standard
-    /// deviations.
+    /// Creates the limits for a design profile of this perimeter. `confidence_sd` is the confidence of verdicts, as a
+    /// number of standard deviations.
     pub fn new(perimeter_m: f64, contradiction_m: f64, confidence_sd: f64) -> Self {
         let radius_m = perimeter_m / math::TAU;
         let tolerance_m = (TOLERANCE_SHARE * radius_m).max(LEAST_TOLERANCE_M).min(contradiction_m);
@@ -54,7 +50,7 @@ impl WallLimits {
         Self { tolerance_m, contradiction_m, perimeter_m, radius_m, reach_m, sure_log_odds }
     }
 
-    /// Width of a single return across its ray, m: about the step of a head.
+    /// Width across the ray that a single return represents, m. It is about the step of a head.
     pub(super) fn step_m(&self, placed: &PlacedReturn) -> f64 {
         let share = (1.0 + placed.off_m / self.radius_m).max(STEPS_SHARE);
         self.perimeter_m / STEPS * share
@@ -72,14 +68,14 @@ impl WallLimits {
         apart_m <= NEAR_SHARE * self.radius_m && (a.off_m - b.off_m).abs() <= self.tolerance_m + slope_m
     }
 
-    /// Distance between two returns across their rays, m, at the range of the nearer return from the centre.
+    /// Distance between two returns across their rays, m. It is measured at the smaller range from the centre.
     pub(super) fn width_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
         let inward = (1.0 + a.off_m.min(b.off_m) / self.radius_m).clamp(0.0, 1.0);
         let around_m = math::wrap_signed(a.arc_m - b.arc_m, self.perimeter_m) * inward;
         math::hypot(a.x_m - b.x_m, around_m)
     }
 
-    /// Distance along the wall between the rays of two returns, m, at the range of the farther return.
+    /// Distance along the wall between the rays of two returns, m. It is measured at the larger range.
     fn apart_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
         let outward = 1.0 + a.off_m.max(b.off_m).max(0.0) / self.radius_m;
         let around_m = math::wrap_signed(a.arc_m - b.arc_m, self.perimeter_m) * outward;
@@ -87,9 +83,9 @@ impl WallLimits {
     }
 }
 
-/// Slope between two neighbouring beams that is allowed in addition to the tolerance: 45 degrees.
+/// Slope between two neighbouring beams that is allowed in addition to the tolerance. 1 means 45 degrees.
 const SLOPE: f64 = 1.0;
-/// Maximum allowance for the wall's slope, as a multiple of the tolerance.
+/// Largest allowance for the wall's slope, as a multiple of the tolerance.
 const MOST_SLOPE: f64 = 1.0;
 /// Maximum distance between neighbouring returns as a share of the radius.
 const NEAR_SHARE: f64 = 0.4;

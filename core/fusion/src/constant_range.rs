@@ -1,5 +1,5 @@
-//! Detection of a sonar that reports the same range in every direction, for instance the range of its last echo, or the
-//! range to its own frame.
+//! Detection of a sonar that reports the same range in every direction. It may repeat the range of its last echo, or
+//! report the range to its own frame.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,8 @@ const SAME_M: f64 = 0.002;
 pub struct ConstantRange {
     returns: u32,
     range_m: f64,
-    /// Smallest and largest difference so far between a range and its design range, m.
+    /// Smallest and largest difference between a return's range and its design range since the range became constant,
+    /// m.
     off_m: [f64; 2],
 }
 
@@ -29,9 +30,10 @@ impl ConstantRange {
         }
     }
 
-    /// Whether at least `fewest` returns have the same range while the design range varies by more than `varies_m`.
+    /// Whether at least `fewest` successive returns have had the same range, while the design range has varied by more
+    /// than `varies_m`.
     ///
-    /// If the design range varies, the ranges to a real wall also vary, by more than 2 mm.
+    /// Ranges to a real wall vary with the design range, so equal ranges show a stuck sensor.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
@@ -41,7 +43,7 @@ impl ConstantRange {
         self.returns > 0
     }
 
-    /// Whether the last return began a new series of equal ranges.
+    /// Whether the range of the last return differs from the range before it, so a new series of equal ranges begins.
     pub fn is_new(&self) -> bool {
         self.returns == 1
     }

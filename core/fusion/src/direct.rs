@@ -21,12 +21,12 @@ use headrace_sensor::reading::{EchoRange, Level, MAX_SOURCES, Reading, TetherLen
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
-/// The speed comes from the cable readings within `SPEED_WINDOW`, of which there are at most `SPEED_READINGS`.
+/// The speed comes from at most `SPEED_READINGS` cable readings, none of them older than `SPEED_WINDOW`.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Standard deviation of an echosounder's range, m.
 const ECHO_SD_M: f64 = 0.01;
-/// Standard deviations of the prior position, m: across the tunnel, and up.
+/// Standard deviations of the position before the fit to the echoes, m: to the left, and up.
 const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
 /// Navigation without a Kalman filter.
@@ -37,7 +37,8 @@ pub struct DirectNavigation {
     tether: TetherTrack,
     echoes: [Option<(MonoNs, Echo)>; MAX_SOURCES],
     place: Option<(MonoNs, [f64; 2])>,
-    /// `height_m` is the height from pressure, m. `height_offset_m` makes this height agree with the echoes.
+    /// `height_m` is the height by the depth sensor, m. `height_offset_m` is added to it, to make it agree with the
+    /// echoes.
     height_m: Option<f64>,
     height_offset_m: f64,
 }
@@ -186,7 +187,8 @@ impl Navigation for DirectNavigation {
         let (_, [y_m, z_m]) = self.place.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Section)?;
         let speed_mps = self.tether.speed_mps();
         let x_m = chainage_m + speed_mps * at.since(since).as_secs_f64();
-        // The chainage error between two passes comes from rounding two cable readings to the counter's resolution.
+        // Two cable readings are each rounded to the counter's resolution. This causes the chainage error between two
+        // passes.
         let relative = Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },

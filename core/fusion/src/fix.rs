@@ -17,23 +17,23 @@ pub struct Fix {
     pub relative: Relative,
     /// Error covariance relative to a much earlier visit to this position in the same navigation segment.
     pub revisit: Relative,
-    /// Number of the navigation segment. Within a segment, the positions of soundings relative to each other are known;
-    /// between two segments, they are not.
+    /// Number of the navigation segment. Positions of soundings relative to each other are known within a segment, but
+    /// not between segments.
     pub tie: u32,
     /// Number of times the estimate has become much more certain while it settled.
     ///
-    /// Soundings from before such a change have larger errors. `relative` does not include these larger errors.
+    /// Soundings from before such a change have larger errors, which `relative` does not include.
     pub settled: u32,
 }
 
 /// Part of a fix that is missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoFix {
-    /// No recent attitude.
+    /// No recent attitude, or yaw is too uncertain.
     Heading,
-    /// No recent measurement of the chainage.
+    /// No recent chainage, or it is too uncertain.
     Chainage,
-    /// No recent measurement of the position in the cross-section.
+    /// No recent position in the cross-section, or it is too uncertain.
     Section,
 }
 

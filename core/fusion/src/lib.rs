@@ -1,7 +1,8 @@
 //! Navigation: the vehicle's position and attitude from its sensors' readings.
 //!
 //! [`Navigation`] is the interface that the loop uses. [`filter`] is the error-state Kalman filter over all sensors.
-//! [`direct`] is a plain reference method without uncertainty. [`smooth`] is the smoother, which runs after the dive.
+//! [`direct`] is a simple method without uncertainties, for comparison. [`smooth`] is the smoother for use after the
+//! dive.
 //!
 //! ```
 //! use headrace_fusion::direct::DirectNavigation;

@@ -12,8 +12,8 @@ use headrace_sensor::reading::Reading;
 
 /// A navigation method that turns readings into fixes.
 ///
-/// Readings arrive in order of receive time, and a fix uses all readings so far. The saved state contains
-/// everything that a fix depends on, so that navigation can resume from a snapshot.
+/// Readings arrive in order of receive time, and a fix uses all readings so far. The saved state contains everything
+/// that a fix depends on, so navigation can resume from a snapshot.
 pub trait Navigation: Stateful + Send + Sync {
     /// Processes a reading. All readings of one sensor have the same `source`.
     ///
@@ -23,7 +23,7 @@ pub trait Navigation: Stateful + Send + Sync {
     /// Finishes navigation after the last reading.
     fn end(&mut self) {}
 
-    /// Returns the innovation statistics of a source; `None` if the navigation method or the source has no such
+    /// Returns the innovation statistics of a source. `None` for an unknown source, and for methods without such
     /// statistics.
     fn consistency(&self, _source: usize) -> Option<Consistency> {
         None
@@ -34,7 +34,7 @@ pub trait Navigation: Stateful + Send + Sync {
         None
     }
 
-    /// Returns the doubt about the cable counter if this doubt has lasted for at least a second.
+    /// Returns the doubt about the cable counter once it has lasted for at least a second.
     ///
     /// `None` while the counter is trusted, and for methods that do not check the counter.
     fn cable_doubt(&self) -> Option<CableDoubt> {
@@ -48,9 +48,9 @@ pub trait Navigation: Stateful + Send + Sync {
         0
     }
 
-    /// Returns the setting that the ranges contradict with certainty.
+    /// Returns the setting that the ranges certainly contradict.
     ///
-    /// `None` if there is no such setting, and for methods that do not check settings.
+    /// `None` if they contradict no setting, and for methods that do not check settings.
     fn setting_doubt(&self) -> Option<SettingDoubt> {
         None
     }

@@ -33,14 +33,15 @@ impl Relative {
 
     /// Standard deviation of the relative pitch and yaw errors together, radians.
     ///
-    /// If the arm to the point becomes a metre longer, [`Relative::sd_m`] changes by at most this number of metres.
+    /// For each metre by which the arm to the point becomes longer, [`Relative::sd_m`] changes by at most this many
+    /// metres.
     pub fn turn_sd_rad(&self) -> f64 {
         let [_, [_, pitch, _], [.., yaw]] = self.0;
         math::sqrt((pitch + yaw).max(0.0))
     }
 
-    /// Returns the relative covariance for another reference point on the vehicle. `arm` leads from the present
-    /// reference point to the other one.
+    /// Returns the relative covariance for another reference point on the vehicle. `arm` leads to it from the present
+    /// reference point.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];

@@ -7,7 +7,7 @@ use headrace_geometry::tunnel::Profile;
 
 /// Minimum cosine of the angle of incidence. Echosounder beams at a more grazing angle are ignored.
 const LEAST_COSINE: f64 = 0.1;
-/// A beam determines the vehicle's height if the beam's range changes by more than this per metre of height, m/m.
+/// Change of a beam's range per metre of height, m/m, above which the beam determines the vehicle's height.
 const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 
@@ -31,9 +31,9 @@ pub struct Place {
 
 /// Fits the position to the echoes by Gauss-Newton iteration, starting at `start`.
 ///
-/// Minimises sum((measured - predicted)^2 / sd^2) plus a prior term (position and standard deviations, m). The
-/// derivative of a range with respect to the position is -n / (n . beam). The iteration stops before a step that would
-/// leave the cross-section.
+/// Minimises sum((measured - predicted)^2 / sd^2) plus a prior term with the position `prior` and the standard
+/// deviations `prior_sd_m`. The derivative of a range with respect to the position is -n / (n . beam). The iteration
+/// stops before a step that leaves the cross-section.
 pub fn settle(
     profile: &Profile,
     attitude: Rot<Tunnel, Body>,

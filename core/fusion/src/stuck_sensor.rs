@@ -1,7 +1,7 @@
 //! Detection of a stuck inertial unit, which repeats its last reading.
 //!
-//! A noisy reading hardly ever equals the previous reading to the last bit. Readings without noise, as in ideal dives,
-//! repeat whenever the motion is steady, so such repetition is no evidence.
+//! A noisy reading hardly ever equals the one before to the last bit. But readings without noise, as in ideal simulated
+//! dives, repeat whenever the motion is steady. For them, repetition is no evidence.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,11 +11,11 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Minimum duration of identical readings before the inertial unit counts as stuck.
 const HANGS_AFTER: DurNs = DurNs(500_000_000);
-/// Natural logarithm of the largest probability that noise alone causes the repetition: one in a billion.
+/// Natural logarithm of the largest probability that the readings repeat by chance: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
-/// Weight of the newest value in two running means: of sign reversals on all three axes, and of the lengths of series.
+/// Weight of the newest value in the running means of sign reversals and of the lengths of series.
 const LATEST: f64 = 1.0 / 64.0;
-/// Readings count as noisy if more than this share of their successive differences reverses its sign.
+/// Share of successive differences that reverse their sign above which readings count as noisy.
 ///
 /// White noise reverses the sign of two thirds of the differences. A motion reverses hardly any.
 const NOISY: f64 = 0.3;
@@ -28,7 +28,7 @@ pub struct StuckSensor {
     steps: [f64; 3],
     /// Share of differences whose sign is opposite to that of the previous difference, from 0 to 1.
     to_and_fro: f64,
-    /// `usual_run` is the mean length of series of identical readings, and `run` the length of the present series, in
+    /// Mean length of a series of identical readings (`usual_run`), and length of the present series (`run`), in
     /// readings.
     usual_run: f64,
     run: u32,
@@ -67,7 +67,7 @@ impl StuckSensor {
 
     fn has_hung(&self, at: MonoNs) -> bool {
         let is_long = at.since(self.since).0 >= HANGS_AFTER.0;
-        // If each reading equals the one before with probability p, the mean length of a series is 1 / (1 - p).
+        // If a reading equals the one before with the probability p, a series has a mean length of 1 / (1 - p).
         let repeats = 1.0 - 1.0 / self.usual_run.max(1.01);
         is_long && self.to_and_fro > NOISY && f64::from(self.run) * math::ln(repeats) < BY_CHANCE_LN
     }
@@ -108,8 +108,8 @@ mod tests {
         assert!(all[first..2000].iter().all(|hangs| *hangs) && all[2000..].iter().all(|hangs| !hangs));
     }
 
-    /// The simulator's ideal units repeat a reading while the motion is steady. Every change of motion changes the
-    /// reading.
+    /// The simulator's ideal units repeat a reading while the motion is steady, and send another one as soon as the
+    /// motion changes.
     #[test]
     fn noise_free_inertial_unit_never_counts_as_stuck() {
         let swaying = |k: u64| [1e-2 * math::sin(k as f64 / 800.0), 0.0, 2e-2 * math::cos(k as f64 / 1700.0)];
@@ -122,12 +122,12 @@ mod tests {
         assert!(hangs(all).iter().all(|hangs| !hangs));
     }
 
-    /// A coarsely quantised unit at rest repeats each reading for a while. The coarser the unit is, the longer the
-    /// detection of a stuck unit takes.
+    /// A coarsely quantised unit at rest repeats each reading for a while. The coarser the unit, the longer it takes to
+    /// detect that it is stuck.
     #[test]
     fn coarsely_quantised_inertial_unit_at_rest_does_not_count_as_stuck() {
         // About one reading in 200 differs, and all others are equal. So series of three to 2000 equal readings are
-        // normal, and no evidence that the unit is stuck.
+        // normal, and do not show a stuck unit.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

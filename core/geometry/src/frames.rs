@@ -8,9 +8,10 @@
 //!            | /                          (+y)      |
 //!   y left --+/                                   0 deg (-z)
 //! ```
-//! Tunnel frame: right-handed, metres; x = chainage along the axis, y = left, z = up from the floor's centre.
-//! Body frame: x forward, y left, z up. Sensor frame: a profiling head turns about its own x; an echosounder looks
-//! along its own x. Rotations are named target-from-source: `Rot<Tunnel, Body>` takes body vectors to the tunnel's.
+//! Tunnel frame: right-handed, metres; x = chainage along the axis, y = left, z = up from the floor's centre. Body
+//! frame: x forward, y left, z up. Sensor frame: a profiling head turns about its own x; an echosounder looks along its
+//! own x. The type of a rotation names the target frame first: `Rot<Tunnel, Body>` turns body vectors into tunnel
+//! vectors.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -155,14 +156,14 @@ impl<F> Sub for Point3<F> {
 }
 
 impl<To, From> Rot<To, From> {
-    /// The identity rotation: the frames coincide.
+    /// The identity rotation, between frames with parallel axes.
     pub fn identity() -> Self {
         Self(UnitQuaternion::identity(), PhantomData)
     }
 
-    /// Creates a rotation from a quaternion w, x, y, z of any non-zero length.
+    /// Creates a rotation from a quaternion w, x, y, z. The quaternion may have any length above 1e-6.
     ///
-    /// Errors: `None` for a length that isn't finite or isn't above 1e-6.
+    /// Errors: `None` for a shorter or infinite quaternion, or one with NaN.
     pub fn from_wxyz(w: f64, x: f64, y: f64, z: f64) -> Option<Self> {
         let norm = math::sqrt(w * w + x * x + y * y + z * z);
         if !(norm.is_finite() && norm > 1e-6) {
@@ -186,9 +187,7 @@ impl<To, From> Rot<To, From> {
         Self(UnitQuaternion::new_unchecked(q), PhantomData)
     }
 
-    /// Returns roll, pitch and yaw in radians, with pitch in [-pi/2, pi/2].
-    ///
-    /// The function is the inverse of [`Rot::from_roll_pitch_yaw`].
+    /// Returns roll, pitch and yaw in radians, with pitch in [-pi/2, pi/2]. Inverse of [`Rot::from_roll_pitch_yaw`].
     pub fn roll_pitch_yaw(&self) -> (f64, f64, f64) {
         let q = self.0.quaternion();
         let (w, x, y, z) = (q.w, q.i, q.j, q.k);
@@ -205,10 +204,10 @@ impl<To, From> Rot<To, From> {
         [q.w, q.i, q.j, q.k]
     }
 
-    /// Whether the quaternion has unit length, within the rounding errors of a long product of rotations.
+    /// Whether the quaternion has unit length, apart from the rounding errors of a long product of rotations.
     pub fn is_unit(&self) -> bool {
-        /// Largest accepted error of the quaternion's squared length. Ten hours of multiplied rotations at 600 Hz give
-        /// errors below 1e-8.
+        /// Largest accepted error of the quaternion's squared length. Ten hours of rotations at 600 Hz, multiplied one
+        /// by one, give errors below 1e-8.
         const DRIFT: f64 = 1e-6;
         let [w, x, y, z] = self.wxyz();
         (w * w + x * x + y * y + z * z - 1.0).abs() <= DRIFT
@@ -270,7 +269,7 @@ pub struct Mount {
 
 /// Returns the direction of a head's beam at `angle_rad`, in the sensor frame.
 ///
-/// 0 is down; the angle grows clockwise seen along +x.
+/// The angle is 0 down, and grows clockwise as seen along +x.
 ///
 /// Source: docs/reference/glossary.md, "Sonar and samples".
 pub fn head_direction(angle_rad: f64) -> Vec3<Sensor> {

@@ -1,7 +1,7 @@
 //! Basis of every other crate: units, time, frames, mathematics, site, tunnel profiles, snapshots.
 //!
-//! Vectors carry their frame as a type. A place on a tunnel's wall is given by chainage and arc length. The crate is
-//! pure: no I/O, no threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
+//! The type of a vector contains its frame. A place on a tunnel's wall is given by chainage and arc length. The crate
+//! is pure: no I/O, no threads, no clock, no randomness. It takes transcendental functions only from [`math`].
 //!
 //! ```
 //! use headrace_geometry::tunnel::shapes;

@@ -2,8 +2,8 @@
 //!
 //! The results of `libm` are the same on every platform.
 //!
-//! The standard library calls the platform's C library, whose results differ by an ulp between machines. That is
-//! enough for two replays to diverge. A lint (clippy.toml) bans the standard library's functions.
+//! The standard library calls the platform's C library instead, whose results differ by an ulp between machines. Two
+//! replays could then diverge. A lint (clippy.toml) bans the standard library's functions.
 
 pub use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -69,8 +69,8 @@ pub fn erfc(x: f64) -> f64 {
 
 /// Wraps `value` to [0, `modulus`). `modulus` must be positive and finite.
 pub fn wrap(value: f64, modulus: f64) -> f64 {
-    // Nearly all values are within one modulus of [0, `modulus`). For these values, the branches give the same bits
-    // as the formula with the quotient.
+    // Nearly all values are less than one modulus outside [0, `modulus`). For them, the branches are faster, and give
+    // the same bits as the formula with the quotient.
     if (0.0..modulus).contains(&value) {
         // The addition turns -0.0 into 0.0.
         return value + 0.0;
@@ -87,8 +87,8 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
 
 /// Wraps `difference` to [-`modulus`/2, `modulus`/2), the shorter way round. `modulus` must be positive and finite.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
-    // As in `wrap`, the branches give the same bits as the formula with the quotient. Near an odd multiple of half the
-    // modulus, rounding can change the result by a modulus, so there the formula is used.
+    // As in `wrap`, the branches are faster and give the same bits as the formula with the quotient. Near an odd
+    // multiple of half the modulus, rounding could change the result by a modulus, so the formula is used there.
     let size = difference.abs();
     if size < 0.499 * modulus {
         return difference;
@@ -104,8 +104,8 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
 /// The largest integer not above `x`; saturates, and NaN gives zero.
 #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn floor_to_i64(x: f64) -> i64 {
-    // Inline code instead of a library call, because each sample needs several roundings to look up cells and
-    // sections.
+    // This is inline code instead of a library call, because the search for a sample's cell and section needs several
+    // roundings.
     let towards_zero = x as i64;
     if towards_zero as f64 > x { towards_zero.saturating_sub(1) } else { towards_zero }
 }
@@ -113,9 +113,9 @@ pub fn floor_to_i64(x: f64) -> i64 {
 /// The nearest integer to `x` (halves to even); saturates, and NaN gives zero.
 #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn round_to_i64(x: f64) -> i64 {
-    /// 2^52: doubles of this size have no fractional part.
+    /// 2^52. A double of this size has no fractional part.
     ///
-    /// Adding this constant to a value thus rounds the value to an integer, halves to even.
+    /// So adding this constant to a value rounds the value to an integer, halves to even.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
     let size = x.abs();
     if size < WHOLE { ((size + WHOLE) - WHOLE).copysign(x) as i64 } else { x as i64 }

@@ -59,7 +59,7 @@ impl Site {
         self.surface_pressure_pa + depth_m * self.density_kgpm3 * self.gravity_mps2
     }
 
-    /// Rescales a range, m, from the speed of sound `device_mps`, which the device assumed, to the water's.
+    /// Rescales a range, m, to the water's speed of sound. The device computed it with the speed `device_mps`.
     pub fn rescaled_range_m(&self, range_m: f64, device_mps: f64) -> f64 {
         range_m * (self.sound_speed_mps / device_mps)
     }
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn pressure_and_depth_follow_from_the_weight_of_water_and_air() {
-        // The depth is 10 m in sea water at 9.8 m/s^2, under an air pressure of 900 hPa.
+        // In sea water at 9.8 m/s^2 and under an air pressure of 900 hPa, a depth of 10 m gives 190,450 Pa.
         let sea = Site {
             density_kgpm3: 1025.0,
             gravity_mps2: 9.8,

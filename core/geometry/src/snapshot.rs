@@ -1,8 +1,8 @@
-//! Snapshots: the state after a tick as bytes, restored into a loop of the same vehicle and program.
+//! Snapshots: the state after a tick as bytes. A loop of the same vehicle and program can restore it.
 //!
-//! Serde writes plain values (numbers, enums, small records). A type with preallocated memory, or with settings that
-//! are not part of the state, is restored in place. [`stateful!`](crate::stateful) classifies every field of such a
-//! type, so that a new field cannot be forgotten.
+//! Serde writes plain values: numbers, enums, small records. Other types are restored in place, because they have
+//! preallocated memory or contain settings that are not part of the state. [`stateful!`](crate::stateful) classifies
+//! every field of such a type, so that a new field cannot be forgotten.
 //!
 //! ```
 //! use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _, stateful};
@@ -23,7 +23,7 @@
 //! # Ok::<(), headrace_geometry::snapshot::SnapshotError>(())
 //! ```
 //!
-//! Only the program that wrote a snapshot can read it; other versions cannot.
+//! A snapshot can be read only by the version of the program that wrote it.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -35,7 +35,7 @@ pub trait Stateful {
 
     /// Restores the state from a snapshot, in the order in which it was saved.
     ///
-    /// Settings and buffer capacities are unchanged.
+    /// Keeps settings and buffer capacities.
     ///
     /// Errors: the snapshot does not fit. `self` may then be partly restored and must not be used.
     fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError>;
@@ -72,7 +72,7 @@ pub struct Saver {
 }
 
 impl Saver {
-    /// Begins a named part of the state, and writes its name, which later errors report.
+    /// Begins a named part of the state. The name is written too, so that errors can report it.
     pub fn part(&mut self, name: &'static str) {
         self.part = name;
         self.value(&name);
@@ -97,7 +97,7 @@ impl Saver {
         }
     }
 
-    /// Appends stateful elements, but not how many there are, because their number is a setting.
+    /// Appends stateful elements. Their number is not written, because it is a setting.
     pub fn each<'a, T: Stateful + ?Sized + 'a>(&mut self, each: impl Iterator<Item = &'a T>) {
         each.for_each(|one| one.save(self));
     }
@@ -168,7 +168,7 @@ impl<'a> Restorer<'a> {
         Ok(())
     }
 
-    /// Reads values into a slice of fixed length.
+    /// Reads a list into a slice of the same length.
     ///
     /// Errors: the snapshot has another length, or an element can't be read.
     pub fn slots<T: DeserializeOwned>(&mut self, slots: &mut [T]) -> Result<(), SnapshotError> {
@@ -179,7 +179,7 @@ impl<'a> Restorer<'a> {
         slots.iter_mut().try_for_each(|slot| self.value().map(|value| *slot = value))
     }
 
-    /// Restores stateful elements in place; their number is a setting.
+    /// Restores stateful elements in place. Their number is a setting, so it is not read.
     ///
     /// Errors: the first error of an element.
     pub fn each<'t, T: Stateful + ?Sized + 't>(
@@ -222,7 +222,7 @@ impl<T: Serialize + DeserializeOwned> Stateful for T {
     }
 }
 
-/// Serde `with` module for arrays longer than serde supports.
+/// Serde module (`#[serde(with = ...)]`) for arrays longer than serde supports.
 pub mod array {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};

@@ -1,4 +1,4 @@
-//! Time as integer nanoseconds, in three types that can't be mixed up.
+//! Time as integer nanoseconds. Three types keep monotonic time, UTC and durations apart.
 //!
 //! The loop uses only [`MonoNs`], the host's monotonic clock. Its timestamps come from the thread that receives a
 //! device's bytes, from a log or from a simulation. UTC appears only at the program's inputs and outputs.
@@ -25,7 +25,7 @@ impl DurNs {
     /// Zero duration.
     pub const ZERO: Self = Self(0);
 
-    /// Creates a duration of whole milliseconds; saturates beyond 292 years.
+    /// Creates a duration of whole milliseconds. Beyond 292 years, it saturates.
     pub const fn from_millis(millis: i64) -> Self {
         Self(millis.saturating_mul(1_000_000))
     }
@@ -45,7 +45,7 @@ impl DurNs {
 }
 
 impl MonoNs {
-    /// Signed duration from `earlier` to `self`; saturates beyond 292 years.
+    /// Signed duration from `earlier` to `self`. Beyond 292 years, it saturates.
     pub fn since(self, earlier: Self) -> DurNs {
         let span = i128::from(self.0) - i128::from(earlier.0);
         DurNs(i64::try_from(span).unwrap_or(if span < 0 { i64::MIN } else { i64::MAX }))
@@ -53,7 +53,7 @@ impl MonoNs {
 
     /// Timestamp in seconds since the clock's origin, for reports.
     ///
-    /// Differences are computed with [`Self::since`].
+    /// Use [`Self::since`] for differences; it is exact.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NS_PER_S
     }

@@ -1,4 +1,4 @@
-//! Connection of a sensor: `connect` in vehicle files.
+//! Connection of a sensor: the key `connect` in vehicle files.
 
 use core::fmt;
 use core::num::ParseIntError;
@@ -10,21 +10,21 @@ const USUAL_BAUD: u32 = 115_200;
 /// Highest accepted serial rate, baud.
 const MAX_BAUD: u32 = 12_000_000;
 
-/// A USB device, identified by its descriptors, which do not depend on the USB port.
+/// A USB device, identified by its descriptors. These do not depend on the USB port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbIdentity {
     /// USB vendor id.
     pub vendor: u16,
     /// USB product id.
     pub product: u16,
-    /// Serial number, to distinguish devices of the same product.
+    /// Serial number, which distinguishes devices of the same product.
     pub serial: Option<String>,
 }
 
 /// A serial port, identified by its path or by its USB adapter.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SerialPort {
-    /// A device file; paths below `/dev/serial/by-id` stay the same after replugging.
+    /// A device file. A path below `/dev/serial/by-id` stays the same after replugging.
     Path(String),
     /// The port of this USB adapter, wherever the adapter is plugged in.
     Usb(UsbIdentity),
@@ -52,11 +52,12 @@ pub enum Connect {
     },
     /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port to which the device sends.
     ///
-    /// Only one sender is accepted: the one in `from`, or else the first whose message the device's driver accepts.
+    /// Only one sender is accepted: the one in `from`. Without `from`, it is the first one whose message the driver
+    /// accepts.
     UdpListen {
         /// Local address and port at which the host receives.
         address: String,
-        /// Host of the device, optionally with its port; any host if `None`.
+        /// Host of the device, optionally with its port. `None` accepts any host.
         from: Option<String>,
     },
     /// `can:INTERFACE`: a CAN bus.
@@ -87,7 +88,7 @@ pub struct ConnectError {
     pub allowed: String,
 }
 
-/// All forms of `connect`, listed in the error about a text that has none of these forms.
+/// All forms of `connect`. An error about any other text lists them.
 const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
      tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
 
@@ -261,7 +262,7 @@ fn udp_listen(rest: &str) -> Result<Connect, String> {
     if from.is_empty() {
         return Err("from= is empty; to accept the first valid sender, remove ?from=".to_owned());
     }
-    // An IPv6 address without a port has several colons.
+    // Several colons mean an IPv6 address, which may come without a port.
     if from.matches(':').count() == 1 {
         host_and_port(from).map_err(|problem| format!("from={from:?}: {problem}"))?;
     }
@@ -279,7 +280,7 @@ fn host_and_port(rest: &str) -> Result<String, String> {
     }
 }
 
-/// Checks the name of a network interface, which has at most 15 characters. Source: Linux, IFNAMSIZ.
+/// Checks the name of a network interface. It has at most 15 characters (Linux, IFNAMSIZ).
 fn can_interface(rest: &str) -> Result<String, String> {
     let allowed = |c: char| c.is_ascii_graphic() && c != '/' && c != ':';
     if rest.is_empty() || rest.len() > 15 || !rest.chars().all(allowed) {

@@ -1,10 +1,9 @@
 //! Interface that the crate of each kind of device implements.
 //!
-//! A kind parses its own keys in a sensor's table of a vehicle file. Each configured sensor has a driver, a decoder and
-//! an emulator.
+//! A kind of device parses its own keys in a sensor's table of a vehicle file. Each configured sensor has a driver, a
+//! decoder and an emulator.
 //!
-//! Opening the port, decoding bytes (pure) and using the readings (in the loop) are separate concerns. This file covers
-//! decoding, and for simulations the device's side of the line.
+//! None of these opens a port. Decoding is pure. The loop uses the readings.
 
 use super::driver::{Carrier, Driver, DriverSetup, Probe};
 use super::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
@@ -31,7 +30,7 @@ pub struct SensorConfig {
     pub connect: String,
     /// Position and attitude of the sensor on the vehicle.
     pub mount: Mount,
-    /// Delay from the time of validity of a value to the receive time of its first byte.
+    /// Delay from a value's time of validity to the receive time of its first byte.
     pub latency: DurNs,
 }
 
@@ -56,7 +55,7 @@ impl SensorInfo {
 pub enum SensorKind {
     /// A profiling head.
     Head,
-    /// An echosounder; readings with a lower confidence than `min_confidence` are ignored.
+    /// An echosounder. Readings with a confidence below `min_confidence` are ignored.
     Echosounder {
         /// Minimum confidence of a used reading, 0 to 1.
         min_confidence: f64,
@@ -94,7 +93,7 @@ pub struct InertialNoise {
 /// Bias of an inertial sensor, in the sensor's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasSpec {
-    /// Standard deviation of the bias's constant part, which is set at power-on.
+    /// Standard deviation of the bias's constant part, which changes only at power-on.
     pub turn_on: f64,
     /// Standard deviation of the bias's drift during operation.
     pub in_run: f64,
@@ -105,9 +104,9 @@ pub struct BiasSpec {
 /// Step and noise of a cable counter, from the vehicle file or a preset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CounterSpec {
-    /// Smallest change of the length, m; `None` if each reading carries the step.
+    /// Smallest change of the length, m. `None` if each reading contains this step.
     pub step_m: Option<f64>,
-    /// Standard deviation of the counter's noise, rounding excluded, m; `None` if unknown.
+    /// Standard deviation of the counter's noise without rounding, m. `None` if unknown.
     pub sd_m: Option<f64>,
 }
 
@@ -116,7 +115,7 @@ pub trait DeviceKind: Sync {
     /// Name of this kind of device in vehicle files and in the channel metadata of logs.
     fn name(&self) -> &'static str;
 
-    /// Parses this kind's own keys in a sensor's table. `sensor` already contains the common keys.
+    /// Parses the keys of this kind in a sensor's table. `sensor` contains the keys that all kinds share.
     ///
     /// Errors: the value of a key is not allowed.
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError>;
@@ -149,8 +148,8 @@ pub trait Device: Send + Sync {
         None
     }
 
-    /// Returns the modes of a profiling head at `range_m`, or at the configured range if `None`; no modes for other
-    /// devices.
+    /// Returns the modes of a profiling head at `range_m`, or at its configured range if `None`. Other devices have no
+    /// modes.
     ///
     /// Errors: a message, if the head does not have this range.
     fn modes(&self, range_m: Option<f64>) -> Result<Vec<HeadMode>, String> {
@@ -164,7 +163,7 @@ pub trait Device: Send + Sync {
     /// Returns the emulator of the device's side of the line, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
 
-    /// Returns the noise of an inertial unit if known. Values in the vehicle file take precedence.
+    /// Returns the noise of an inertial unit, if it is known. Values in the vehicle file take precedence.
     fn inertial_noise(&self) -> Option<InertialNoise> {
         None
     }
@@ -174,52 +173,51 @@ pub trait Device: Send + Sync {
         None
     }
 
-    /// Returns the report descriptor of a HID device, for a rehearsal to register an emulated device with the
+    /// Returns the report descriptor of a HID device. A rehearsal uses it to register an emulated device with the
     /// kernel.
     fn report_descriptor(&self) -> Option<Vec<u8>> {
         None
     }
 
-    /// Writes a packet to `shorter` without its optional payload, which a log may omit, and returns `true`.
+    /// Writes a packet to `shorter` without a payload that a log may omit, and returns `true`.
     ///
-    /// Returns `false` if the packet has no such payload, or if the payload cannot be recognised from these bytes
+    /// Returns `false` if the packet has no such payload, or if the payload cannot be recognised from this packet
     /// alone.
     fn without(&self, _what: OptionalPayload, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
         false
     }
 
-    /// Returns the address that distinguishes the device's bytes from those of other devices of its kind on the
-    /// same line.
+    /// Returns the address that distinguishes this device from others of its kind on the same line.
     ///
-    /// Devices with equal addresses, or without an address (`None`), cannot share a line.
+    /// Two devices of a kind cannot share a line if their addresses are equal or if they have none (`None`).
     fn line_address(&self) -> Option<String> {
         None
     }
 
-    /// Returns the keys with values that are allowed but seldom intended, each with the effect of its value.
+    /// Returns keys whose values are allowed but seldom intended, each with the effect of its value.
     fn remarks(&self) -> Vec<(&'static str, String)> {
         Vec::new()
     }
 
-    /// Returns the supported carriers. UDP may replace any of these carriers; each datagram then carries one message.
+    /// Returns the supported carriers. UDP may replace each of them; a datagram then contains one message.
     fn carriers(&self) -> &'static [Carrier];
 
     /// Returns the driver, which is the host's side of the device's line.
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
-/// Part of a packet that a log may omit. The decoded readings are bit-identical without this part.
+/// Part of a packet that a log may omit. Without it, the decoded readings are bit-identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OptionalPayload {
     /// Echo strengths, if the message also contains the range.
     Echoes,
-    /// Geographic positions, and identifiers unique to one machine.
+    /// Geographic positions, and identifiers that are unique to one machine.
     Identity,
 }
 
 /// Converts bytes to readings: a codec with the device's configuration.
 ///
-/// The decoder is pure and runs in the loop. Its saved state depends only on the decoded bytes, and excludes the
+/// A decoder is pure and runs in the loop. Its saved state depends only on the decoded bytes; it does not include the
 /// configuration.
 pub trait Decoder: Stateful + Send + Sync {
     /// Decodes a packet and calls `sink` for each completed reading.
@@ -235,14 +233,14 @@ pub trait Decoder: Stateful + Send + Sync {
         0
     }
 
-    /// Reason for which the last withheld reading was withheld; `None` if there is none.
+    /// Reason for which the latest withheld reading was withheld. `None` if none was withheld.
     fn withheld_reason(&self) -> Option<WithheldReason> {
         None
     }
 
-    /// Returns statistics of the device's clock against the host's; `None` if the device does not send its time.
+    /// Returns statistics that compare the device's clock with the host's. `None` if the device does not send its time.
     ///
-    /// The statistics are for reports only, because times of validity come from receive times.
+    /// They are for reports only, because times of validity come from receive times.
     fn clock(&self) -> Option<ClockReport> {
         None
     }
@@ -257,9 +255,9 @@ pub struct EmulatorSetup {
     pub head: Option<HeadProgram>,
     /// Water and location of the tunnel, as the operator knows them.
     pub site: Site,
-    /// Whether the host that polls the device is emulated as well.
+    /// Whether the host that polls the device is emulated too.
     ///
-    /// If not, the device answers requests passed to [`Emulator::hear`].
+    /// If not, the device answers only the requests that are passed to [`Emulator::hear`].
     pub polled: bool,
 }
 
@@ -275,9 +273,9 @@ pub enum Direction {
 /// Function that receives the traffic on a line: direction, time of the first byte, bytes.
 pub type LineSink<'a> = &'a mut dyn FnMut(Direction, MonoNs, &[u8]);
 
-/// Device side of the line, and optionally a host that polls the device. `M` is the type of its measurements.
+/// Device side of the line, optionally with a host that polls it. `M` is the type of the device's measurements.
 pub trait Emulator<M>: Send + Sync {
-    /// Adds to `due` the measurements that the device begins before `until`, in order of time, each only once.
+    /// Adds to `due` the measurements that the device begins before `until`, in order of time. Each is added only once.
     ///
     /// Times are on the device's clock.
     fn begin(&mut self, until: MonoNs, due: &mut Vec<M>);
@@ -290,12 +288,12 @@ pub trait Emulator<M>: Send + Sync {
     /// Encodes a measurement and passes each message to `line` with its time.
     ///
     /// The method is called once for each measurement that the device began, in the same order. An emulator with an
-    /// emulated host also encodes imported measurements, which it did not begin. A value that is not finite in an
-    /// imported measurement means that the quantity was not measured; no message carries it.
+    /// emulated host also encodes imported measurements. If a value in them is not finite, the quantity was not
+    /// measured, and no message contains it.
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 
-/// An emulated device, by the type of its measurements.
+/// An emulated device. Its variant determines the type of its measurements.
 pub enum Emulated {
     /// A profiling head.
     Head(Box<dyn Emulator<Sounding>>),

@@ -1,10 +1,11 @@
-//! Model of a device's clock: undoes the wraps of its tick counter, and estimates its drift against the host's clock.
+//! Model of a device's clock. It undoes the wraps of the tick counter, and estimates the drift against the host's
+//! clock.
 //!
 //! Each device stamp takes at least a constant minimum time to arrive at the host. Buses and queues only add to it. So
-//! the receive time minus the device time has a lower envelope, and the slope of the envelope is the drift. Time is
-//! divided into stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to the
-//! kept stamps. A constant delay shifts all stamps equally, so it changes the line's offset but not its slope. If
-//! memory for stamps is full, stretches are merged in pairs. Thus ten hours need no more memory than two minutes.
+//! the receive time minus the device time has a lower envelope, whose slope is the drift. Time is divided into
+//! stretches, and the least delayed stamp of each stretch is kept. A least-squares line is fitted to the kept stamps. A
+//! constant delay shifts all stamps equally, so it changes the line's offset but not its slope. If the memory for
+//! stamps is full, stretches are merged in pairs. So ten hours need no more memory than two minutes.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,29 +16,27 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Maximum number of stretches of time for which a stamp is kept.
 const PLACES: usize = 128;
 
-/// Length of a stretch of time (one stamp is kept per stretch) before any stretches are merged, ns of the device's
-/// clock. Each merge doubles it.
+/// Initial length of a stretch of time, ns of the device's clock. Each merge of stretches doubles it.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
-/// Minimum number of stretches of time for a drift estimate. With fewer stamps, their scatter about the fitted line is
-/// a poor measure of the drift's error.
+/// Minimum number of stretches of time for a drift estimate. The scatter of fewer stamps about the fitted line is a
+/// poor measure of the drift's error.
 const LEAST_STRETCHES: usize = 8;
 
 /// Largest deviation of a stamp from its predicted time that queues explain, ns.
 ///
 /// A larger deviation begins a new epoch. The prediction uses the previous stamp and the receive times. For a clock
-/// with a short wrap period, the limit is a quarter of this period.
+/// that wraps often, the limit is a quarter of its wrap period.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
 /// Largest plausible difference between the minimum delays in two stretches of time.
 ///
-/// This difference is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. No clock drifts by more
-/// than `MOST_DRIFT`. If a stretch's delay is larger, its stamp was queued and is not kept.
+/// It is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. No clock drifts by more than
+/// `MOST_DRIFT`. If a stretch's delay is larger, its stamp waited in a queue and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
 const MOST_DRIFT: f64 = 500e-6;
 
-/// Longest plausible delay by a queue, ns. If the delays of stamps stay implausible for longer, a new clock epoch
-/// begins.
+/// Longest plausible delay by a queue, ns. If delays are implausible for longer, a new clock epoch begins.
 const LONGEST_QUEUE_NS: i64 = 30_000_000_000;
 
 const LONGEST_TICK_NS: i64 = 900_000_000_000;
@@ -49,9 +48,9 @@ const PPM: f64 = 1e6;
 pub struct ClockReport {
     /// Number of device stamps received.
     pub stamps: u64,
-    /// Number of times the clock restarted, or fell behind by more than queues explain.
+    /// Number of times the clock has restarted, or has fallen behind by more than queues explain.
     pub restarts: u64,
-    /// Number of times the clock ran ahead by more than queues explain.
+    /// Number of times the clock has run ahead by more than queues explain.
     pub jumps: u64,
     /// Length of the clock epoch from which the drift was estimated, measured by the device's clock.
     pub span: DurNs,
@@ -59,7 +58,7 @@ pub struct ClockReport {
     pub drift: Option<Drift>,
 }
 
-/// Rate error against the host's clock, parts per million. Positive: the device's clock is fast.
+/// Rate error against the host's clock, parts per million. It is positive if the device's clock is fast.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
     /// Rate error of the device's clock, parts per million.
@@ -78,14 +77,14 @@ pub struct DeviceClock {
     restarts: u64,
     jumps: u64,
     epoch: Option<Epoch>,
-    /// Drift with the smallest standard deviation from earlier clock epochs, and the length of its epoch.
+    /// Best drift of earlier clock epochs, which has the smallest standard deviation, and the length of its epoch.
     before: Option<(Drift, DurNs)>,
 }
 
-/// A clock epoch: a run of the device's clock without restart or jump.
+/// A clock epoch: a period in which the device's clock neither restarts nor jumps.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Epoch {
-    /// Receive time of the epoch's first stamp, which is the zero of device time.
+    /// Receive time of the epoch's first stamp, at which device time is zero.
     begun: MonoNs,
     /// The last device stamp: raw ticks, unwrapped ticks, receive time.
     raw: i128,
@@ -103,9 +102,9 @@ struct Edge {
     span_ns: i64,
     /// Number of the current stretch of time, and its least delayed stamp.
     open: Option<(i64, Stamp)>,
-    /// Drift for which the delays of stamps within a stretch are corrected before they are compared.
+    /// Estimated drift. The delays of stamps within a stretch are corrected for it before they are compared.
     slope: f64,
-    /// Device time since which stamps of new stretches have had implausible delays compared with the kept stamps.
+    /// Device time since which the delays of new stretches have been implausible compared with the kept stamps.
     shifted_since_ns: Option<i64>,
 }
 
@@ -124,7 +123,7 @@ struct Line {
     mean_late_ns: f64,
 }
 
-/// Comparison of the delay in a completed stretch of time with the kept stamps of the epoch.
+/// Result of comparing the delay of a completed stretch of time with the kept stamps of the epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shift {
     None,
@@ -148,7 +147,7 @@ impl DeviceClock {
         }
     }
 
-    /// Processes a device stamp received at `received`; ignores bits beyond the clock's width.
+    /// Processes a device stamp received at `received`. Bits beyond the clock's width are ignored.
     ///
     /// Returns the device time since the first stamp of the epoch, without wraps.
     pub fn take(&mut self, ticks: u64, received: MonoNs) -> DurNs {
@@ -182,7 +181,7 @@ impl DeviceClock {
 
     /// Returns the earliest time at which the host could have received a stamp made at device time `device`.
     ///
-    /// [`Self::take`] returns such device times. `None` until the drift is known.
+    /// `device` is a time as returned by [`Self::take`]. `None` until the drift is known.
     pub fn earliest(&self, device: DurNs) -> Option<MonoNs> {
         let epoch = self.epoch.as_ref()?;
         let line = epoch.edge.line(self.tick)?;
@@ -192,8 +191,8 @@ impl DeviceClock {
         Some(epoch.begun + device + late)
     }
 
-    /// Returns the clock's statistics so far. The drift comes from the epoch with the smallest standard deviation of
-    /// drift.
+    /// Returns the clock's statistics so far. The drift is that of the epoch in which it has the smallest standard
+    /// deviation.
     pub fn report(&self) -> ClockReport {
         let now = self.drift_now();
         let best =
@@ -230,7 +229,7 @@ impl DeviceClock {
 }
 
 impl Edge {
-    /// Creates an envelope; the first stamp of the epoch is its reference.
+    /// Creates an envelope. Delays are relative to the first stamp of the epoch.
     fn new() -> Self {
         Self {
             kept: [Stamp::default(); PLACES],
@@ -262,14 +261,14 @@ impl Edge {
         self.kept.get(..self.len).unwrap_or_default()
     }
 
-    /// Ends the current stretch of time and keeps its least delayed stamp, unless that stamp was delayed by a queue.
+    /// Ends the current stretch of time and keeps its least delayed stamp, unless a queue has delayed that stamp too.
     fn close(&mut self) -> Shift {
         let Some((_, stamp)) = self.open.take() else { return Shift::None };
         let shift = self.shift(stamp);
         if shift != Shift::None {
             if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
-                // The new stamp is less delayed by far, so the kept stamps were queued: the epoch began while a queue
-                // was full.
+                // The new stamp is far less delayed than the kept stamps, so those were queued. The epoch began while a
+                // queue was full.
                 self.len = 0;
             } else {
                 let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);
@@ -291,7 +290,7 @@ impl Edge {
         let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
         let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
         let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
-        // A clock that falls behind makes its stamps look delayed.
+        // The stamps of a clock that falls behind look delayed.
         if late_ns > most_ns {
             Shift::Behind
         } else if late_ns < -most_ns {
@@ -332,7 +331,7 @@ impl Edge {
         (self.kept, self.len) = (joined, len);
     }
 
-    /// Fits a line to the delays of the kept stamps; `tick` is the resolution of the clock.
+    /// Fits a line to the delays of the kept stamps. `tick` is the resolution of the clock.
     fn line(&self, tick: DurNs) -> Option<Line> {
         let kept = self.kept();
         if kept.len() < LEAST_STRETCHES {
@@ -351,7 +350,7 @@ impl Edge {
         let slope = xy / xx;
         let left = |(x, y): (f64, f64)| (y - slope * x) * (y - slope * x);
         let scatter = kept.iter().map(about).map(left).sum::<f64>() / (n - 2.0);
-        // Even stamps without scatter are uncertain, because they are rounded to ticks.
+        // Stamps are rounded to ticks, so even stamps without scatter are uncertain.
         let quantum = tick.0 as f64 * tick.0 as f64 / 12.0;
         let slope_sd = math::sqrt((scatter + quantum) / xx);
         (xx > 0.0).then_some(Line { slope, slope_sd, mean_device_ns, mean_late_ns })
@@ -366,14 +365,14 @@ impl Line {
 
 /// Returns the ticks elapsed between two stamps whose raw difference is `difference`.
 ///
-/// The function adds as many wraps of the clock as bring the result nearest to the time `waited`.
+/// Adds as many wraps of the clock as bring the result nearest to the time `waited`.
 fn advance(difference: i128, round: i128, tick: DurNs, waited: DurNs) -> i128 {
     let expected = i128::from(waited.0).div_euclid(i128::from(tick.0));
     let rounds = (expected - difference + round / 2).div_euclid(round);
     difference + rounds * round
 }
 
-/// Returns the stamp that has less delay after correction for a drift of `slope`.
+/// Returns the stamp with the smaller delay, after correction for a drift of `slope`.
 fn earlier(a: Stamp, b: Stamp, slope: f64) -> Stamp {
     let allowed = slope * b.device_ns.saturating_sub(a.device_ns) as f64;
     if (b.late_ns.saturating_sub(a.late_ns) as f64) < allowed { b } else { a }

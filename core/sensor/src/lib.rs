@@ -5,8 +5,8 @@
 //! - A driver is the host's side of the device's line, without I/O.
 //! - An emulator is the device's side of the line, for simulations.
 //!
-//! A device's crate depends only on this crate, which re-exports the lower crates. A codec is a [`codec::Framing`]
-//! in [`codec::Framed`]:
+//! A device's crate depends only on this crate, which re-exports the crates below it. A codec consists of a
+//! [`codec::Framing`] in [`codec::Framed`]:
 //!
 //! ```
 //! use headrace_sensor::codec::{Codec as _, Framed, Framing, Verdict};

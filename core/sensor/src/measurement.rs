@@ -1,7 +1,7 @@
 //! Measurements of simulated devices, before they are encoded.
 //!
-//! An emulated device sets the time and angle of each measurement. The simulation fills in the value, and the
-//! device encodes the measurement.
+//! An emulated device sets the time and, for a head, the angle of each measurement. The simulation fills in the value,
+//! and the device encodes the measurement.
 
 use super::reading::Level;
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
@@ -58,7 +58,7 @@ pub struct Inertia {
 pub struct GroundVelocity {
     /// Time of validity of the velocity.
     pub at: MonoNs,
-    /// Velocity of the sensor itself, m/s, which includes the sensor's motion by the vehicle's rotation.
+    /// Velocity of the sensor itself, m/s. It includes the motion by the vehicle's rotation.
     pub velocity_mps: Vec3<Sensor>,
 }
 

@@ -12,7 +12,7 @@ pub enum Level {}
 /// Maximum number of sources in one loop.
 pub const MAX_SOURCES: usize = 64;
 
-/// Number of a registered source of bytes. Messages with equal times are ordered by this number.
+/// Number of a registered source of bytes. Messages with equal times are in the order of their sources' numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct SourceId(pub u16);
 
@@ -32,7 +32,7 @@ pub struct Packet<'a> {
     pub bytes: &'a [u8],
 }
 
-/// One value of a sensor, in SI units and the sensor's own frame.
+/// One value of a sensor, in SI units and the sensor's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Reading {
     /// A ping of a profiling head.
@@ -118,7 +118,7 @@ pub struct WaterPressure {
 /// A reading of a cable counter: length of cable paid out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TetherLength {
-    /// Length counted since the counter's zero, m; increases as the vehicle goes into the tunnel.
+    /// Length counted since the counter's zero, m. It increases as the vehicle goes into the tunnel.
     pub length_m: f64,
     /// Quantum (resolution step) of the length, m.
     pub resolution_m: f64,

@@ -1,10 +1,10 @@
 //! Corrected times of samples that arrive late, from the device's own clock.
 //!
 //! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms then
-//! have the same receive time. By receive times, the first sample of a burst would count for the whole gap before the
-//! burst, even if it measured only a short jerk. The device's stamps separate the samples. Receive time minus device
-//! time is usually near its minimum, and any excess is the delay of the sample. Receive times still define the order of
-//! samples; only their times of validity are corrected.
+//! have the same receive time. If receive times counted, the first sample of a burst would be valid for the whole gap
+//! before the burst, even if it measured only a short jerk. The device's stamps separate the samples. Receive time
+//! minus device time is usually near its minimum, and any excess is the delay of the sample. Receive times still define
+//! the order of samples; only their times of validity are corrected.
 
 use core::cmp::Ordering;
 
@@ -14,20 +14,20 @@ use crate::device_clock::{ClockReport, DeviceClock};
 use crate::reading::Reading;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Rate at which the estimated usual delay rises while device stamps arrive later than usual, per second. Clocks drift
-/// apart more slowly.
+/// Rate at which the estimated usual delay rises while device stamps arrive later than usual, s/s. Clocks drift apart
+/// more slowly.
 ///
-/// If stamps are earlier than usual, the usual delay falls `FALLS_TIMES` times as fast. The estimate thus converges to
-/// the delay below which one stamp in ten lies. The step size does not depend on the stamp's delay, so a garbled stamp
+/// While stamps arrive earlier than usual, the usual delay falls `FALLS_TIMES` times as fast. So it converges to the
+/// delay below which one stamp in ten lies. The size of a step does not depend on the stamp's delay, so a garbled stamp
 /// has no larger effect than any other.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
-/// Longest time between two stamps for which one update moves the usual delay, s.
+/// Longest time between two stamps that counts for a change of the usual delay, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// A delay below this is not corrected, because clock ticks and the sending of a sample's frames cause such delays.
+/// Shortest delay that is corrected. Clock ticks and the sending of a sample's frames cause shorter ones.
 const LEAST: DurNs = DurNs(1_000_000);
-/// A delay above this is not corrected. It may come from a stopped device clock, and navigation waits no longer than
-/// this for samples.
+/// Longest delay that is corrected. A longer one may come from a stopped device clock, and navigation waits no longer
+/// than this for samples.
 const MOST: DurNs = DurNs(150_000_000);
 
 /// Corrects the times of the samples of a device with a clock. Allocates: never.
@@ -37,14 +37,14 @@ pub struct SampleTimes {
     delay: UsualDelay,
     stamped: Option<Stamped>,
     last_reading: Option<MonoNs>,
-    /// Number of samples whose stamp came before the readings, minus number of samples whose stamp came after;
-    /// clamped.
+    /// Number of samples whose stamp came before the readings, minus number of samples whose stamp came after them. It
+    /// is limited to `MOST_LEADS` in size.
     ///
-    /// The count is needed because some units send the stamp after the readings.
+    /// It is needed because some units send the stamp after the readings.
     leads: i8,
 }
 
-/// A stamped sample: receive time of its stamp, this time with the usual delay, and which of its readings have arrived.
+/// A stamped sample: receive time of its stamp, the same time with the usual delay, and which readings have arrived.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Stamped {
     received: MonoNs,
@@ -52,10 +52,10 @@ struct Stamped {
     seen: [bool; KINDS],
 }
 
-/// Number of kinds of readings: turn rate, force, attitude. A stamp belongs to the first reading of each kind after
-/// it.
+/// Number of kinds of readings with stamps: turn rate, force, attitude. A stamp belongs to the first reading of each
+/// kind after it.
 const KINDS: usize = 3;
-/// Stamps count as coming before the readings if `leads` is at least `SURE_LEADS`. `MOST_LEADS` limits `leads`.
+/// Smallest value of `leads` at which stamps count as coming before the readings, and largest size of `leads`.
 const SURE_LEADS: i8 = 8;
 const MOST_LEADS: i8 = 16;
 
@@ -90,7 +90,7 @@ impl SampleTimes {
     /// Returns the receive time that a reading would have had without the delay of its sample.
     ///
     /// Returns `received` for a reading without a stamp, with a usual delay, or with a longer delay than queues cause.
-    /// The same holds for all readings of a unit that sends its stamps after its readings.
+    /// Also returns it for all readings of a unit that sends its stamps after its readings.
     pub fn arrival(&mut self, reading: &Reading, received: MonoNs) -> MonoNs {
         let kind = match reading {
             Reading::AngularRate(_) => 0,
@@ -100,8 +100,8 @@ impl SampleTimes {
         };
         let Some(stamped) = &mut self.stamped else { return received };
         let last = self.last_reading.replace(received);
-        if let Some(last) = last.filter(|_| stamped.seen == [false; KINDS]) {
-            // Within a burst, receive times are equal and do not show whether the stamp came before the readings.
+        if let Some(last) = last.filter(|_| stamped.told == [false; KINDS]) {
+            // Receive times within a burst are equal. They do not show whether the stamp came before the readings.
             let lead = match received.since(stamped.received).cmp(&stamped.received.since(last)) {
                 Ordering::Less => 1,
                 Ordering::Equal => 0,
@@ -123,7 +123,7 @@ impl SampleTimes {
 }
 
 impl UsualDelay {
-    /// Returns by how much a stamp's delay exceeds the usual delay; zero for the first stamp of a clock epoch.
+    /// Returns how much a stamp's delay exceeds the usual delay. Zero for the first stamp of a clock epoch.
     fn late(&mut self, device: DurNs, received: MonoNs) -> DurNs {
         let delay = received.since(MonoNs(0)) - device;
         let is_first = device <= DurNs::ZERO || device < self.device;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Reason for which a reading is withheld.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum WithheldReason {
-    /// The packet has no message from which the device's readings are made.
+    /// The packet contains no message that carries readings of the device.
     NoMessage,
     /// The message is from a device with another id or address.
     OtherDevice,

@@ -6,12 +6,12 @@ use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
 use headrace_sampling::advice::Looks;
 
-/// Allowed angles between the rays of a ring (the rays cast from a head round the wall), degrees.
+/// Allowed angles between the rays of a ring, degrees. A ring of rays is cast from a head all round the wall.
 ///
-/// The finest angle is the one that the command `plan` uses. Above 1 degree, the advice would round up the angular
-/// steps of every mode.
+/// The command `plan` uses the finest angle. With angles above 1 degree, the advice would round up the angular steps of
+/// every mode.
 const RING_DEG: RangeInclusive<f64> = 0.1..=1.0;
-/// Allowed distances that the vehicle may move across the tunnel before a ring of rays is cast again, m.
+/// Allowed movements of the vehicle across the tunnel after which a ring of rays is cast again, m.
 const LOOK_M: RangeInclusive<f64> = 0.001..=0.1;
 
 /// Reads the `[advice]` table of a vehicle file.

@@ -87,7 +87,7 @@ impl AlertTiming {
         }
     }
 
-    /// Returns a copy of the timing in which the delays of one alert class are replaced.
+    /// Returns a copy of the timing with other delays for one alert class.
     #[must_use]
     pub fn with(mut self, class: AlertClass, timing: ClassTiming) -> Self {
         if let Some(slot) = self.0.get_mut(class as usize) {

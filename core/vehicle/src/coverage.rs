@@ -12,7 +12,7 @@ use headrace_sampling::target::{CONFIDENCE_SD, Target};
 pub struct CoverageConfig {
     /// Maximum difference between the upper and the lower bound of a hole's size, m; zero for the exact search.
     pub hole_tolerance_m: f64,
-    /// A sample contradicts the design profile if it deviates from the profile by more than this, m.
+    /// Deviation from the design profile beyond which a sample contradicts the profile, m.
     ///
     /// A section cannot pass if most of its samples contradict the profile.
     pub contradiction_m: f64,
@@ -33,29 +33,29 @@ impl Default for CoverageConfig {
     }
 }
 
-/// Default limit of a sample's deviation from the design profile, as a share of the radius. The limit is at most 0.5 m.
+/// Default of `contradiction_m` as a share of the radius, and its upper limit, m.
 ///
 /// The radius is that of a circle whose circumference is the profile's perimeter.
 const CONTRADICTION_SHARE: f64 = 0.2;
 const MOST_CONTRADICTION_M: f64 = 0.5;
-/// Maximum number of samples with which all openings together are filled.
+/// Maximum number of samples that fill all openings together.
 const MAX_PLACES: i64 = 1_000_000;
 
 impl CoverageConfig {
     /// Returns the default deviation above which a sample contradicts a profile of this perimeter, m.
     ///
-    /// The value exceeds the thickness of a lining, and the error of a design that is 6 % off. It is smaller than the
-    /// deviations that appear if the vehicle file describes a different tunnel.
+    /// It exceeds the thickness of a lining, and the error of a design that is 6 % off. If the vehicle file describes
+    /// another tunnel than the inspected one, deviations exceed it.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
     /// Reads the tables `[coverage]` and `[[openings]]` from the root of a vehicle file.
     ///
-    /// The second value of the result is the confidence of verdicts.
+    /// The second value of the result is the confidence of verdicts, in standard deviations.
     ///
-    /// `profile` or `target_m` is `None` if its keys in the file are invalid. Even then, the two tables are checked as
-    /// far as possible.
+    /// `profile` or `target_m` is `None` if its keys in the file are invalid. Even then, both tables are checked as far
+    /// as possible.
     ///
     /// Errors: a key that is missing, unknown or out of range.
     pub(super) fn of_root(

@@ -1,4 +1,4 @@
-//! Checks of a vehicle file as a whole, after its keys have been read.
+//! Checks of a vehicle file as a whole, after each of its keys has been read.
 //!
 //! The checks find sensors that cannot share a connection, wall outside the heads' range limits, and heads whose passes
 //! cannot interleave.
@@ -21,16 +21,16 @@ use crate::vehicle::VehicleConfig;
 pub enum Grade {
     /// The vehicle file cannot work as written.
     Error,
-    /// The vehicle file works, but at a cost, or only if the setting is intended.
+    /// The vehicle file works, but at a cost, or works as intended only if an unusual setting is meant.
     Warning,
 }
 
-/// A problem in a vehicle file whose keys are valid individually.
+/// A problem between keys of a vehicle file that are valid one by one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
     /// Severity of the finding.
     pub grade: Grade,
-    /// Dotted path of the key that the finding is about; the key may be absent from its table.
+    /// Dotted path of the key that the finding is about. The file may lack this key.
     pub key: String,
     /// The problem, and what to do about it.
     pub problem: String,
@@ -44,21 +44,22 @@ impl fmt::Display for Finding {
 
 /// Number of beams per turn that the check of head ranges casts.
 const BEAMS: u32 = 720;
-/// Minimum share of the wall that a head must reach.
+/// Minimum share of the wall that a head must reach, from 0 to 1.
 ///
-/// If the share is lower, the range setting or the tunnel is wrong.
+/// A lower share means that the range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
 /// Largest relative difference of turn periods at which heads stay in phase for hours.
 const SAME_TURN: f64 = 1e-6;
-/// Finest range step of a sonar, m: the step of an 881L with a range setting of 5 m or less (data sheet).
+/// Finest range step of a sonar, m: that of an 881L with a range setting of 5 m or less (data sheet).
 ///
-/// No sonar return resolves finer details of a wall.
+/// A sonar's returns show no finer details of a wall.
 const FINEST_M: f64 = 0.002;
-/// Edge length, m, at which a polyline deviates from a curved wall by less than [`FINEST_M`] for any radius.
+/// Edge length of a polyline, m, that is short enough for a curved wall of any radius.
 ///
-/// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, whose radius is 0.1 m.
+/// The polyline deviates from the wall by the sagitta e^2 / (8 r). In the narrowest pipe, with a radius of 0.1 m, this
+/// is 0.1 mm, which is less than [`FINEST_M`].
 const ENOUGH_M: f64 = 0.01;
-/// Heads count as side by side if they are at most this far apart along the hull, m.
+/// Largest distance along the hull at which heads count as side by side, m.
 const APART_M: f64 = 0.01;
 
 impl VehicleConfig {
@@ -77,7 +78,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Returns the index of each sensor that cannot share the connection of an earlier sensor, with the reason.
+    /// Returns the index of each sensor that cannot use its connection because of an earlier sensor, with the reason.
     pub fn excluded_from_lines(&self) -> Vec<(usize, String)> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -116,7 +117,7 @@ impl VehicleConfig {
                 }
             }
         }
-        // If no sensor has a connection, the vehicle is only simulated or replayed, which needs none.
+        // No sensor has a connection if the vehicle is only simulated or replayed.
         if silent.len() < self.sensors.len() {
             let problem = format!("have no connect, so `run` can't reach them: {}", silent.join(", "));
             found.extend((!silent.is_empty()).then(|| warning("sensors".to_owned(), problem)));
@@ -163,7 +164,7 @@ impl VehicleConfig {
         })
     }
 
-    /// Returns the heads that do not reach all of the wall from the centre of the tunnel.
+    /// Returns a finding for each head that does not reach all of the wall from the centre of the tunnel.
     fn reaches(&self) -> Vec<Finding> {
         let heads = self.heads();
         let hidden = occlusion::hidden_by_vehicle(&heads, &self.hull);
@@ -202,7 +203,7 @@ impl VehicleConfig {
         Some(Finding { grade, key: format!("sensors[{number}].range_m"), problem })
     }
 
-    /// Returns a warning if the profile's points are closer together than the finest detail that a sonar resolves.
+    /// Returns a warning if points of the profile are closer together than the finest detail that a sonar resolves.
     fn too_fine(&self) -> Option<Finding> {
         let tunnel = &self.tunnel;
         if tunnel.name != "polyline" {
@@ -227,7 +228,7 @@ impl VehicleConfig {
         Some(warning("tunnel.file".to_owned(), problem))
     }
 
-    /// Returns warnings about heads whose passes cannot interleave.
+    /// Returns findings about heads whose passes cannot interleave.
     fn interleaving(&self) -> Vec<Finding> {
         let heads = self.heads();
         let mut found = Vec::new();
@@ -267,8 +268,8 @@ fn warning(key: String, problem: String) -> Finding {
     Finding { grade: Grade::Warning, key, problem }
 }
 
-/// Returns what two connections share, in words: a serial port, address, interface or device. `None` if they share
-/// nothing.
+/// Returns in words what two connections have in common: a serial port, address, interface or device. `None` if there
+/// is nothing.
 fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     match (a, b) {
         (Connect::Serial { port: a, .. }, Connect::Serial { port: b, .. }) => {
@@ -306,7 +307,7 @@ fn clocks(walls: &[&Wall], profile: &Profile) -> String {
     arcs.sort_by(f64::total_cmp);
     let mut clocks: Vec<String> = arcs.into_iter().map(|arc_m| profile.clock(arc_m)).collect();
     clocks.dedup();
-    // Both the first and the last arc lengths are at the floor, so its clock position may appear twice.
+    // The lowest and the highest arc lengths are both at the floor, so the floor's clock position may appear twice.
     if clocks.len() > 1 && clocks.first() == clocks.last() {
         clocks.pop();
     }

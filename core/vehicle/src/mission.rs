@@ -24,18 +24,18 @@ pub struct Mission {
     pub target: Target,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Length of the tunnel, m; samples beyond it are counted but not stored.
+    /// Length of the tunnel, m. Samples beyond it are counted but not stored.
     pub length_m: f64,
     /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
-    /// Speed for which the heads' phases are planned, m/s; zero if no speed is planned.
+    /// Speed for which the heads' phases are planned, m/s. Zero if no speed is planned.
     pub planned_speed_mps: f64,
-    /// Parts of the vehicle, apart from the heads, that may occlude a head.
+    /// Parts of the vehicle that may occlude a head. Other heads are not listed here.
     pub hull: Vec<Obstacle>,
     /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// Angle between the rays that locate the wall for the speed advice, and the vehicle's movement after which these
-    /// rays are cast again.
+    /// Settings of the rays that locate the wall for the speed advice: the angle between them, and the movement of the
+    /// vehicle after which they are cast again.
     pub looks: Looks,
     /// Time limit of the dive, counted from the first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
@@ -48,8 +48,8 @@ pub struct Mission {
 impl Mission {
     /// Creates a mission with defaults.
     ///
-    /// The tunnel is 100 m long, with sections of 0.25 m at the default site. The heads are in phase-shift
-    /// mode. There are no hull parts and no time limit, and holes are computed exactly.
+    /// The tunnel is 100 m long, with sections of 0.25 m, at the default site. The heads are in phase-shift mode. There
+    /// are no hull parts and no time limit. Holes are computed exactly.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         let contradiction_m = CoverageConfig::usual_contradiction_m(profile.perimeter_m());
         Self {
@@ -79,9 +79,9 @@ impl Mission {
             && [planned_speed_mps, hole_tolerance_m, confidence_sd].iter().all(|number| **number >= 0.0)
     }
 
-    /// Whether pings hit the same places on the wall as under the settings of another mission.
+    /// Whether pings hit the same places on the wall under the settings of both missions.
     ///
-    /// True if the tunnel, the water, the layout and the hull are equal in both missions.
+    /// True if the tunnel, the water, the layout and the hull are the same.
     pub fn places_as(&self, other: &Self) -> bool {
         self.profile == other.profile
             && self.site == other.site

@@ -16,13 +16,13 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// Allowed values of noise settings.
 ///
-/// Zero is excluded, because the filter would rely on a sensor without noise alone. Only the mount error may be zero.
+/// Zero is excluded, because the filter would rely only on the sensor without noise. The mount error may be zero.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const MOUNT_DEGREES: RangeInclusive<f64> = 0.0..=5.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
-/// Allowed lengths of a filter epoch and of a time window, s. The filter's buffers suffice for all allowed values.
+/// Allowed lengths of a filter epoch and of the reordering window, s. The filter's buffers suffice for all of them.
 ///
 /// With epochs of 0.5 s, the estimated position of a field dive was wrong by metres. With 0.2 s, the error was no
 /// larger than with 0.1 s (trade-off "Navigation" of `headrace cost`).
@@ -40,10 +40,10 @@ pub enum NavigationConfig {
 }
 
 impl NavigationConfig {
-    /// Reads the `[navigation]` table; the default method is the filter.
+    /// Reads the `[navigation]` table. The default method is the filter.
     ///
-    /// If the inertial unit's `noise` or the cable `counter` is known, it determines the missing keys that it concerns.
-    /// All other missing keys get their defaults.
+    /// Missing keys get their defaults. But if the inertial unit's `noise` or the cable `counter` is known, the missing
+    /// keys that concern it are taken from it.
     ///
     /// Errors: the first key that is unknown or out of range.
     pub fn parse(
@@ -70,7 +70,7 @@ impl NavigationConfig {
     }
 }
 
-/// Reads a vehicle file's `[navigation]` table; missing keys keep the values of `usual`.
+/// Reads the noise settings of the `[navigation]` table. Missing keys keep the values of `usual`.
 ///
 /// Errors: the first key whose value is out of range.
 fn settings(section: &Section<'_>, usual: &Settings) -> Result<Settings, ConfigError> {

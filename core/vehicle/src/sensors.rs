@@ -1,4 +1,4 @@
-//! `[[sensors]]` of a vehicle file: the keys common to all devices, and those of each kind.
+//! `[[sensors]]` of a vehicle file: the keys that all devices have, and those of each kind of device.
 
 use core::ops::RangeInclusive;
 
@@ -20,9 +20,9 @@ pub(super) struct Sensors {
     pub(super) configs: Vec<SensorConfig>,
 }
 
-/// Reads all `[[sensors]]` tables; returns `None` if any of them has an error.
+/// Reads all `[[sensors]]` tables. Returns `None` if any of them has an error.
 ///
-/// Errors: the file has no such table. If the caller doesn't collect errors, also the first invalid table.
+/// Errors: the file has no such table. If the caller does not collect errors, also the first invalid table.
 pub(super) fn parse(
     root: &Section<'_>,
     tables: Vec<Section<'_>>,
@@ -45,7 +45,7 @@ pub(super) fn parse(
     Ok(complete.then_some(sensors))
 }
 
-/// Reads one `[[sensors]]` table; `ids` contains the ids of earlier sensors.
+/// Reads one `[[sensors]]` table. `ids` contains the ids of earlier sensors, and gets that of this one.
 fn parse_sensor(
     section: &Section<'_>,
     ids: &mut Vec<String>,

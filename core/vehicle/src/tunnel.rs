@@ -104,13 +104,13 @@ fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profil
     profile.map_err(|why| section.invalid("profile", &why.to_string()))
 }
 
-/// Maximum number of points of a profile. It suffices for one point per millimetre on a perimeter of 100 m.
+/// Maximum number of points of a profile: one point per millimetre on a perimeter of 100 m.
 const MOST_POINTS: usize = 100_000;
 
 /// Reads a polyline with one line `y_m,z_m` per vertex.
 ///
-/// Returns the vertices with their line numbers. The function skips lines that start with #, and the first line if it
-/// is not a vertex.
+/// Returns the vertices and their line numbers. Skips lines that start with #, and the first line if it is not a
+/// vertex.
 fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
     let (mut points, mut lines) = (Vec::new(), Vec::new());
     for (number, line) in text.lines().enumerate() {

@@ -40,8 +40,8 @@ pub struct VehicleConfig {
     pub tunnel: TunnelConfig,
     /// Arrangement of the heads: phase-shift or sector-offset mode.
     pub layout: HeadLayout,
-    /// Speed for which the heads' phases are planned, m/s. With zero, the plan ignores the heads' positions along the
-    /// hull.
+    /// Speed for which the heads' phases are planned, m/s. Zero means that the plan ignores the heads' positions along
+    /// the hull.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
@@ -49,8 +49,8 @@ pub struct VehicleConfig {
     pub coverage: CoverageConfig,
     /// Navigation method and settings.
     pub navigation: NavigationConfig,
-    /// Angle between the rays that locate the wall for the speed advice, and the vehicle's movement after which these
-    /// rays are cast again.
+    /// Settings of the rays that locate the wall for the speed advice: the angle between them, and the movement of the
+    /// vehicle after which they are cast again.
     pub looks: Looks,
     /// Maximum duration of the dive.
     pub dive_time: Option<DurNs>,
@@ -58,28 +58,28 @@ pub struct VehicleConfig {
     pub alerts: AlertTiming,
     /// Limits of cable length and dive time.
     pub limits: LimitsConfig,
-    /// The sensors, in the order of the file, which is also the order of their sources.
+    /// The sensors in the order of the file. Their sources have the same order.
     pub sensors: Vec<Box<dyn Device>>,
-    /// The keys common to all kinds of sensor, for each sensor, in the same order as `sensors`.
+    /// For each sensor in `sensors`, the keys that all kinds of sensor have.
     pub sensor_configs: Vec<SensorConfig>,
     /// Step and noise of the cable counter; `None` without one.
     pub counter: Option<CounterSpec>,
-    /// Files that the vehicle file refers to, with their text, so that a log can be replayed without them.
+    /// Names and texts of the files that the vehicle file refers to, so that a log can be replayed without these files.
     pub attachments: Vec<(String, String)>,
 }
 
-/// The `[water]` table and the water levels; see [`Site`].
+/// The `[water]` table and the water levels, read into a [`Site`].
 pub type WaterConfig = Site;
 
 /// Allowed values of the target, m.
 pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 
-/// Limits on the number of sections and wall cells. Each limit keeps the memory allocated at startup below some hundred
+/// Limits on the number of sections and wall cells. Each keeps the memory allocated at startup below some hundred
 /// megabytes.
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 
-/// Number of wall cells in the sample store.
+/// Number of wall cells that the sample store needs for a tunnel and a target.
 fn wall_cells(tunnel: &TunnelConfig, target_m: f64) -> f64 {
     let cell_m = StoreLayout::cell_for_target_m(target_m);
     tunnel.length_m * tunnel.profile.perimeter_m() / (cell_m * cell_m)
@@ -107,9 +107,9 @@ impl VehicleConfig {
         Ok(Self { attachments: attachments.into_inner(), ..vehicle })
     }
 
-    /// Reads the whole vehicle file except the attachments.
+    /// Reads the whole vehicle file. `load` returns the text of a file to which it refers. `attachments` stays empty.
     ///
-    /// Checks that depend on an invalid part of the file are skipped.
+    /// If a part of the file is invalid, checks that depend on it are skipped.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -197,7 +197,7 @@ impl VehicleConfig {
         self.navigation.begin(&self.tunnel.profile, self.site)
     }
 
-    /// Scan programs of the heads, in the order of the file; empty if there are no heads.
+    /// Scan programs of the heads, in the order of the file. Empty if there are no heads.
     ///
     /// Errors: no program fits the heads.
     pub fn programs(&self) -> Result<Vec<HeadProgram>, SamplingError> {
@@ -213,7 +213,7 @@ impl VehicleConfig {
         self.sensors.iter().filter_map(|sensor| sensor.head()).collect()
     }
 
-    /// Returns the input of a plan: the configured heads, on a vehicle that travels steadily in the tunnel's centre.
+    /// Returns the input of a plan. The vehicle has the configured heads and travels steadily in the tunnel's centre.
     ///
     /// Errors: no modes are known for a head's range setting.
     pub fn inspection(&self) -> Result<Inspection, String> {
@@ -234,7 +234,7 @@ impl VehicleConfig {
     }
 }
 
-/// Reads a table. The result is `default` if the table is absent, and `None` if the table is wrong.
+/// Reads a table. Returns `default` if the table is absent, and `None` if it is wrong.
 fn table_or<T>(
     root: &Section<'_>,
     name: &'static str,
@@ -253,7 +253,7 @@ fn parse_tunnel(root: &Section<'_>, load: Loader<'_>) -> Result<(Option<TunnelCo
     Ok((root.part(|| TunnelConfig::from_section(&section, load))?, axis_yaw_rad))
 }
 
-/// Checks that sections and wall cells are not too small for the memory that the loop allocates.
+/// Checks that sections and wall cells are large enough for the memory that the loop allocates.
 fn check_fineness(
     root: &Section<'_>,
     tunnel: &TunnelConfig,
@@ -317,7 +317,7 @@ fn parse_hull(section: &Section<'_>) -> Result<Obstacle, ConfigError> {
     Ok(Obstacle::Box { least: point(least), most: point(most) })
 }
 
-/// Reads the navigation settings for these sensors; `None` if the `[navigation]` table is wrong.
+/// Reads the navigation settings of a vehicle with these sensors. `None` if the `[navigation]` table is wrong.
 fn parse_navigation(
     root: &Section<'_>,
     devices: &[Box<dyn Device>],
@@ -345,7 +345,7 @@ fn check_sound(
 
 /// Checks the number of heads, and that no head is inside a hull box.
 ///
-/// A hull box could not occlude a head inside it.
+/// A head inside a hull box is an error, because the box could not occlude it.
 fn check_heads(
     root: &Section<'_>,
     sensors: &[Box<dyn Device>],
@@ -366,7 +366,7 @@ fn check_heads(
     Ok(())
 }
 
-/// Reads the layout and the planned speed, m/s; `sensors` is `None` unless all sensors are valid.
+/// Reads the layout and the planned speed, m/s. `sensors` is `None` unless all sensors are valid.
 fn parse_heads(
     section: &Section<'_>,
     sensors: Option<&[Box<dyn Device>]>,

@@ -1,5 +1,5 @@
-//! A failed section and its surroundings: ping counts over the section and its surroundings, and the driving figures as
-//! they would be without some factors.
+//! A failed section as input for explaining the fail. It comes with ping counts of its surroundings, and with driving
+//! figures as they would be without some factors.
 
 use crate::cause::{Cause, Causes};
 use crate::frontier::Reach;
@@ -10,9 +10,9 @@ use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 use headrace_sampling::losses::MOST_PASSES;
 
-/// Removing a factor helps only if the spacing of samples then falls below this share of the actual spacing.
+/// Removing a factor helps only if it reduces the spacing of samples below this share of the actual spacing.
 pub(super) const HELPS: f64 = 0.93;
-/// Largest hole size for which the surroundings are searched for missing samples, in multiples of the target.
+/// Largest hole for which missing samples are searched in the surroundings, in multiples of the target.
 pub(super) const WIDEST: f64 = 8.0;
 
 /// A failed section and its surroundings, as input for explaining the fail.
@@ -26,25 +26,24 @@ pub struct Case<'a> {
     pub first_visit: u32,
     /// Stretch that every live head had swept at the time of the request.
     pub swept_by_all: Option<Reach>,
-    /// Stretch where samples may still land; the wall in this stretch is unknown.
+    /// Stretch where samples may still land, so its wall is not known yet.
     pub to_come: Option<Reach>,
     /// Whether no head was alive (pinging) at the time of the request.
     pub none_alive: bool,
-    /// Whether no head pinged in the section, and at least one head passed through it in silence.
+    /// Whether no head pinged in the section, although at least one passed through it.
     pub is_dark: bool,
     /// Whether the section's samples come from several navigation segments.
     pub is_torn: bool,
     /// Coverage target T, m.
     pub target_m: f64,
-    /// Causes of the two neighbouring sections. Among equally small sets of causes, the search tries these two sets
-    /// first.
+    /// Causes of the two neighbouring sections. If several sets of causes are equally small, these are tried first.
     pub beside: [Causes; 2],
-    /// List of the most recent missing samples.
+    /// The most recent missing samples.
     pub lacks: &'a MissingSamples,
 }
 
-/// Ping counts over the sections round a hole, and the driving figures at the moment with the largest
-/// distance between passes.
+/// Ping counts of the sections round a hole. `worst` holds the driving figures at the moment with the largest distance
+/// between passes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Seen {
     pub(super) pings: u32,
@@ -85,31 +84,31 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole. If the hole is larger than the target, only its central part, as large
-/// as the target, has to be swept.
+/// Whether every live head has swept the hole. In a hole larger than the target, only the central part, as large as the
+/// target, must be swept.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
     case.swept_by_all.is_some_and(|swept| from_m >= swept.from_m && to_m <= swept.to_m)
 }
 
-/// Whether the pings of silent heads can't be reconstructed.
+/// Whether it is unknown where silent heads would have pinged, so that their pings cannot be put back.
 ///
-/// True if the silent heads sweep in sectors, if one of them never pinged, or if all heads were silent for
-/// longer than the list of missing samples covers.
+/// True if the silent heads sweep in sectors, if one of them never pinged, or if all heads were silent for longer than
+/// the list of missing samples covers.
 pub(super) fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
 }
 
-/// Whether the places where silent heads would have pinged are unknown.
+/// Whether it is unknown where silent heads would have pinged, for another reason than sectors.
 ///
-/// True if some silent heads never pinged, or if no head pinged in the section and no missing samples of silent heads
-/// are listed.
+/// True if some silent heads never pinged. Also true if no head pinged in the section and no missing samples of silent
+/// heads are listed.
 pub(super) fn is_unheard(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_unheard || case.is_dark && !is_remembered(case)
 }
 
-/// Whether the places where silent heads would have pinged in the section are known.
+/// Whether missing samples of silent heads are listed for the section.
 pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     let mut lacking = case.lacks.between(case.bounds_m.0, case.bounds_m.1);
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
@@ -117,16 +116,16 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
 
 /// Whether a missing sample lies in the central part of a hole.
 ///
-/// This part is at most as large as the target, because samples that land later may still shrink the hole.
+/// The central part is at most as large as the target, because samples that land later may still shrink the hole.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
 }
 
 impl Drive {
-    /// Largest speed that leaves time for `passes_needed` passes in place of one, m/s.
+    /// Largest speed that leaves time for `passes_needed` passes where one was planned, m/s.
     ///
-    /// Zero if so many returns are lost that no useful speed remains.
+    /// Zero if too many returns are lost for any useful speed.
     pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
         if passes_needed >= MOST_PASSES {
             return 0.0;
@@ -139,10 +138,10 @@ impl Drive {
         }
     }
 
-    /// Returns the driving figures as they would have been without the factors `removed`.
+    /// Returns the driving figures as they would have been without the factors in `removed`.
     ///
-    /// If speed is among these factors, the returned speed is low enough for holes of at most `margin_m`, m, which is
-    /// the target less a margin. `all_turn` means that no head is silent or stalled.
+    /// Without the speed factor, the speed is low enough for holes of at most `margin_m`, m. This is the target less a
+    /// margin. `all_turn` means that no head is silent or stalled.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;
@@ -177,7 +176,8 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // If the vehicle hides wall from some heads, the advised speed is lower than this speed, and replaces it.
+            // If the vehicle hides wall from some heads, the advised speed is lower than the one computed here, and is
+            // used.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

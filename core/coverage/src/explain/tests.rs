@@ -28,8 +28,7 @@ fn sound() -> Drive {
     }
 }
 
-/// A wall with a lattice of samples except in some places, and the known facts about the drive past this
-/// wall.
+/// A wall with a lattice of samples except in some places, and the facts known about the drive past it.
 struct Wall {
     along_m: f64,
     around_m: f64,
@@ -62,7 +61,7 @@ impl Default for Wall {
     }
 }
 
-/// A place in the section that one turn of pings has missed.
+/// A place in the section without samples, because one turn of pings has missed it.
 const BARE: Option<[[f64; 2]; 2]> = Some([[9.7, 10.5], [3.0, 4.5]]);
 
 fn named(wall: &Wall) -> Vec<Cause> {
@@ -70,7 +69,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
     let (mut store, mut lacks) = (SampleStore::new(layout), MissingSamples::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
-    // The section's centre lies half way between two passes.
+    // The section's centre lies midway between two passes.
     let rows = count(4.0, wall.along_m);
     let x_m = |i: i64| 10.125 + (i as f64 + 0.5) * wall.along_m;
     for i in (-rows..=rows).filter(|i| x_m(*i) < wall.end_m) {
@@ -156,11 +155,11 @@ fn both_causes_are_named_only_if_both_are_needed() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
-    // Scattered losses enlarge the hole. Even without these losses, the section would fail.
+    // Scattered losses enlarge the hole, but the section would fail even without them.
     let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
-    // A sample that is missing for two reasons is put back only if both reasons are removed.
+    // A sample that is missing for two reasons is put back only if both are removed.
     let both = Causes::of(Cause::PositionLost).with(Cause::OutOfRange);
     assert_eq!(
         named(&Wall { bare: BARE, why: both, ..Wall::default() }),
@@ -170,7 +169,7 @@ fn both_causes_are_named_only_if_both_are_needed() {
 
 /// The heads are slightly out of phase, which enlarges the hole.
 ///
-/// The section would pass in spite of the phase if the other two factors were removed.
+/// Without the speed and the missing returns, the section would pass in spite of the phase.
 #[test]
 fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
@@ -180,7 +179,7 @@ fn two_causes_are_named_if_removing_two_of_three_factors_suffices() {
     assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
 }
 
-/// A longer range or a finer step has a longer turn, which leaves the passes farther apart.
+/// With a longer range or a finer step, a turn takes longer, so the passes are farther apart.
 ///
 /// If the section would fail with the other setting too, the present setting is not the cause.
 #[test]
@@ -203,7 +202,7 @@ fn head_setting_is_a_cause_only_if_another_setting_meets_the_target() {
     assert_eq!(named(&coarse(3.0)), [Cause::Unknown]);
 }
 
-/// Even if the vehicle moves straight, a stalled head leaves the passes too far apart.
+/// A stalled head leaves the passes too far apart, even if the vehicle moves straight.
 #[test]
 fn stalled_head_and_swing_are_both_named_as_causes() {
     let why = Causes::of(Cause::HeadStalled);
@@ -212,7 +211,7 @@ fn stalled_head_and_swing_are_both_named_as_causes() {
     assert_eq!(named(&wall), [Cause::OffAxis, Cause::HeadStalled]);
 }
 
-/// If no head pinged, nothing else is known about the section, so speed is not named as a cause.
+/// If no head pinged, nothing shows that speed was a cause, so it is not named.
 #[test]
 fn silent_heads_are_the_only_named_cause_if_no_head_pinged() {
     let fast = || Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
@@ -229,7 +228,7 @@ fn cause_of_the_neighbouring_section_is_preferred_if_sufficient() {
         ..Wall::default()
     };
     assert_eq!(named(&wall(Cause::TooFast)), [Cause::TooFast]);
-    // Only factors that were present in the section can be preferred.
+    // Only factors that were present in the section are preferred.
     assert_eq!(named(&wall(Cause::Occluded)), [Cause::TooFast]);
 }
 
@@ -240,8 +239,8 @@ fn cause_has_the_same_word_in_text_and_json() {
     }
 }
 
-/// The largest speed that meets the target leaves time for a single pass. With losses, the same distance is
-/// driven in the time of all needed passes and one ping.
+/// The largest speed that meets the target leaves time for a single pass. With losses, the vehicle drives the same
+/// distance in the time of all needed passes and one ping.
 #[test]
 fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
@@ -251,9 +250,10 @@ fn speed_with_lost_returns_leaves_time_for_all_needed_passes() {
     assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
-/// Checks the expected time between passes for each set of removed factors.
+/// Checks the expected time between passes for each set of removed causes.
 ///
-/// `drive` contains a different time for each case: as driven, as scheduled, without stalls, at the planned speed.
+/// The figures in `drive` differ, so that each shows which one was used: as driven, as scheduled, without stalls, or at
+/// the planned speed.
 #[test]
 fn expected_time_between_passes_depends_on_the_removed_causes() {
     let drive = Drive {
@@ -289,8 +289,8 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
         let then = without(causes, all_turn);
         assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
     }
-    // A longer range doubles the time between passes, and a finer mode increases this time by half. Both factors scale
-    // all times that depend on the turn period.
+    // A longer range doubles the time between passes, and a finer mode multiplies it by 1.5. Both scale all times that
+    // depend on the turn period.
     for (causes, slower, finer) in [
         (&[Cause::OutOfRange][..], 2.0, 1.0),
         (&[Cause::AngularStep], 1.5, 0.5),
@@ -305,7 +305,7 @@ fn expected_time_between_passes_depends_on_the_removed_causes() {
     assert!(near(straight.swing_m, 0.0) && near(straight.t_y_m, 0.2) && near(straight.healthy_gap_s, 4.0));
 }
 
-/// With a target of 0.5 m and steps of 0.3 m around the perimeter, passes may be 0.4 m apart along the tunnel.
+/// For a target of 0.5 m and steps of 0.3 m around the perimeter, passes may be 0.4 m apart along the tunnel.
 #[test]
 fn removing_the_speed_cause_lowers_the_speed_until_the_target_is_met() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
@@ -326,10 +326,10 @@ fn removing_the_speed_cause_lowers_the_speed_until_the_target_is_met() {
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
 
-/// Passes 4 s apart at 0.1 m/s have the same distance along the tunnel as passes 2 s apart at the planned 0.2
-/// m/s.
+/// Passes 4 s apart at 0.1 m/s have the same distance along the tunnel as passes 2 s apart at 0.2 m/s, the planned
+/// speed.
 ///
-/// The planned speed helps only if it reduces this distance below the share `HELPS` of the actual distance.
+/// The planned speed helps only if it reduces this distance below the share `HELPS` of the actual one.
 #[test]
 fn removing_the_phase_cause_sets_the_planned_speed_only_if_passes_come_closer_together() {
     let then = |planned_gap_s: f64| {

@@ -1,4 +1,4 @@
-//! Computes the hole that a section would have without some of the present factors.
+//! Computes the hole that a section would have without some of the factors that were present.
 
 use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unheard};
 use crate::cause::{Cause, Causes};
@@ -11,21 +11,19 @@ use headrace_geometry::math;
 use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::spacing;
 
-/// Removing the speed factor means a speed at which holes are at most this share of the target. Plans keep the rest as
-/// a margin.
+/// Share of the target to which holes shrink if the speed factor is removed. Plans keep the rest as a margin.
 const MARGIN: f64 = 0.85;
 /// Limits of the factor by which the wall is compressed or stretched.
 ///
 /// A finer step or a longer range takes longer per turn, which stretches the wall.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// If the hole exceeds this multiple of the target even with all present factors removed, the cause of the hole is
-/// unknown.
+/// If a hole exceeds this multiple of the target even without all present factors, its cause is unknown.
 const AT_MOST: f64 = 1.3;
-/// Maximum number of bisection steps in the search for the hole's diameter with all missing samples put back.
+/// Maximum number of bisection steps in the search for the hole's diameter, if all missing samples are put back.
 const SEARCHED: u32 = 5;
-/// Largest share of the missing samples that the remaining factors may cause after some factors are removed. If the
-/// share is larger, the remaining factors alone cause a hole.
+/// Largest share of the missing samples that may remain after some factors are removed. A larger share means that the
+/// remaining factors cause a hole by themselves.
 const STAYS: f64 = 0.15;
 /// Maximum number of causes in a set that explains a fail.
 const MOST_NAMED: u32 = 3;
@@ -39,11 +37,11 @@ pub(super) struct Trial<'a> {
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// Factors that were present in the section, and the factors among them that caused missing samples.
+    /// Factors that were present in the section (`present`), and those of them that caused missing samples (`lacking`).
     present: Causes,
     lacking: Causes,
     left: u32,
-    /// Bounds of the hole's diameter with all missing samples put back, m, and the number of bisection steps left.
+    /// Bounds of the hole's diameter if all missing samples are put back, m, and number of bisection steps left.
     full_m: [f64; 2],
     halvings: u32,
 }
@@ -68,7 +66,7 @@ impl<'a> Trial<'a> {
         let lacking: Causes = lacking.into_iter().filter(|cause| present.has(*cause)).collect();
         let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
         let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
-        // Samples outside the hole cannot shrink the hole when they are put back.
+        // Samples that are put back outside the hole cannot shrink it.
         let fills = |lack: &MissingSample| {
             lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
         };
@@ -81,9 +79,8 @@ impl<'a> Trial<'a> {
     /// Smallest set of present factors without which the section would have passed.
     pub(super) fn smallest(&mut self) -> Causes {
         let silent = Causes::of(Cause::HeadSilent);
-        // If no head pinged, the silence of the heads is a certain cause, and speed, step, swing and phase
-        // are not tested as causes. Other causes remain possible, because even pinging heads might not have
-        // detected the wall.
+        // If no head pinged, the silence of the heads is a certain cause. Speed, step, swing and phase are then not
+        // tested. Other causes remain possible, because even heads that ping might not have detected the wall.
         let surely = if self.case.is_dark { silent } else { Causes::default() };
         if self.case.is_dark {
             let is_driven = |cause: &Cause| {
@@ -112,9 +109,9 @@ impl<'a> Trial<'a> {
         present
     }
 
-    /// Removes `occluded` from the set if the other causes nearly suffice and wall is out of range.
+    /// Removes `occluded` from the set if wall is out of range and the other causes nearly suffice.
     ///
-    /// With a longer range, wall stays hidden from some heads, but other heads see this wall.
+    /// With a longer range, other heads see the wall that stays hidden from some.
     fn less_occluded(&mut self, set: Causes) -> Causes {
         let rest = set.without(Cause::Occluded);
         let is_far = set.has(Cause::Occluded) && set.has(Cause::OutOfRange);
@@ -129,12 +126,12 @@ impl<'a> Trial<'a> {
             [Cause::NotPassed, Cause::HeadSilent, Cause::Phase, Cause::PositionLost].map(Causes::of);
         let is_short = self.is_short();
         let first = [
-            // If the heads have not swept the wall, nothing is known about any other factor.
+            // If the heads have not swept the wall, nothing is known about the other factors.
             (true, not_passed),
-            // If some heads never pinged, nothing is known about any other factor.
+            // If some heads never pinged, nothing is known about the other factors.
             (is_unheard(self.case, self.seen), silent),
-            // If the planned speed would have met the target, phase is named first: the remedy is a change of
-            // speed, which is the easiest change.
+            // If the planned speed would have met the target, phase is named first. Its remedy is a change of speed,
+            // which is the easiest one.
             (!is_short && self.drive.is_slow_out_of_phase(1.0 / HELPS), phase),
         ];
         // Factors that would explain almost any hole are tested last.
@@ -149,23 +146,22 @@ impl<'a> Trial<'a> {
         in_turn.filter(|set| set.is_within(present)).find(|set| self.passes_without(*set, 1.0))
     }
 
-    /// Whether a head is silent or stalled. The other heads then leave uneven gaps, as if they were out of
-    /// phase.
+    /// Whether a head is silent or stalled. The other heads then leave uneven gaps, which look like a phase error.
     fn is_short(&self) -> bool {
         self.present.has(Cause::HeadSilent) || self.present.has(Cause::HeadStalled)
     }
 
-    /// Whether an uncertain displacement between passes is the only doubt about the position.
+    /// Whether the displacement between passes is uncertain, and nothing else about the position is in doubt.
     ///
-    /// A fail already allows for this uncertainty, and the uncertainty would explain any hole. Every other explanation
-    /// therefore comes first.
+    /// A fail already allows for this uncertainty, which would explain any hole. So every other explanation comes
+    /// first.
     fn is_only_adrift(&self) -> bool {
         self.seen.adrift && !self.seen.unseen && !self.case.is_torn
     }
 
     /// Returns the factors that every set of causes must contain to explain the fail.
     ///
-    /// If one of these factors stays, the section fails even if all other factors are removed.
+    /// The section fails if one of them stays, even if all other factors are removed.
     fn needed(&mut self, present: Causes) -> Causes {
         let mut is_needed = |cause: &Cause| !self.passes_without(present.without(*cause), 1.0);
         present.iter().filter(|cause| is_needed(cause)).collect()
@@ -190,29 +186,29 @@ impl<'a> Trial<'a> {
         !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
     }
 
-    /// Lays out the wall as it would be without the factors `removed`, for the search for holes.
+    /// Lays out the wall as it would be without the factors in `removed`, for the search for holes.
     fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &WallChanges) {
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
         let put_back = lacks
-            // The range includes samples that the mirroring of the wall needs later.
+            // Mirroring the wall later needs samples from this wider range.
             .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
             .map(|lack| WallPoint { x_m: lack.x_m, arc_m: lack.arc_m });
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 
-    /// Whether all wall counts as covered without the factors `removed`.
+    /// Whether all wall counts as covered without the factors in `removed`.
     ///
-    /// True if it is unknown where these factors caused missing samples.
+    /// True if it is unknown at which places these factors caused missing samples.
     fn covers(&self, removed: Causes) -> bool {
         let is_lost = self.case.is_torn || self.seen.unseen || self.seen.adrift;
         removed.has(Cause::PositionLost) && is_lost
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
     }
 
-    /// Distance between neighbouring samples without the factors `removed`, m, computed from vehicle and head movement
-    /// alone.
+    /// Distance between neighbouring samples without the factors in `removed`, m. It is computed only from the movement
+    /// of vehicle and heads.
     ///
     /// Infinite if the remaining factors cause many missing samples.
     fn stays_m(&self, removed: Causes) -> f64 {
@@ -229,9 +225,9 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(then.along_m(), 0.0, then.t_y_m)
     }
 
-    /// Whether enough samples remain despite random losses once the beams no longer swing.
+    /// Whether random losses leave enough samples once the beams no longer swing.
     ///
-    /// The compression of the wall doesn't allow for these losses.
+    /// This needs its own check, because the compression of the wall does not allow for losses.
     fn is_sampled_without(&self, removed: Causes, target_m: f64) -> bool {
         let is_lossy = self.present.less(removed).has(Cause::MissingReturns);
         if !is_lossy || !removed.has(Cause::OffAxis) {
@@ -241,7 +237,7 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(self.drive.passes_needed * then.along_m(), 0.0, then.t_y_m) <= target_m
     }
 
-    /// Returns the movement of vehicle and heads, first as driven, then without the factors `removed`.
+    /// Returns the movement of vehicle and heads twice: as driven, and without the factors in `removed`.
     ///
     /// If silent or stalled heads remain a factor, `healthy_gap_s` is at least the actual time between passes.
     fn drives(&self, removed: Causes) -> [Drive; 2] {
@@ -255,10 +251,10 @@ impl<'a> Trial<'a> {
         [now, now.without(removed, MARGIN * self.case.target_m, all_turn)]
     }
 
-    /// Diameter of the hole with all missing samples put back, m. The remaining factors must explain a hole
-    /// of this size.
+    /// Diameter of the hole if all missing samples are put back, m. The factors that moved passes apart must explain a
+    /// hole of this size.
     ///
-    /// The diameter is only as exact as a comparison with `least_m` and `most_m` requires.
+    /// It is only as exact as a comparison with `least_m` and `most_m` requires.
     fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
         let matters = |[smaller_m, larger_m]: [f64; 2]| smaller_m < most_m && larger_m > least_m;
         if least_m < most_m && self.halvings > 0 && matters(self.full_m) {
@@ -279,14 +275,14 @@ impl<'a> Trial<'a> {
         self.full_m[1]
     }
 
-    /// Stretch where samples may still land, into which the wall is mirrored.
+    /// Stretch where samples may still land. The wall is mirrored into it.
     ///
-    /// `None` if not every live head has swept the hole. The wall is then not mirrored.
+    /// `None` if some live head has not swept the hole; then the wall is not mirrored.
     fn to_come(&self) -> Option<Reach> {
         self.case.to_come.filter(|_| is_passed(self.case))
     }
 
-    /// Returns the changes to the wall that result from removing the factors `removed`.
+    /// Returns the changes to the wall that removing the factors in `removed` causes.
     fn otherwise(&mut self, removed: Causes) -> WallChanges {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
@@ -307,8 +303,7 @@ impl<'a> Trial<'a> {
         let [now, then] = self.drives(removed);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
-        // The driving figures are from a single moment. The size of the hole therefore limits the effect that these
-        // figures have.
+        // The driving figures are from a single moment, so their effect is limited by the size of the hole.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         WallChanges {

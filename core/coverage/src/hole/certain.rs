@@ -1,11 +1,11 @@
-//! Early fail of a section, before its hole is final. The fail requires a large empty circle that lies wholly where no
-//! more samples can land.
+//! Early fail of a section, before its hole is final. It requires a large empty circle, all of which lies where no more
+//! samples can land.
 
 use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 
-/// Resolution of the search, m. A circle may be missed if it exceeds the required radius by less than this resolution.
+/// Resolution of the search, m. A circle that exceeds the required radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
 /// Radius that an empty circle must have for an early fail, as a function of the arc length of its centre.
@@ -21,9 +21,10 @@ pub struct Needed<'a> {
 impl HoleFinder {
     /// Whether a circle of the required radius, centred between two chainages, is certain to remain empty.
     ///
-    /// The circle contains no sample and lies outside all `reaches`, the stretches where samples may still land or
-    /// where some heads have not been. The distance to the nearest sample or reach changes by at most 1 m per metre. As
-    /// in the search for holes, tiles whose bound is too small are dropped and the other tiles are halved.
+    /// The circle contains no sample. It lies outside all `reaches`, the stretches where samples may still land or
+    /// where some heads have not been. Along the wall, the distance to the nearest sample or reach changes by at most 1
+    /// m per metre. As in the search for holes, tiles whose bound is too small are dropped, and the other tiles are
+    /// halved.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle(
@@ -75,7 +76,7 @@ mod tests {
     const PERIMETER_M: f64 = 6.0;
 
     proptest! {
-        /// The reference is brute force over a fine grid.
+        /// The reference is a brute-force search on a fine grid.
         #[test]
         fn circle_is_found_if_and_only_if_brute_force_finds_one(
             samples in proptest::collection::vec((0.0f64..4.0, 0.0f64..PERIMETER_M), 0..40),
@@ -97,7 +98,7 @@ mod tests {
                 });
                 nearest.fold(f64::INFINITY, f64::min).min(reach_m - x_m)
             };
-            // The required radius grows with arc length up to the opposite side, and then decreases.
+            // The required radius grows with arc length as far as the opposite side, and then decreases.
             let radius_m = |arc_m: f64| radius_m + slope * arc_m.min(PERIMETER_M - arc_m);
             let places = (0..=25).flat_map(|i| (0..600).map(move |k| {
                 (1.0 + 0.01 * f64::from(i), 0.01 * f64::from(k))
@@ -106,7 +107,7 @@ mod tests {
             let most_m = radius_m(PERIMETER_M / 2.0);
             let needed = Needed { radius_m: &radius_m, most_m, slope };
             let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), [reach, None], &needed);
-            // The brute-force grid has an error of at most 5 mm in each direction. The search has an error of 1 mm.
+            // The brute-force grid is wrong by at most 5 mm in each direction, and the search by 1 mm.
             prop_assert!(!found || best_m + 0.009 > 0.0, "a circle is found with a margin of {best_m} m");
             prop_assert!(found || best_m <= 0.0022, "no circle is found with a margin of {best_m} m");
         }

@@ -1,10 +1,8 @@
 //! A tile of wall divided into the Voronoi cells of its samples.
 //!
-//! Each share is a convex polygon. The distance from the share's sample is largest at a corner.
+//! The share of each sample is a convex polygon. Its point farthest from the sample is a corner.
 
-/// Maximum number of samples among which a tile is divided.
-///
-/// With more samples, the tile is halved instead.
+/// Maximum number of samples among which a tile is divided. With more samples, the tile is halved instead.
 pub(super) const MAX_OWNERS: usize = 24;
 /// Maximum number of corners of a sample's share of the tile. With more corners, the tile is halved instead.
 const MAX_CORNERS: usize = 12;
@@ -14,17 +12,17 @@ const MAX_CORNERS: usize = 12;
 pub(super) struct Share {
     /// Sample to which the share belongs, relative to the tile's centre, m.
     pub owner: (f64, f64),
-    /// Corners relative to the sample of the share, where differences of nearby points are exact, m.
+    /// Corners relative to the share's sample, m. Differences of points near the sample are exact.
     corners: [(f64, f64); MAX_CORNERS],
     len: usize,
-    /// Squared distance of the share's farthest corner from the sample; zero for an empty share.
+    /// Squared distance of the farthest corner from the sample, m2. Zero for an empty share.
     pub farthest2: f64,
     /// The corner farthest from the sample.
     pub farthest: (f64, f64),
 }
 
 impl Share {
-    /// Returns the share of a tile's only sample: the whole tile, whose half edges are given.
+    /// Returns the share of a tile's only sample. It is the whole tile, given by its half edges.
     fn whole(owner: (f64, f64), (half_x, half_arc): (f64, f64)) -> Self {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
         let (low, high) = (-owner.1 - half_arc, -owner.1 + half_arc);
@@ -36,7 +34,7 @@ impl Share {
         share
     }
 
-    /// Adds a corner to the share; returns false if there are too many corners.
+    /// Adds a corner to the share. Returns false if there is no room for it.
     fn push(&mut self, corner: (f64, f64)) -> bool {
         let Some(place) = self.corners.get_mut(self.len) else { return false };
         *place = corner;
@@ -48,13 +46,13 @@ impl Share {
         true
     }
 
-    /// Clips the share to the points nearer to its own sample than to another sample, the rival.
+    /// Clips the share to the points that are nearer to its own sample than to `rival`, another sample.
     ///
     /// Returns false if there are too many corners.
     fn clip(&mut self, rival: (f64, f64)) -> bool {
         let (nx, ny) = (rival.0 - self.owner.0, rival.1 - self.owner.1);
         let half = 0.5 * (nx * nx + ny * ny);
-        // A rival cuts off nothing if it is more than twice as far from the share's sample as the farthest corner.
+        // A rival more than twice as far from the share's sample as the farthest corner cuts off nothing.
         if half > 2.0 * self.farthest2 {
             return true;
         }
@@ -93,8 +91,8 @@ impl Share {
 
 /// A tile divided among the samples found so far.
 ///
-/// The largest distance of a corner from its share's sample is the upper bound for all points of the tile. More samples
-/// only reduce this bound.
+/// The largest distance of a corner from its share's sample is an upper bound for all points of the tile. More samples
+/// only reduce it.
 #[derive(Debug)]
 pub(super) struct Division {
     half_edges: (f64, f64),
@@ -115,15 +113,14 @@ impl Division {
         self.shares.push(Share::whole(owner, half_edges));
     }
 
-    /// Returns the share whose corner is farthest from its sample.
+    /// Returns the share with the largest distance of a corner from its sample.
     pub(super) fn worst(&self) -> Option<&Share> {
         self.shares.iter().max_by(|a, b| a.farthest2.total_cmp(&b.farthest2))
     }
 
     /// Adds the share of a sample.
     ///
-    /// Returns false if the sample already has a share, or if there is no room for another share. The tile must then
-    /// be halved.
+    /// Returns false if the sample already has a share, or if there is no room for it. Then the tile must be halved.
     pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
         let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
         if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {

@@ -9,11 +9,11 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::WallPoint;
 
-/// Maximum search radius, m. Wall farther than this from every sample counts as wall that no head has swept.
+/// Maximum search radius, m. Wall that is farther than this from every sample counts as not swept by any head.
 pub const FARTHEST_M: f64 = 12.0;
 /// Half diagonal below which a tile is not halved again, m.
 ///
-/// The bound of such a tile is within 2e-10 m of the exact value.
+/// The bound of such a small tile is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
 /// Upper limit of the rounding error of a computed distance, m.
 const ROUNDING_M: f64 = 1e-9;
@@ -29,7 +29,7 @@ pub struct Hole {
     pub diameter_m: f64,
     /// Lower bound of the hole's exact diameter, m: `diameter_m` less the possible effect of thinned and moved samples.
     pub least_m: f64,
-    /// Upper bound of the hole's exact diameter, m; infinite if the hole is not `bounded`.
+    /// Upper bound of the hole's exact diameter, m. Infinite if the hole is not `bounded`.
     pub most_m: f64,
     /// Chainage of the circle's centre, m.
     pub x_m: f64,
@@ -37,7 +37,7 @@ pub struct Hole {
     pub arc_m: f64,
     /// Whether there are samples around the hole.
     ///
-    /// Without samples around the hole, its exact diameter is at least `diameter_m`.
+    /// Without them, its exact diameter is at least `diameter_m`.
     pub bounded: bool,
 }
 
@@ -64,17 +64,17 @@ impl Hole {
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tile {
-    /// Centre of the tile, from the start of the section, m.
+    /// Centre of the tile, m. Its chainage is relative to the start of the section.
     pub(super) x_m: f64,
     pub(super) arc_m: f64,
     pub(super) half_x_m: f64,
     pub(super) half_arc_m: f64,
     /// Sample nearest to the tile's centre, relative to the centre, m.
     ///
-    /// Searches for an empty circle of given size store the place of any nearby sample here: its chainage from the
-    /// start of the section, and its arc length.
+    /// A search for an empty circle of given size stores any nearby sample here instead: its chainage from the start of
+    /// the section, and its arc length.
     pub(super) owner: (f64, f64),
-    /// Upper bound of f in the tile, m; f is the distance from a point to the nearest sample.
+    /// Upper bound of the distance from a point of the tile to the nearest sample, m.
     pub(super) bound_m: f64,
 }
 
@@ -82,7 +82,7 @@ pub(super) struct Tile {
 struct Best {
     distance_m: f64,
     at: WallPoint,
-    /// Largest upper bound among the dropped tiles, m.
+    /// Largest upper bound of a dropped tile, m.
     dropped_m: f64,
 }
 
@@ -92,7 +92,7 @@ struct Beyond(WallPoint);
 
 /// Result of searching for a sample near the centre of a tile.
 pub(super) enum Near {
-    /// No empty circle has its centre in the tile: one sample is within the radius of all points of the tile.
+    /// No empty circle has its centre in the tile, because one sample is within the radius of all its points.
     Settled,
     /// The sample nearest to the centre, or any sample that is near enough.
     Sample(Nearest),
@@ -112,7 +112,7 @@ impl Near {
 }
 
 impl Tile {
-    /// Centre of the tile, with the chainage from the start of the section.
+    /// Centre of the tile. Its chainage is relative to the start of the section.
     pub(super) fn centre(&self) -> WallPoint {
         WallPoint { x_m: self.x_m, arc_m: self.arc_m }
     }
@@ -122,7 +122,7 @@ impl Tile {
         math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
     }
 
-    /// Halves of the tile, cut across its longer side.
+    /// Both halves of the tile, cut across its longer side.
     fn halves(&self) -> [Self; 2] {
         let along_x = self.half_x_m > self.half_arc_m;
         [-0.5, 0.5].map(|side| {
@@ -137,8 +137,8 @@ impl Tile {
 
     /// Searches for a sample near the tile's centre.
     ///
-    /// No search is needed if `owner` is a known sample within the radius of all points of the tile. Otherwise, the
-    /// function returns any sample that is near enough, or else the nearest sample.
+    /// No search is needed if `owner` is a known sample within the radius of all points of the tile. Otherwise, returns
+    /// any sample that is near enough, or else the nearest one.
     pub(super) fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
         // The margins are larger than the rounding errors of the distances.
         let enough_m = radius_m - self.half_m() - ROUNDING_M;
@@ -159,9 +159,9 @@ impl Tile {
         self.halves()
     }
 
-    /// Returns the sample's position relative to the tile's centre.
+    /// Returns a sample's position relative to the tile's centre.
     ///
-    /// The result has the same bits for every point from which a search can find the sample.
+    /// The bits of the result do not depend on the point from which the search has found the sample.
     fn relative(&self, found: &Nearest, perimeter_m: f64) -> (f64, f64) {
         (found.x_m - self.x_m, (found.arc_m - self.arc_m) + found.turns * perimeter_m)
     }
@@ -182,13 +182,13 @@ pub(super) fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item
     })
 }
 
-/// Finds the largest hole of a stretch of wall. All searches share the working memory of this finder.
+/// Finds the largest hole of a stretch of wall. All searches share its working memory.
 #[derive(Debug)]
 pub struct HoleFinder {
     tolerance_m: f64,
-    /// Radius of the previous hole, m: the first guess for the next search.
+    /// Radius of the previous hole, m, as the first guess for the next search.
     last_m: f64,
-    /// Largest radius of circles for which the latest layout of the changed wall suffices, m.
+    /// Largest radius of circles that can be searched on the latest layout of the changed wall, m.
     pub(super) laid_m: f64,
     pub(super) window: Window,
     pub(super) tiles: Vec<Tile>,
@@ -204,9 +204,9 @@ impl Default for HoleFinder {
 stateful!(HoleFinder { state: last_m; fixed: tolerance_m, laid_m, window, tiles, division; });
 
 impl HoleFinder {
-    /// Creates a finder that measures hole diameters with a tolerance, m; zero means an exact search.
+    /// Creates a finder that measures hole diameters with a tolerance, m. Zero means an exact search.
     ///
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory that it will ever use.
     pub fn new(tolerance_m: f64) -> Self {
         Self {
             tolerance_m,
@@ -227,7 +227,8 @@ impl HoleFinder {
 
     /// Returns the largest hole among the samples of visits from `first_visit` on.
     ///
-    /// The hole's `least_m` is then no lower bound: full cells don't store a sample near a sample of an earlier visit.
+    /// Its `least_m` is then no lower bound, because a full cell does not store a sample near a sample of an earlier
+    /// visit.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
@@ -254,13 +255,13 @@ impl HoleFinder {
     fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
         let mut best = Best { distance_m: 0.0, at: WallPoint::default(), dropped_m: 0.0 };
         self.tiles.clear();
-        // A good first guess at the hole saves most of the work. All tiles' centres are evaluated before any
+        // A good first guess at the hole saves most of the work. So the centres of all tiles are evaluated before any
         // tile is divided, and the tile with the largest bound is divided first.
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
-            // The next tile's centre is one tile edge away. The distance from there to the nearest sample is longer by
-            // this edge at most, which limits the radius of the next search.
+            // The next tile's centre is one tile edge away. The distance from it to the nearest sample is at most
+            // longer by this edge, which limits the radius of the next search.
             within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_arc_m + 1e-6;
             self.tiles.push(tile);
         }
@@ -277,7 +278,7 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile among samples until no point of the tile can be clearly farther from all samples than the best
+    /// Divides a tile among samples until none of its points can be clearly farther from all samples than the best
     /// point.
     ///
     /// Returns false if the tile must be halved first.
@@ -301,7 +302,7 @@ impl HoleFinder {
                 if bound_m > reach_m {
                     return Err(Beyond(corner));
                 }
-                // The owner of the share is the nearest sample to the farthest corner, except for rounding.
+                // Apart from rounding, the owner of the share is the sample nearest to the farthest corner.
                 best.take(bound_m, corner);
                 return Ok(true);
             };
@@ -323,7 +324,7 @@ impl HoleFinder {
         let from_m = self.window.chainage_m(-radius_m);
         let fidelity = store.fidelity(from_m, self.window.chainage_m(length_m + radius_m));
         let diameter_m = 2.0 * best.distance_m;
-        // If the window was full, the samples that it dropped could reduce the diameter. Its lower bound is then zero.
+        // A full window has dropped samples, which could reduce the diameter. Then the diameter's lower bound is zero.
         let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
         let hole = Hole {
             diameter_m,
@@ -340,7 +341,7 @@ impl HoleFinder {
 }
 
 impl Best {
-    /// Whether a point lies in a section of this length, within the search radius of a sample.
+    /// Whether the best point lies in a section of this length, with a sample within the search radius.
     fn is_within(&self, length_m: f64) -> bool {
         let is_inside = (-ROUNDING_M..=length_m + ROUNDING_M).contains(&self.at.x_m);
         is_inside && (0.0..=FARTHEST_M + ROUNDING_M).contains(&self.distance_m)

@@ -1,14 +1,14 @@
 //! Hypothetical holes on a changed wall.
 //!
-//! Missing samples are put back, the wall is compressed, or stretches count as covered.
+//! Missing samples are put back, the wall is compressed or stretched, or stretches count as covered.
 
 use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
 use headrace_geometry::tunnel::WallPoint;
 
-/// Search resolution as a share of the required radius. A circle whose radius exceeds the required radius by less than
-/// this share may be missed.
+/// Search resolution as a share of the required radius. A circle that exceeds this radius by a smaller share may be
+/// missed.
 const FINE: f64 = 0.01;
 
 /// Hypothetical changes to the wall.
@@ -22,7 +22,7 @@ pub struct WallChanges {
     pub covered: [Option<Reach>; 4],
     /// Stretch where samples may still land.
     ///
-    /// The wall in this stretch is taken as the mirror image of the wall outside the stretch.
+    /// The wall in it is taken as the mirror image of the wall outside.
     pub to_come: Option<Reach>,
 }
 
@@ -30,7 +30,7 @@ impl WallChanges {
     /// Wall without any change.
     pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
-    /// Distance from a chainage to the nearest stretch that counts as covered or where samples may still land, m.
+    /// Distance from a chainage to the nearest stretch that is covered or where samples may still land, m.
     fn clear_m(&self, x_m: f64) -> f64 {
         let off_m = |reach: &Reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0);
         let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
@@ -45,7 +45,7 @@ impl WallChanges {
 
 /// Returns a stretch and its mirror image, in ascending order.
 ///
-/// If the two stretches meet, they are joined. A gap between the two stretches belongs to neither of them.
+/// They are joined if they meet. A gap between them belongs to neither.
 fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
     let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
     if image_m[0] > to_m {
@@ -58,9 +58,9 @@ fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 
 }
 
 impl HoleFinder {
-    /// Lays out the wall with the changes `otherwise` and the additional samples `more`.
+    /// Lays out the wall with the changes in `otherwise` and the additional samples `more`.
     ///
-    /// The layout suffices for circles of up to `radius_m` centred between two chainages. Stored samples of visits
+    /// The layout suffices for circles of up to `radius_m` centred between the two chainages. Stored samples of visits
     /// before `first_visit` are ignored.
     ///
     /// Allocates: never.
@@ -104,10 +104,10 @@ impl HoleFinder {
         window.sort();
     }
 
-    /// Whether a circle of `radius_m` centred between two chainages holds no sample.
+    /// Whether a circle of `radius_m` centred between two chainages contains no sample.
     ///
-    /// Lay out the wall with [`lay_otherwise`](Self::lay_otherwise) before, for circles of at least this radius. A
-    /// smaller layout lacks samples near the circle.
+    /// Call [`lay_otherwise`](Self::lay_otherwise) first, with at least this radius. A layout for a smaller radius
+    /// lacks samples near the circle.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle_otherwise(
@@ -142,9 +142,9 @@ mod tests {
     use super::*;
     use crate::store::{StoreLayout, WallSample};
 
-    /// Whether there is an empty circle on a wall of 10 m perimeter.
+    /// Whether there is an empty circle on a wall of 10 m perimeter with these changes.
     ///
-    /// The wall has samples every 0.5 m along and around, except where `is_in` is false.
+    /// The wall has samples every 0.5 m along and around, where `is_in` is true.
     fn has(
         is_in: impl Fn(u32, u32) -> bool,
         radius_m: f64,
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn hypothetically_compressed_wall_has_smaller_holes() {
         let all = |_, _| true;
-        // The hole's radius is half the diagonal of a mesh of 0.5 by 0.5 m, or of 0.25 by 0.5 m.
+        // The hole's radius is half the diagonal of a mesh. The mesh is 0.5 by 0.5 m, or 0.25 by 0.5 m.
         for (otherwise, radius_m) in [
             (WallChanges::NOTHING, 0.3535),
             (WallChanges { along: 0.5, ..WallChanges::NOTHING }, 0.2795),
@@ -188,7 +188,7 @@ mod tests {
 
     /// A stretch of 2.5 m without samples is compressed to 0.75 m.
     ///
-    /// Samples on both sides of the compressed stretch then bound the hole.
+    /// After that, the samples on both of its sides bound the hole.
     #[test]
     fn search_on_compressed_wall_includes_samples_from_farther_away() {
         let sides = |i: u32, _| i <= 8 || i >= 13;
@@ -199,8 +199,8 @@ mod tests {
 
     #[test]
     fn wall_is_mirrored_into_the_stretch_not_yet_sampled() {
-        // On a compressed wall, a circle at the end of the samples extends ahead, into wall where no sample has
-        // landed yet.
+        // Without mirroring, a circle at the end of the samples extends ahead on the compressed wall, to where no
+        // sample has landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = WallChanges { along: 0.3, ..WallChanges::NOTHING };
         let to_come = Some(Reach { from_m: 5.25, to_m: f64::INFINITY });

@@ -12,11 +12,11 @@ const CELLS: usize = 1 << 20;
 /// The sample nearest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Nearest {
-    /// Chainage of the sample from the window's origin, m.
+    /// Chainage of the sample relative to the window's origin, m.
     pub x_m: f64,
     /// Arc length of the sample, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Number of perimeters to add to the arc length to get the sample's image nearest to the point.
+    /// Number of perimeters to add to the sample's arc length to get its image nearest to the point.
     pub turns: f64,
     /// Squared distance from the point to the sample on the unrolled wall, m2.
     pub distance2: f64,
@@ -28,20 +28,20 @@ pub(super) struct Window {
     perimeter_m: f64,
     /// Chainage of the window's origin, m.
     origin_m: f64,
-    /// Distance of the first row of cells from the origin, m.
+    /// Distance from the origin to the first row of cells, m.
     from_m: f64,
     cell_m: f64,
     column_m: f64,
-    /// Reciprocals of perimeter, cell length and cell width, 1/m. Sorting and lookup must use the same values.
+    /// Reciprocals of perimeter, cell length and cell width, 1/m. Sorting and lookup must use equal values.
     per_m: [f64; 3],
     rows: usize,
     columns: usize,
     /// Start index of each cell's samples, row by row, with two additional entries at the end.
     begins: Vec<u32>,
-    /// Samples by cell, with the chainage from the window's origin.
+    /// Samples by cell. Their chainage is relative to the window's origin.
     spots: Vec<WallPoint>,
     unsorted: Vec<(u32, WallPoint)>,
-    /// Whether there were more samples than the window can hold.
+    /// Whether samples were dropped because the window was full.
     pub overfull: bool,
 }
 
@@ -67,9 +67,8 @@ impl Default for Window {
 impl Window {
     /// Loads the stored samples between two chainages into the window. Cells are about `cell_m` long.
     ///
-    /// The chainages `from_m` and `to_m` are relative to `origin_m`.
-    ///
-    /// Samples of visits before `first_visit` are ignored.
+    /// The chainages `from_m` and `to_m` are relative to `origin_m`. Samples of visits before `first_visit` are
+    /// ignored.
     ///
     /// Allocates: never.
     pub(super) fn fill(
@@ -90,7 +89,7 @@ impl Window {
 
     /// Begins a window between two chainages relative to `origin_m`.
     ///
-    /// The caller then pushes samples and sorts the window.
+    /// Then the caller pushes samples and sorts the window.
     pub(super) fn begin(&mut self, perimeter_m: f64, origin_m: f64, between_m: (f64, f64), cell_m: f64) {
         self.lay_out(perimeter_m, origin_m, between_m, cell_m);
         self.unsorted.clear();
@@ -119,7 +118,7 @@ impl Window {
 
     fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
         let cells = (to_m - from_m) * perimeter_m;
-        // Cells are enlarged if their number would exceed the capacity.
+        // Larger cells are used if there is no room for all cells of this size.
         let cell_m = cell_m.max(1.5 * math::sqrt(cells / CELLS as f64));
         (self.perimeter_m, self.origin_m, self.from_m, self.cell_m) = (perimeter_m, origin_m, from_m, cell_m);
         self.rows = whole((to_m - from_m) / cell_m) + 1;
@@ -132,8 +131,8 @@ impl Window {
 
     /// Sorts the samples by cell, with a counting sort.
     ///
-    /// Counts are stored at cell + 2. Their running sum at cell + 1 is the start index of the cell. This index advances
-    /// to the start of the next cell while the samples are placed.
+    /// The count of each cell is stored at cell + 2. So the running sum at cell + 1 is the start index of the cell.
+    /// While samples are placed, this index advances to the start of the next cell.
     pub(super) fn sort(&mut self) {
         let mut sum = 0;
         for begin in &mut self.begins {
@@ -161,12 +160,12 @@ impl Window {
         );
     }
 
-    /// Whether the last cell ends with the last sample. This is true if all samples lie in cells.
+    /// Whether the last cell ends with the last sample, as it does if all samples lie in cells.
     fn is_sorted(&self) -> bool {
         self.begins.iter().rev().take(2).all(|end| *end as usize == self.spots.len())
     }
 
-    /// Converts chainage from the window's origin to chainage along the tunnel, m.
+    /// Converts chainage relative to the window's origin to chainage along the tunnel, m.
     pub(super) fn chainage_m(&self, x_m: f64) -> f64 {
         self.origin_m + x_m
     }
@@ -176,7 +175,8 @@ impl Window {
         self.perimeter_m
     }
 
-    /// Returns the sample nearest to a point within `within_m`; among equally near samples, the first found.
+    /// Returns the sample nearest to a point within `within_m`. If several are equally near, returns the first one
+    /// found.
     pub(super) fn nearest(&self, to: WallPoint, within_m: f64) -> Option<Nearest> {
         self.near(to, within_m, -1.0)
     }
@@ -193,7 +193,7 @@ impl Window {
         let arc_m = arc_m - turn * self.perimeter_m;
         let mut best = Search { x_m, arc_m, limit2: within_m * within_m, enough2, found: None };
         let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
-        // The search begins in the point's row and proceeds by one row on either side at a time.
+        // The search begins in the point's row, and then takes the next row on either side at each step.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
             if best.is_enough() {
@@ -214,12 +214,12 @@ impl Window {
         Some(Nearest { x_m: spot.x_m, arc_m: spot.arc_m, turns, distance2: best.limit2 })
     }
 
-    /// Searches a row of cells near a point; returns false if the whole row is out of range.
+    /// Searches a row of cells near a point. Returns false if the whole row is out of range.
     fn look_in_row(&self, row: usize, best: &mut Search) -> bool {
         let low = self.from_m + row as f64 * self.cell_m - best.x_m;
         let away = low.max(-(low + self.cell_m)).max(0.0);
         let width2 = best.limit2 - away * away;
-        // The margin allows for rounding of the row's edge coordinates.
+        // The margin allows for rounding of the coordinates of the row's edges.
         if width2 < -1e-9 {
             return false;
         }
@@ -254,7 +254,7 @@ impl Window {
         self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
     }
 
-    /// Searches a range of cells in a row, shifted by whole turns round the perimeter.
+    /// Searches a range of cells in a row. Their samples are shifted by `turns` turns round the perimeter.
     fn look_at(&self, from: usize, to: usize, turns: f64, best: &mut Search) {
         let arc_m = best.arc_m - turns * self.perimeter_m;
         for spot in self.spots(from, to) {
@@ -265,7 +265,7 @@ impl Window {
         }
     }
 
-    /// Searches all samples of a row, each by its shorter direction round the perimeter.
+    /// Searches all samples of a row. The distance to each is measured the shorter way round the perimeter.
     fn look_all_round(&self, first: usize, best: &mut Search) {
         let half_m = self.perimeter_m / 2.0;
         for spot in self.spots(first, first + self.columns) {
@@ -305,7 +305,7 @@ impl Search {
         is_nearer
     }
 
-    /// Whether the sample found is near enough to stop the search.
+    /// Whether a sample was found that is near enough to stop the search.
     fn is_enough(&self) -> bool {
         self.limit2 <= self.enough2 && self.found.is_some()
     }

@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Missed stretches under test, and the states of the sections, which the stretches must match.
+/// Missed stretches under test, and the states of the sections that they must match.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -29,7 +29,7 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        // No speed helps against holes of a metre or more in this test.
+        // In this test, no speed helps against holes of a metre or more.
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
@@ -49,7 +49,7 @@ impl Rig {
         runs.set(section, failing, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
-    /// Checks every missed stretch that isn't cleared against the states of its sections.
+    /// Checks every missed stretch that is not cleared against the states of its sections.
     fn check(&self) {
         let failing = |index: i64| self.failing[usize::try_from(index + 5).unwrap()];
         let causes = |index: i64| failing(index).map(|failing| failing.causes);
@@ -113,7 +113,7 @@ fn missed_stretches_grow_merge_and_are_cleared() {
     let first = *rig.runs.get(RunId(0)).unwrap();
     assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
-    // Sections 7 and 19 are just near enough to join the missed stretch. Sections 6 and 20 are too far away.
+    // Sections 7 and 19 are just near enough to join the missed stretch. Sections 6 and 20 are not.
     assert_eq!([6, 7, 19, 20].map(|section| rig.runs.is_beyond(&first, section)), [true, false, false, true]);
     for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);
@@ -137,7 +137,7 @@ fn most_frequent_cause_of_a_missed_stretch_is_its_main_cause() {
         rig.say(section, Some(Cause::TooFast), 1.0);
     }
     assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "a cause of one section in 22 isn't named");
-    // All failed sections except the first are judged again, with another cause.
+    // All failed sections except the first are judged again, now with another cause.
     for section in 1..22 {
         rig.say(section, Some(Cause::HeadSilent), 1.0);
     }
@@ -161,7 +161,7 @@ fn missed_stretch_splits_when_its_middle_sections_pass_and_the_first_part_keeps_
 }
 
 proptest! {
-    /// Missed stretches match the states of the sections after any sequence of updates.
+    /// After any sequence of updates, missed stretches match the states of the sections.
     #[test]
     fn missed_stretches_match_the_section_states(
         said in proptest::collection::vec((-5..COUNT - 5, 0_u8..4, 0.1_f64..3.0), 1..300),
@@ -173,7 +173,7 @@ proptest! {
             let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(lost)];
             rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
-        // Many changes may use up the numbers of missed stretches. Some sections then belong to no stretch.
+        // Many changes may use up the numbers of missed stretches. Then some sections belong to none.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
             rig.check();
         }

@@ -1,7 +1,7 @@
 //! Decides which sections are due for judging.
 //!
-//! During the dive, a section is due if the heads have left it, or if a part of it may already be certain to
-//! fail. At the end of a dive, a section is due if its verdict may still change.
+//! During the dive, a section is due if the heads have left it, or if a part of it may already be certain to fail. At
+//! the end of the dive, a section is due if its verdict may still change.
 
 use super::section_table::{Ended, Judging, LOOK_AT_ONCE, Request, Sections, clamp};
 use crate::frontier::{Moved, Outlook, Reach, clear_of};
@@ -9,9 +9,8 @@ use crate::hole::{FARTHEST_M, Needed};
 use crate::section::Verdict;
 use headrace_geometry::math;
 
-/// Distance travelled between two checks of sections left behind, m.
-///
-/// A flag is late by at most this distance.
+/// Distance travelled between two checks of the sections that the heads have left, m. It is the largest delay of a
+/// flag.
 const LOOK_M: f64 = 0.125;
 
 impl Sections {
@@ -22,10 +21,10 @@ impl Sections {
         !moved.is_nothing() || moved.to_come.is_some_and(is_due)
     }
 
-    /// Sets the chainages of the heads at which sections are checked next.
+    /// Sets the chainages of the heads' reach at which sections are checked next.
     ///
-    /// Each section is divided into parts of at most [`LOOK_M`]. A check is due when the heads have left another part:
-    /// behind the vehicle, or ahead of it while it goes back.
+    /// Each section is divided into parts of at most [`LOOK_M`]. A check is due whenever the heads have left another
+    /// part: behind the vehicle, or ahead of it while it goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -40,8 +39,8 @@ impl Sections {
 
     /// Calls `ask` for every section of the coverage extent that is due after the heads have moved.
     ///
-    /// A section is due if it left the zone or was never in the zone, if its hole can get no more samples, or if a
-    /// part of the section may already be certain to fail.
+    /// A section is due if it left the zone or was never in it, if its hole can get no more samples, or if a part of it
+    /// may already be certain to fail.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -73,8 +72,8 @@ impl Sections {
                 let may_fail = !section.is_flagged() && section.verdict == Verdict::Open;
                 let is_out = index < moved.left_behind.end || index >= moved.left_ahead.start;
                 let Some(hole) = section.hole else {
-                    // Sections of the coverage extent that were never judged lie beside the heads, or where the vehicle
-                    // set out.
+                    // A section of the coverage extent that was never judged lies beside the heads, or where the
+                    // vehicle set out.
                     let (from_m, to_m) = bounds_m;
                     let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
                     if !is_out {
@@ -97,11 +96,11 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for sections in reach of a vehicle that is nearly stationary.
+    /// Calls `ask` for sections in reach of a vehicle that is nearly stationary. Otherwise they would get no verdict
+    /// while it is stationary.
     ///
-    /// Without this call, these sections would get no verdict while the vehicle is stationary. An unflagged section is
-    /// always due, because it may have become certain to fail. A flagged section is due if it has new samples since it
-    /// was judged.
+    /// An unflagged section is always due, because it may have become certain to fail. A flagged section is due if it
+    /// has new samples since it was judged.
     ///
     /// Allocates: never.
     pub fn look_around(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -121,7 +120,7 @@ impl Sections {
 
     /// Whether a section already has an empty circle that exceeds the target by more than the errors.
     ///
-    /// All heads have been at the circle, and no more samples will land in it.
+    /// The circle must lie where all heads have been and no more samples will land.
     pub(super) fn fails_already(&self, request: &Request, judging: &mut Judging<'_>) -> bool {
         let Judging { store, finder, profile, .. } = judging;
         let Request { section: index, to_come, not_passed, .. } = *request;
@@ -144,8 +143,8 @@ impl Sections {
         most_clear_m > least_m && finder.has_circle(store, bounds_m, [to_come, not_passed], &needed)
     }
 
-    /// At the end of a dive, calls `ask` for every section of the coverage extent, except settled passes without new
-    /// samples.
+    /// Calls `ask` for the sections of the coverage extent at the end of a dive. Settled passes without new samples are
+    /// left out.
     pub fn unsettled(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
         let ask_for = Request::at(outlook);
         for index in self.sections_of(outlook.way) {
@@ -153,7 +152,7 @@ impl Sections {
                 debug_assert!(false, "section {index} of the coverage extent exists");
                 continue;
             };
-            // Samples that are too far away to change a pass may have reduced the hole of a failed section.
+            // The hole of a failed section may have become smaller through samples too far away to change a pass.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 ask(Request { ended: Some(Ended(outlook.through)), ..ask_for(index) });
@@ -175,7 +174,7 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sampling::Target;
 
-    /// Sections that the heads have passed only in part are checked at least every 12.5 cm of travel, both behind and
+    /// The heads have passed some sections only in part. These are checked at least every 12.5 cm of travel, behind and
     /// ahead of the vehicle.
     #[test]
     fn next_check_is_due_within_12_5_cm_of_travel() {
@@ -194,7 +193,7 @@ mod tests {
 
     /// Around a stationary vehicle, a failed section is judged again only after new samples.
     ///
-    /// Every other section is judged at each check, because it may have become certain to fail.
+    /// All other sections are judged at each check, because they may have become certain to fail.
     #[test]
     fn failed_section_at_a_stationary_vehicle_is_judged_again_only_after_new_samples() {
         let mut sections = Sections::new(0.25, Target::new(0.5), -1.0, 10.0);
@@ -228,7 +227,7 @@ mod tests {
 
     /// Returns the requests after the heads have left the stretch from 2.5 to 3 m. Samples may land from 3.25 m on.
     ///
-    /// Each request has the section's index, and whether it asks only for a certain fail.
+    /// Each request is given by the section's index, and by whether it asks only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
         let mut sections = Sections::new(0.25, Target::new(0.5), 1.0, 10.0);
         set(&mut sections);
@@ -270,8 +269,8 @@ mod tests {
     #[test]
     fn section_without_a_verdict_is_judged_when_the_heads_have_left_it() {
         let found = due(|_| {});
-        // All sections behind the zone get a full judgement. At the zone's ends, sections may fail because of
-        // the part that the heads have left. Sections ahead are not judged.
+        // All sections behind the zone get a full judgement. A section at an end of the zone may fail because of the
+        // part that the heads have left. Sections ahead are not judged.
         let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
         expected.extend([(12, true), (15, true)]);
         assert_eq!(found, expected);
@@ -282,10 +281,10 @@ mod tests {
         assert_eq!(alone(9, |section| section.stale = true), [], "the heads left the section earlier");
     }
 
-    /// A section may fail early because of the part of its hole that is out of the heads' reach.
+    /// A section may fail early because a part of its hole is already out of the heads' reach.
     ///
-    /// The diameter of this part is twice the distance of the hole's centre from the reach. If the whole hole is out
-    /// of reach, the section gets its final verdict.
+    /// This part is a circle about the hole's centre that just touches the reach. If all of the hole is out of reach,
+    /// the section gets its final verdict.
     #[test]
     fn hole_is_judged_when_a_large_enough_part_is_out_of_reach_of_the_heads() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
@@ -308,9 +307,9 @@ mod tests {
 
     /// Whether a section is certain to fail because of an empty circle of radius `circle_m`, in a pipe of 3 m radius.
     ///
-    /// The circle lies beside the vehicle (`is_beside`) or above it. `along_m` and `yaw_rad` are the standard
-    /// deviations of chainage and yaw from pass to pass. From the chainage `to_come_m` on, samples may still land.
-    /// Before 9 m, some heads have not passed the wall.
+    /// The circle lies beside the vehicle (`is_beside`) or above it. The two errors are the standard deviations of
+    /// chainage and yaw from pass to pass. Samples may still land from the chainage `to_come_m` on. Before 9 m, some
+    /// heads have not passed the wall.
     fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -370,18 +369,18 @@ mod tests {
         for is_beside in [true, false] {
             let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
             assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "the circle must exceed the target");
-            // The limit is 0.5 m plus three times 0.06 m.
+            // The limit is 0.5 m plus three standard deviations of 0.06 m.
             assert!(!fails(0.335, [0.05, 0.0]) && fails(0.345, [0.05, 0.0]));
         }
-        // A yaw of 0.02 rad moves wall 3 m beside the vehicle by 0.06 m, and does not move wall above it. The limit
-        // beside the vehicle is 0.5 m plus three times 0.072 m.
+        // A yaw of 0.02 rad moves wall 3 m beside the vehicle by 0.06 m, and does not move wall above it. So the limit
+        // beside the vehicle is 0.5 m plus three standard deviations of 0.072 m.
         assert!(!fails(0.35, true, [0.0, 0.02], 10.9) && fails(0.365, true, [0.0, 0.02], 10.9));
         assert!(fails(0.265, false, [0.0, 0.02], 10.9));
         for (to_come_m, yaw_rad) in
             [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
         {
-            // A yaw error doesn't move the wall above the vehicle, so a circle of 0.265 m radius suffices there. Beside
-            // the vehicle, the circle would have to be far larger.
+            // A yaw error does not move the wall above the vehicle, so a circle of 0.265 m radius suffices there.
+            // Beside the vehicle, it would have to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
         assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in the circle");

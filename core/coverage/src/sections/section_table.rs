@@ -21,7 +21,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::{Profile, WallPoint};
 use headrace_sampling::Target;
 
-/// Request to judge a section as of a given time.
+/// Request to judge a section, with the outlook at a given time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
     /// Index of the section, from chainage zero.
@@ -32,19 +32,18 @@ pub struct Request {
     pub swept_by_all: Option<Reach>,
     /// Whether no head was alive at this time.
     pub none_alive: bool,
-    /// Stretch where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land if the vehicle does not turn back.
     pub to_come: Option<Reach>,
-    /// Stretch where some heads have not been, and will not be unless the vehicle turns back.
+    /// Stretch where some heads have not been. They will not reach it unless the vehicle turns back.
     pub not_passed: Option<Reach>,
-    /// Stretch where all heads have been; `None` before the end of the dive.
+    /// Stretch where all heads have been, at the end of the dive. `None` before the end.
     pub ended: Option<Ended>,
-    /// Whether to judge only a certain fail: a large empty circle in which no more samples can land.
-    ///
-    /// The circle need not be the section's largest hole.
+    /// Whether the section is judged only if it is certain to fail, because of a large empty circle in which no more
+    /// samples can land. The circle need not be its largest hole.
     pub only_fails: bool,
 }
 
-/// Stretch where all heads have been when the dive ends; `None` if there is none.
+/// Stretch where all heads have been when the dive ends. It contains `None` if there is no such stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ended(pub Option<Reach>);
 
@@ -56,11 +55,11 @@ impl Ended {
     }
 }
 
-/// Initial check positions. Every finite reach is beyond these positions, so the first movement causes a check.
+/// Initial check positions. They are below and above every finite reach, so the first movement causes a check.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Request {
-    /// Returns a function that makes a request to judge a section, with the outlook's time and stretches.
+    /// Returns a function that makes the request to judge a section, with the time and stretches of the outlook.
     pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
         let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
         move |section| Self {
@@ -83,11 +82,11 @@ struct Measured {
     sd_m: f64,
     /// Whether the newest visit alone shows that the section passes.
     by_newest: bool,
-    /// Whether every hole over the target would be filled if the section's doubtful returns were wall.
+    /// Whether the section's doubtful returns, if they were wall, would fill every hole over the target.
     filled_by_doubtful: bool,
 }
 
-/// Inputs of judging, and the callback for changed missed stretches.
+/// Inputs of judging, and a function to call for each missed stretch that changes.
 pub struct Judging<'a> {
     /// Store with all samples.
     pub store: &'a SampleStore,
@@ -106,27 +105,26 @@ pub struct Judging<'a> {
 pub struct Sections {
     pub(super) section_m: f64,
     pub(super) target: Target,
-    /// Distance before the start of a missed stretch at which the vehicle's origin should turn round, m.
+    /// Distance before a missed stretch at which the vehicle's origin should turn round, m.
     run_up_m: f64,
     first: i64,
-    /// Number of judged sections by verdict, in the order of [`Verdict::ALL`].
-    ///
-    /// The last entry counts open sections that were not inspected.
+    /// Number of judged sections by verdict, in the order of [`Verdict::ALL`]. One more entry counts open sections that
+    /// were not inspected.
     judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
     /// Chainages that the ends of the heads' reach must pass before sections are checked again, m.
     ///
-    /// The first chainage is for sections behind the heads, the second for sections ahead.
+    /// The first one is for sections behind the heads, the second one for sections ahead.
     pub(super) next_look_m: [f64; 2],
 }
 
 stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target, run_up_m, first; });
 
 impl Sections {
-    /// Creates sections of `section_m` over [`from_m`, `to_m`].
+    /// Creates sections of the length `section_m` over [`from_m`, `to_m`].
     ///
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory that they will ever use.
     pub fn new(section_m: f64, target: Target, from_m: f64, to_m: f64) -> Self {
         let first = math::floor_to_i64(from_m / section_m);
         let end = -math::floor_to_i64(-to_m / section_m);
@@ -150,9 +148,9 @@ impl Sections {
         Self { run_up_m: reach_m + self.target.max_hole_m, ..self }
     }
 
-    /// Returns the chainage to which the vehicle's origin has to go back, m, rounded to a decimetre.
+    /// Returns the chainage to which the vehicle's origin has to go back, m, rounded down to a decimetre.
     ///
-    /// From this chainage, all heads pass the stretch from its beginning.
+    /// From there, all heads pass the stretch from its beginning.
     pub fn back_to_m(&self, start_m: f64) -> f64 {
         back_to_m(start_m, self.run_up_m)
     }
@@ -199,9 +197,9 @@ impl Sections {
         self.target
     }
 
-    /// Distance from the heads' reach at which the heads count as having left a section, m.
+    /// Distance from the heads' reach beyond which the heads have left a section, m.
     ///
-    /// Samples farther away don't change a pass.
+    /// Samples that are farther away do not change a pass.
     pub fn left_m(&self) -> f64 {
         self.target.max_hole_m / 2.0
     }
@@ -226,7 +224,7 @@ impl Sections {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Records a sample at `x_m`: every section within the target T of the sample is due for judging again.
+    /// Records a sample at `x_m`. Every section within the target T of it must be judged again.
     pub fn touch(&mut self, x_m: f64, visit: &Visit, profile: &Profile) {
         let (from, to) =
             (self.index_of(x_m - self.target.max_hole_m), self.index_of(x_m + self.target.max_hole_m));
@@ -244,7 +242,7 @@ impl Sections {
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
         let section = self.get(request.section)?;
         if section.verdict == Verdict::Pass && section.visits.are_several() && section.doubt().is_none() {
-            // A later visit does not revoke the pass of an earlier visit.
+            // A later visit does not revoke a pass.
             return None;
         }
         let asks = request.only_fails || request.ended.is_some() || section.is_flagged();
@@ -262,7 +260,7 @@ impl Sections {
         let is_like = section.hole.is_some_and(|before| before.is_like(&measured.hole));
         let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
         self.decide(request, &measured, fails, judging)?;
-        // The evidence of an unchanged hole is kept, because the hole's missing samples may no longer be stored.
+        // Evidence is kept while the hole is unchanged, because the missing samples in it may no longer be stored.
         if self.get(request.section)?.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&measured.hole, request, judging);
             let evidence = self.as_beside(request.section, evidence);
@@ -276,8 +274,8 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Updates a section's hole and verdict. `fails` means that the section is certain to fail, whatever its largest
-    /// hole.
+    /// Updates a section's hole and verdict. `fails` means that the section is certain to fail, even if its largest
+    /// hole does not show it.
     fn decide(
         &mut self,
         request: &Request,
@@ -304,13 +302,13 @@ impl Sections {
             section.verdict = Verdict::Pass;
             section.keep_newest_visit();
         }
-        // More samples do not change a pass. Samples outside a hole's radius do not change the hole.
+        // More samples do not change a pass, and samples outside a hole's radius do not change the hole.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         let alone = verdict(&hole, sd_m, target, clear_m);
         section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
         if section.not_inspected {
-            // The largest hole extends to wall where some heads have not been. Another hole may still make
-            // the section fail.
+            // The largest hole extends to wall where some heads have not been. Even so, the section may fail because of
+            // another hole.
             let radius_m = f64::midpoint(target.max_hole_m, target.error_m(sd_m));
             section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
@@ -320,20 +318,20 @@ impl Sections {
             }
         }
         let section = self.get_mut(request.section)?;
-        // The dive has ended, so no more samples will come.
+        // At the end of the dive, no more samples will come.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if request.ended.is_some() && section.verdict == Verdict::Open && section.is_flagged() {
-            // The section failed, and the dive ended while the vehicle went back over it.
+            // The section had failed. The dive ended while the vehicle was going back over it.
             (section.verdict, section.not_inspected) = (Verdict::Fail, false);
         }
         Some(())
     }
 
-    /// Returns the evidence of a section.
+    /// Returns the evidence of a section, with known causes if possible.
     ///
-    /// If the section's cause is unknown, the causes of a flagged neighbour replace it. The edge of a missed stretch
-    /// thus has the causes of the stretch.
+    /// If the section's cause is unknown, it gets the causes of a flagged neighbour. So the edge of a missed stretch
+    /// has the causes of the stretch.
     fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {
         if evidence.cause != Cause::Unknown {
             return evidence;
@@ -345,7 +343,7 @@ impl Sections {
         }
     }
 
-    /// Returns the index of the verdict count in which a judged section is counted.
+    /// Returns the index in `judged` under which a section is counted; `None` if it has not been judged.
     fn counted(section: &Section) -> Option<usize> {
         section.hole?;
         Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
@@ -353,7 +351,7 @@ impl Sections {
 
     /// Measures the hole that decides a section's verdict.
     ///
-    /// The samples of all visits count, unless the newest visit alone shows that the section passes.
+    /// The samples of all visits count, unless those of the newest visit alone show that the section passes.
     fn measure(&self, index: i64, judging: &mut Judging<'_>) -> Option<Measured> {
         let Judging { store, finder, profile, .. } = judging;
         let ((from_m, to_m), pass_error) = (self.bounds_m(index), self.pass_error(index));
@@ -378,14 +376,14 @@ impl Sections {
         }
         let least_m = self.target.max_hole_m + self.target.error_m(sd_m);
         let first_visit = section.visits.first();
-        // The doubtful returns in an unchanged hole still count, even if their places are no longer stored.
+        // If the hole is unchanged, its doubtful returns still count, even if they are no longer stored.
         let is_known = section.filled_by_doubtful && section.hole.is_some_and(|before| before.is_like(&hole));
         let filled_by_doubtful = hole.least_m > least_m
             && (is_known || is_filled_by_doubtful(judging, (from_m, to_m), least_m / 2.0, first_visit));
         Some(Measured { hole, sd_m, by_newest: false, filled_by_doubtful })
     }
 
-    /// Moves a judged section from its previous slot in the verdict counts to its present slot.
+    /// Moves a judged section from its previous entry in `judged` to its present one.
     fn count(&mut self, before: Option<usize>, now: Option<usize>) {
         if let Some(count) = before.and_then(|before| self.judged.get_mut(before)) {
             *count -= 1;
@@ -395,8 +393,8 @@ impl Sections {
         }
     }
 
-    /// Returns the length of each verdict within the coverage extent, m. The sum is the total length of the extent's
-    /// sections.
+    /// Returns the length of each verdict within the coverage extent, m. Together they are as long as all sections of
+    /// the extent.
     pub fn metres(&self, way: Option<Reach>) -> Metres {
         let mut metres = Metres::default();
         let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
@@ -416,10 +414,9 @@ impl Sections {
         metres
     }
 
-    /// Returns the error of a section's passes.
+    /// Returns the error between the passes through a section.
     ///
-    /// If no head pinged in the section, the result is the largest error of the sections that are at most half the
-    /// target away.
+    /// If no head pinged in the section, it is the largest error of the sections that are at most half the target away.
     pub(super) fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
@@ -433,7 +430,7 @@ impl Sections {
         })
     }
 
-    /// Adds a flagged section to its missed stretch, or removes a section whose flag was cleared.
+    /// Adds a flagged section to its missed stretch, or removes a section whose flag has been cleared.
     fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
         let Self { sections, runs, first, target, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
@@ -451,8 +448,8 @@ impl Sections {
         runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// Determines the causes of a section's hole from the heads' passages through all sections within the target T of
-    /// the section.
+    /// Determines the causes of a section's hole. They follow from the heads' passages through all sections within the
+    /// target T of it.
     ///
     /// If the heads have left only a part of the section, the largest hole in this part counts.
     fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
@@ -495,8 +492,8 @@ impl Sections {
 
     /// Returns the evidence for one cause of a missed stretch.
     ///
-    /// If the section with the largest hole has the cause, the evidence is from this section. Otherwise it is from the
-    /// last section along the tunnel that has the cause.
+    /// It is that of the section with the largest hole, if this section has the cause. Otherwise it is that of the last
+    /// section along the tunnel which has the cause.
     pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
         let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
         evidence(run.worst.0).or_else(|| (run.from..run.to).rev().find_map(evidence))
@@ -511,7 +508,7 @@ impl Sections {
 }
 
 impl Sections {
-    /// Returns an unsure section as a stretch; `None` if the section isn't unsure.
+    /// Returns an unsure section as a stretch; `None` if the section is not unsure.
     pub fn unsure(&self, index: i64) -> Option<Stretch> {
         let section = self.get(index)?;
         let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
@@ -520,7 +517,7 @@ impl Sections {
         Some(Stretch::one(section.unsure()?, index, [hole_m, error_m, section.hole_sd_m], driven))
     }
 
-    /// Returns the unsure stretches within a part of the tunnel such as the coverage extent, in order.
+    /// Returns the unsure stretches within `way`, for instance the coverage extent, in order.
     ///
     /// Allocates: the list. Called only at the end of a dive.
     pub fn unsure_stretches(&self, way: Option<Reach>) -> Vec<Stretch> {
@@ -534,7 +531,7 @@ impl Sections {
     }
 }
 
-/// Whether doubtful returns, taken as wall, leave no empty circle of `radius_m` centred between two chainages.
+/// Whether doubtful returns, if they were wall, leave no empty circle of `radius_m` centred between the chainages.
 fn is_filled_by_doubtful(
     judging: &mut Judging<'_>,
     (from_m, to_m): (f64, f64),
@@ -554,15 +551,15 @@ fn is_filled_by_doubtful(
     !finder.has_circle_otherwise((from_m, to_m), radius_m, &WallChanges::NOTHING)
 }
 
-/// Verdict on a hole whose centre is at the distance `clear_m` from the stretch where samples may still land.
+/// Verdict on a hole. Its centre is at the distance `clear_m` from the stretch where samples may still land.
 ///
 /// D is the hole's diameter, `sd_m` (sd) its standard deviation, T the target and k the confidence.
-/// - `pass` if D + k sd <= T: more samples won't enlarge D.
-/// - `fail` if D - k sd > T for any final D: samples come no nearer to the centre than `clear_m`. A hole without
-///   samples around it fails, too.
+/// - `pass` if D + k sd <= T. More samples do not enlarge D.
+/// - `fail` if D - k sd > T for any final D, as samples come no nearer to the centre than `clear_m`.
+/// - `fail` also for a hole without samples around it, once no more can come.
 /// - `open` otherwise while D may change, and `cannot_say` afterwards.
 ///
-/// A verdict holds for both the lower and the upper bound of D.
+/// A verdict must hold for both the lower and the upper bound of D.
 pub(crate) fn verdict(hole: &Hole, sd_m: f64, target: Target, clear_m: f64) -> Verdict {
     let (target_m, error_m) = (target.max_hole_m, target.error_m(sd_m));
     debug_assert!(hole.is_consistent(), "bounds enclose the diameter: {hole:?}");

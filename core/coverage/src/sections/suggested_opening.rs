@@ -1,4 +1,4 @@
-//! Openings of the wall that the vehicle file doesn't declare, such as side tunnels.
+//! Openings of the wall that the vehicle file does not declare, such as side tunnels.
 
 use super::section_table::Sections;
 use crate::cause::Cause;
@@ -9,20 +9,20 @@ use crate::section::{Section, Verdict};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// Least edge of a suggested opening as a multiple of the target T. Smaller patches can have lost their returns by
+/// Least edge of a suggested opening as a multiple of the target T. A smaller patch may have lost its returns by
 /// chance.
 const LEAST_TARGETS: f64 = 2.0;
-/// Largest edge of a suggested opening as a multiple of the equivalent radius: an opening is no wider than the tunnel.
+/// Largest edge of a suggested opening as a multiple of the equivalent radius. An opening is no wider than the tunnel.
 const MOST_RADII: f64 = 2.0;
-/// Largest share of lost pings, as a multiple of the patch's share of the perimeter. If more pings are lost, the wall
-/// around the patch loses returns, too, and a low gain is the likelier reason.
+/// Largest share of lost pings, as a multiple of the patch's share of the perimeter. If the share is larger, the wall
+/// around the patch loses returns too, so a low gain is more likely.
 const MOST_LOST: f64 = 2.0;
 
 impl Sections {
-    /// Returns the opening that explains the lost returns of a missed stretch; `None` if the losses have another cause.
+    /// Returns the opening that explains the lost returns of a missed stretch; `None` if they have another cause.
     ///
-    /// The opening is the patch of wall that the stretch's empty circles cover. Every ping at the patch was lost, but
-    /// few pings elsewhere were.
+    /// It is the patch of wall that the stretch's empty circles cover. Every ping at the patch was lost, but only a few
+    /// pings elsewhere were.
     ///
     /// Allocates: the opening's name. Called only at the end of a dive.
     pub fn suggested_opening(&self, run: &Run, profile: &Profile) -> Option<Opening> {
@@ -57,7 +57,7 @@ fn hole_of_lost(section: &Section) -> Option<Hole> {
     section.hole.filter(|hole| hole.bounded && is_lost && section.verdict == Verdict::Fail)
 }
 
-/// A patch of wall: chainages, and distances around the wall from the centre of the largest hole, m.
+/// A patch of wall. It spans chainages, and distances around the wall from the centre of the largest hole, m.
 struct Patch {
     x_m: [f64; 2],
     across_m: [f64; 2],

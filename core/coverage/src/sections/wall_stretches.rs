@@ -1,12 +1,12 @@
-//! Stretches whose wall is farther from the design than roughness explains.
+//! Stretches of wall that are farther from the design than roughness explains.
 
 use super::section_table::Sections;
 use crate::deviation::Deviation;
 use crate::frontier::Reach;
 use headrace_geometry::math;
 
-/// Least mean deviation of a stretch as a share of the equivalent radius. A tunnel that is 5 % wider than its design,
-/// with its floor at the design's height, deviates by 4.5 %.
+/// Least mean deviation of a stretch as a share of the equivalent radius. It is below 4.5 %, the deviation of a tunnel
+/// that is 5 % wider than its design, with its floor at the design's height.
 const LEAST_SHARE: f64 = 0.04;
 
 /// A stretch of wall whose mean deviation from the design is at least 4 % of the equivalent radius.
@@ -24,7 +24,7 @@ pub struct WallStretch {
     pub outmost_m: f64,
 }
 
-/// Sections that deviate to the same side and are near each other, with the sections between them.
+/// Sections that deviate to the same side and are near each other, together with the sections between them.
 struct Candidate {
     from: i64,
     to: i64,
@@ -38,7 +38,7 @@ impl Candidate {
 
     /// Returns the stretch if it is at least as long as the target, and if its mean deviation is at least `least_m`.
     ///
-    /// The mean deviation includes the sections between the deviating sections.
+    /// The mean includes the sections between those that deviate.
     fn stretch(&self, sections: &Sections, least_m: f64) -> Option<WallStretch> {
         let length_m = (self.to - self.from) as f64 * sections.section_m();
         let (mean_m, [inmost_m, outmost_m]) = self
@@ -52,7 +52,7 @@ impl Candidate {
 }
 
 impl Sections {
-    /// Returns the stretches whose wall is off the design, within a part of the tunnel such as the coverage extent.
+    /// Returns the stretches of wall that are off the design, within `extent`, for instance the coverage extent.
     ///
     /// A stretch is at least as long as the target T. Sections at most T apart form one stretch, because a single turn
     /// of a slow head is spread over several sections.
@@ -90,8 +90,8 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sampling::Target;
 
-    /// Returns start, end and mean deviation of each stretch, m, in a circular tunnel of 3 m radius. Each section of
-    /// 0.25 m has the given deviation. The limit is a mean deviation of 0.12 m.
+    /// Returns start, end and mean deviation of each stretch, m, in a circular tunnel of 3 m radius. `off_m` are the
+    /// deviations of its sections of 0.25 m. The limit is a mean deviation of 0.12 m.
     fn stretches(target_m: f64, off_m: &[f64]) -> Vec<[f64; 3]> {
         let profile = shapes::circle(3.0).unwrap();
         let mut sections = Sections::new(0.25, Target::new(target_m), 0.0, 10.0);
@@ -130,8 +130,8 @@ mod tests {
         assert_near(&stretches(0.5, &[0.0, 0.4, 0.4]), &[[0.25, 0.75, 0.4]]);
     }
 
-    /// A slow head sees only a part of the wall in each section. The stretch has the mean deviation of all these parts.
-    /// The stretch begins and ends with a section that deviates.
+    /// A slow head sees only a part of the wall in each section. The mean deviation of the stretch is that of all these
+    /// parts. The first and the last section of the stretch deviate.
     #[test]
     fn sections_of_one_slow_turn_form_a_stretch_if_their_mean_deviates() {
         let ditch = [0.0, 0.6, 0.0, 0.0, 0.6, 0.0, 0.0, 0.6, 0.0];

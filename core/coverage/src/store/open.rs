@@ -9,7 +9,7 @@ use super::packed::Packed;
 use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
 
-/// List link: index of a node plus one, or zero for none.
+/// List link: index of a node plus one. Zero means none.
 type Link = u32;
 
 /// A sample in the common pool of the open bricks.
@@ -19,7 +19,7 @@ pub(super) struct Node {
     pub x_m: f64,
     /// Arc length of the sample, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without a step.
+    /// Single step from the previous sample, along the tunnel and along the perimeter, m. Zero without a step.
     pub step_m: [f64; 2],
     /// Number of the visit that measured the sample.
     pub visit: u32,
@@ -28,14 +28,14 @@ pub(super) struct Node {
 }
 
 impl Node {
-    /// Sample in this node of a linked list.
+    /// Returns the sample in this node of a linked list.
     pub(super) fn sample(&self) -> Packed {
         let Self { x_m, arc_m, step_m, visit, .. } = *self;
         Packed { x_m, arc_m, step_m, visit }
     }
 }
 
-/// A cell of an open brick, which is a stretch of wall whose samples are unpacked.
+/// A cell of an open brick. A brick is a stretch of wall; if it is open, its samples are unpacked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CellAt {
     /// Index of the slot that holds the cell's brick.
@@ -60,21 +60,20 @@ struct Chain {
     last: Link,
 }
 
-/// A fixed number of open bricks (stretches of wall near the vehicle), with a common pool of unpacked
-/// samples.
+/// A fixed number of open bricks, which are stretches of wall near the vehicle. Their unpacked samples share one pool.
 #[derive(Debug, Clone)]
 pub(super) struct OpenBricks {
     rows: usize,
     columns: usize,
     cells: Vec<Cell>,
-    /// Bitmask of the rows that have samples, for each column of a slot.
+    /// For each column of a slot, bitmask of the rows that have samples.
     rows_seen: Vec<u32>,
     chains: Vec<[Chain; MAX_HEADS]>,
     /// Number of the brick in each slot; `None` for an empty slot.
     bricks: Vec<Option<u32>>,
     nodes: Vec<Node>,
     most_nodes: usize,
-    /// Free list of pool nodes, linked like the list of a cell.
+    /// Free list of pool nodes. It is linked in the same way as the list of a cell.
     free: Link,
     used: usize,
 }
@@ -82,7 +81,7 @@ pub(super) struct OpenBricks {
 stateful!(OpenBricks { state: free, used; lists: nodes; slots: cells, rows_seen, chains, bricks; fixed: rows, columns, most_nodes; });
 
 impl OpenBricks {
-    /// Creates the pool for the samples of up to `slots` open bricks; none is open yet. Allocates: at startup only.
+    /// Creates the pool for the samples of up to `slots` open bricks. None is open yet. Allocates: at startup only.
     pub(super) fn new(slots: usize, (rows, columns): (usize, usize), most_nodes: usize) -> Self {
         Self {
             rows,
@@ -98,17 +97,17 @@ impl OpenBricks {
         }
     }
 
-    /// Number of samples for which the pool has room.
+    /// Number of samples for which the pool still has room.
     pub(super) fn room(&self) -> usize {
         self.most_nodes - self.used
     }
 
-    /// Number of samples in the open bricks (stretches of wall whose samples are unpacked).
+    /// Number of samples in the open bricks.
     pub(super) fn used(&self) -> usize {
         self.used
     }
 
-    /// Number of bytes that have been used so far.
+    /// Number of bytes that have ever been used.
     pub(super) fn touched_bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>() + self.cells.len() * size_of::<Cell>()
     }
@@ -137,7 +136,7 @@ impl OpenBricks {
         self.bricks.get(slot) == Some(&Some(brick))
     }
 
-    /// Adds a sample of a head to a cell of a slot; returns false if there is no room.
+    /// Adds a sample of a head to a cell of a slot. Returns false if there is no room.
     pub(super) fn add(&mut self, at: CellAt, head: usize, sample: &Packed) -> bool {
         let Packed { x_m, arc_m, step_m, visit } = *sample;
         let index = self.index(at);
@@ -183,7 +182,7 @@ impl OpenBricks {
         (at.slot * self.rows + at.row) * self.columns + at.column
     }
 
-    /// Returns the bitmask of the rows that have samples in this column of a slot.
+    /// Returns the bitmask of the rows that have samples in a column of a slot.
     pub(super) fn rows_seen(&self, slot: usize, column: usize) -> u32 {
         self.rows_seen.get(slot * self.columns + column).copied().unwrap_or(0)
     }
@@ -193,13 +192,13 @@ impl OpenBricks {
         self.cells.get(self.index(at)).map_or(0, |list| list.count)
     }
 
-    /// Returns the samples of a cell of a slot, latest first.
+    /// Returns the samples of a cell of a slot. The latest comes first.
     pub(super) fn in_cell(&self, at: CellAt) -> impl Iterator<Item = &Node> {
         let latest = self.cells.get(self.index(at)).map_or(0, |list| list.latest);
         self.list(latest, |node| node.next_in_cell)
     }
 
-    /// Returns the samples of a head in a slot, earliest first.
+    /// Returns the samples of a head in a slot. The earliest comes first.
     pub(super) fn of_head(&self, slot: usize, head: usize) -> impl Iterator<Item = &Node> {
         let chain = self.chains.get(slot).and_then(|chains| chains.get(head));
         self.list(chain.map_or(0, |chain| chain.first), |node| node.next_of_head)

@@ -1,9 +1,9 @@
-//! Packed samples away from the vehicle; most of them take four bytes each.
+//! Packed samples away from the vehicle. Most of them take four bytes each.
 //!
 //! The samples of a brick lie in a chain of blocks, head by head in order of arrival. Most samples take one word: the
-//! difference from the previous sample, in quanta of 2^-17 m. Quanta are counted from chainage and arc length zero of
-//! the brick. All samples thus share one lattice, on which a step ends exactly where the next step begins. If an
-//! unpacked sample is packed again, it does not move again.
+//! difference from the previous sample, in quanta of 2^-17 m. Quanta are aligned to chainage zero and arc length zero.
+//! So all samples are on one lattice, on which a step ends exactly where the next step begins. A sample that is
+//! unpacked and packed again does not move again.
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -13,14 +13,14 @@ use headrace_sampling::head::MAX_HEADS;
 const QUANTA_PER_M: f64 = 131_072.0;
 /// Maximum displacement of a sample by packing, m.
 ///
-/// The displacement is up to half a quantum along the tunnel. Along the perimeter it is up to one quantum, because the
-/// perimeter's last quantum is partial.
+/// Along the tunnel, it is up to half a quantum. Along the perimeter, it is up to one quantum, because the perimeter's
+/// last quantum is incomplete.
 pub(super) const MOVED_M: f64 = 8.6e-6;
-/// Number of sample words per block; one more word links to the next block.
+/// Number of words for samples per block. One more word links to the next block.
 pub(super) const ROOM: usize = 31;
-/// Maximum number of words per sample.
+/// Maximum number of words that a sample takes.
 pub(super) const MOST_WORDS: usize = 7;
-/// Lower half of an escape word. No difference between samples is stored with this value.
+/// Lower half of an escape word. No difference between samples has this value.
 const ESCAPE: u16 = 0x8000;
 const PLACE: u16 = 0;
 const STEPPED: u16 = 1;
@@ -29,7 +29,7 @@ const VISIT: u16 = u16::MAX;
 /// Tag that switches to another head: `HEAD` plus the head's number.
 const HEAD: u16 = 2;
 
-/// Lattice point in quanta: along the tunnel from the start of the brick, and along the perimeter.
+/// Lattice point. Its quanta are counted along the tunnel from the start of the brick, and along the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Spot {
     x: i64,
@@ -51,7 +51,7 @@ pub(super) struct Packed {
     pub x_m: f64,
     /// Arc length of the sample, m.
     pub arc_m: f64,
-    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without a step.
+    /// Single step from the previous sample, along the tunnel and along the perimeter, m. Zero without a step.
     pub step_m: [f64; 2],
     /// Number of the visit that measured the sample.
     pub visit: u32,
@@ -59,7 +59,7 @@ pub(super) struct Packed {
 
 impl Lattice {
     pub(super) fn new(from_m: f64, perimeter_m: f64) -> Self {
-        // This is the last quantum whose centre is below the perimeter.
+        // The last quantum must have its centre below the perimeter.
         let last_arc = math::floor_to_i64(perimeter_m * QUANTA_PER_M - 0.5 - 1e-6).max(0);
         Self { origin: math::floor_to_i64(from_m * QUANTA_PER_M), perimeter_m, last_arc }
     }
@@ -77,9 +77,9 @@ impl Lattice {
     }
 }
 
-/// Returns the difference word for a sample close to the previous sample.
+/// Returns the word for a sample that stores its difference from the previous sample.
 ///
-/// `None` if the sample is too far away.
+/// `None` if the samples are too far apart.
 fn difference(from: Spot, to: Spot, stepped: bool) -> Option<u32> {
     let along = i16::try_from(to.x - from.x).ok().filter(|along| (-0x4000..0x4000).contains(along))?;
     let around = i16::try_from(to.arc - from.arc).ok().filter(|around| *around != i16::MIN)?;
@@ -96,7 +96,7 @@ fn escape(tag: u16) -> u32 {
 pub(super) struct Arena {
     blocks: Vec<[u32; ROOM + 1]>,
     most: usize,
-    /// First free block: index of the block plus one, or zero.
+    /// First free block: its index plus one. Zero means none.
     free: u32,
     used: usize,
 }
@@ -138,7 +138,7 @@ impl Arena {
         (self.most - self.used) * ROOM
     }
 
-    /// Number of bytes that have been used so far.
+    /// Number of bytes that have ever been used.
     pub(super) fn touched_bytes(&self) -> usize {
         self.blocks.len() * size_of::<[u32; ROOM + 1]>()
     }
@@ -167,7 +167,7 @@ impl Arena {
         self.blocks.get_mut(link.checked_sub(1)? as usize)
     }
 
-    /// Frees a chain of blocks of a brick.
+    /// Frees the chain of blocks that begins with `first`.
     pub(super) fn release(&mut self, first: u32) {
         let mut link = first;
         let free = self.free;
@@ -207,13 +207,13 @@ impl<'a> Writer<'a> {
         Self { arena, lattice, first: 0, block: 0, at: ROOM, before: None, visit: 0 }
     }
 
-    /// Switches to another head's samples; `None` if there is no room.
+    /// Switches to another head's samples. `None` if there is no room.
     pub(super) fn head(&mut self, head: usize) -> Option<()> {
         self.before = None;
         self.word(escape(HEAD + u16::try_from(head).ok()?))
     }
 
-    /// Writes a sample; `None` if there is no room.
+    /// Writes a sample. `None` if there is no room.
     pub(super) fn sample(&mut self, sample: Packed) -> Option<()> {
         if sample.visit != self.visit {
             self.visit = sample.visit;
@@ -224,7 +224,7 @@ impl<'a> Writer<'a> {
         let [along_m, around_m] = sample.step_m;
         let stepped = along_m.abs() + around_m.abs() > 0.0;
         let start_m = (sample.x_m - along_m, math::wrap(sample.arc_m - around_m, self.lattice.perimeter_m));
-        // True if the step began at the head's previous sample, except for rounding.
+        // Whether the step began at the head's previous sample, apart from rounding.
         let follows = |before: &Packed| {
             (before.x_m - start_m.0).abs() < 1e-9 && (before.arc_m - start_m.1).abs() < 1e-9
         };
@@ -263,7 +263,7 @@ impl<'a> Writer<'a> {
         Some(())
     }
 
-    /// First block of the written brick.
+    /// Returns the first block of the written brick.
     pub(super) fn finish(self) -> u32 {
         self.first
     }

@@ -1,4 +1,4 @@
-//! The nearest pass: the closest place where a head crosses an arc length.
+//! The nearest pass: the place nearest to a point where a head crosses the point's arc length.
 
 use core::ops::Range;
 
@@ -11,15 +11,15 @@ use headrace_geometry::tunnel::WallPoint;
 #[derive(Debug, Clone, Copy)]
 struct Place {
     x_m: f64,
-    /// Arc length of the query point in [0, perimeter), m.
+    /// Arc length of the point in [0, perimeter), m.
     arc_m: f64,
     perimeter_m: f64,
 }
 
 impl Place {
-    /// Returns the distance in chainage to the place where a sample's step crosses the arc length, m.
+    /// Returns how far away in chainage a sample's step crosses the arc length of this point, m.
     ///
-    /// `None` if the step does not cross the arc length.
+    /// `None` if the step does not cross it.
     fn to_crossing_m(self, end: &Node) -> Option<f64> {
         let [along_m, around_m] = end.step_m;
         let mut to_end = end.arc_m - self.arc_m;
@@ -29,7 +29,7 @@ impl Place {
             to_end += self.perimeter_m;
         }
         let to_start = to_end - around_m;
-        // The start point of a step belongs to the previous step.
+        // A step that only starts at the arc length does not count, because the previous step ends there and counts.
         let crosses = (to_start < 0.0 && to_end >= 0.0) || (to_start > 0.0 && to_end <= 0.0);
         crosses.then(|| (end.x_m - along_m * (to_end / around_m) - self.x_m).abs())
     }
@@ -37,21 +37,21 @@ impl Place {
 
 /// State of a pass search on one side of the query point.
 ///
-/// `brick` is the brick (a group of rows of cells) that the search has reached.
+/// `brick` is the number of the brick that the search has reached. A brick is a group of rows of cells.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,
     slot: usize,
-    /// Bitmask of the brick's rows that may have a pass.
+    /// Bitmask of the brick's rows in which a pass may be.
     rows: u32,
 }
 
 impl SampleStore {
     /// Returns the distance in chainage to the nearest pass over a point's arc length within `within_m`, m.
     ///
-    /// A pass is a single step of a head from one sample to the next. The chainage of the pass at this arc length is
-    /// interpolated. If a packed brick had to be opened, the distance is accurate to some micrometres.
-    /// Source: docs/reference/glossary.md, "Spacing and holes", T_x.
+    /// A pass is a single step of a head from one sample to the next. Its chainage at this arc length is interpolated.
+    /// If a packed brick has to be opened, the distance is accurate to some micrometres. Source:
+    /// docs/reference/glossary.md, "Spacing and holes", T_x.
     ///
     /// Allocates: never.
     pub fn nearest_pass_m(&mut self, of: WallPoint, within_m: f64) -> Option<f64> {
@@ -61,7 +61,7 @@ impl SampleStore {
         let centre = math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m);
         let into_row = (x_m - self.layout.from_m) - centre as f64 * self.layout.cell_m;
         let inner = into_row.min(self.layout.cell_m - into_row).max(0.0);
-        // The end of a step is at most one step length away from the place where the step crosses the arc length.
+        // The end of a step is at most one step length away from its crossing with the arc length.
         let [along_m, around_m] = self.longest_step_m;
         let left = math::floor_to_i64((place.arc_m - around_m) / self.column_m);
         let right = math::floor_to_i64((place.arc_m + around_m) / self.column_m);
@@ -98,7 +98,7 @@ impl SampleStore {
         best
     }
 
-    /// Opens a brick and finds the rows that have samples in a range of columns.
+    /// Opens a brick and finds its rows that have samples in a range of columns.
     fn side(&mut self, brick: u32, columns: &Range<i64>) -> Side {
         let Some(slot) = self.opened(brick, false) else {
             return Side { brick: Some(brick), slot: 0, rows: 0 };
@@ -107,7 +107,7 @@ impl SampleStore {
         Side { brick: Some(brick), slot, rows: columns.clone().map(seen).fold(0, |all, rows| all | rows) }
     }
 
-    /// Wraps a column that may lie beyond the seam.
+    /// Wraps the number of a column that may lie beyond the seam of the unrolled wall.
     fn wrapped(&self, column: i64) -> i64 {
         if (0..self.columns).contains(&column) { column } else { column.rem_euclid(self.columns) }
     }

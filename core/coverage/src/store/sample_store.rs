@@ -1,4 +1,4 @@
-//! The store: insertion, queries, and opening and packing of bricks.
+//! The store of samples: insertion, queries, and opening and packing of bricks.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,17 +10,17 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::WallPoint;
 use headrace_sampling::head::MAX_HEADS;
 
-/// Number of bricks (stretches of wall) that are open at a time, which means that their samples are unpacked.
+/// Number of bricks that are open at a time. A brick is a stretch of wall; if it is open, its samples are unpacked.
 ///
-/// Each brick is at least a metre long, so the open bricks extend beyond any search radius on either side.
+/// A brick is at least a metre long, so the open bricks extend beyond any search radius on either side.
 const OPEN_BRICKS: usize = 64;
 /// Minimum length of a brick, a stretch of wall whose samples are packed together, m.
 const BRICK_M: f64 = 1.0;
-/// Maximum number of rows per brick, because an open brick has a bit for each row in a `u32`.
+/// Maximum number of rows per brick. An open brick has a bit for each row in a `u32`.
 const MOST_ROWS: usize = 32;
 /// Maximum number of samples in all open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;
-/// Overhead words per brick: unused words in the last block, and words that switch heads.
+/// Words per brick that hold no sample: unused words of the last block, and words that switch heads.
 const WORDS_PER_BRICK: usize = 48;
 
 /// A sample on the unrolled wall.
@@ -36,7 +36,7 @@ pub struct WallSample {
     ///
     /// `None` unless the two samples are one step apart in one sweep.
     pub step_m: Option<[f64; 2]>,
-    /// Number of the visit that measured the sample, from zero. The number never decreases.
+    /// Number of the visit that measured the sample, from zero. Later samples never have a lower number.
     pub visit: u32,
 }
 
@@ -49,14 +49,14 @@ pub struct StoreLayout {
     pub from_m: f64,
     /// Last chainage of the store, m.
     pub to_m: f64,
-    /// Nominal edge of a cell, m. Half the target is a good value for the searches.
+    /// Nominal edge of a cell, m. Half the target makes the searches fast.
     pub cell_m: f64,
     /// Minimum capacity of the store in samples.
     pub capacity: u32,
 }
 
 impl StoreLayout {
-    /// Returns the cell edge, m, that is best for searches for holes about as large as the target.
+    /// Returns the best cell edge for finding holes about as large as the target, m.
     pub fn cell_for_target_m(target_m: f64) -> f64 {
         (target_m / 2.0).clamp(0.05, 0.5)
     }
@@ -67,14 +67,14 @@ impl StoreLayout {
 pub enum Kept {
     /// The sample was stored.
     Stored,
-    /// The sample was dropped, because its cell is full and a nearby sample represents it.
+    /// The sample was dropped, because its cell is full and a stored sample nearby represents it.
     Thinned,
 }
 
 /// Reason why a sample was not stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
-    /// The sample's chainage is outside the store's extent, or its coordinates aren't finite.
+    /// The sample's chainage is outside the store's extent, or its coordinates are not finite.
     #[error("storing a sample: it lies outside the stretch of tunnel that the store covers")]
     Outside,
     /// The store is full.
@@ -82,7 +82,7 @@ pub enum StoreError {
     Full,
 }
 
-/// Limits of the difference between the samples that a stretch stores and the samples that were inserted there.
+/// Largest differences between the samples that were inserted into a stretch and those stored for it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fidelity {
     /// Maximum distance of a dropped sample from the nearest stored sample, m.
@@ -98,22 +98,22 @@ pub struct StoreUse {
     pub kept: u64,
     /// Number of samples dropped by thinning.
     pub thinned: u64,
-    /// Number of bytes that have been used so far, which the OS has mapped.
+    /// Number of bytes that have ever been used, and so have been mapped by the OS.
     pub bytes: usize,
 }
 
 /// A brick: a group of rows of cells.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Brick {
-    /// Link to the brick's first block of packed samples, or zero.
+    /// Link to the brick's first block of packed samples. Zero means none.
     first_block: u32,
     /// Number of samples in the brick.
     count: u32,
-    /// Slot plus one if the brick is open (unpacked), or zero.
+    /// Slot of the brick plus one if it is open (unpacked). Zero otherwise.
     slot: u16,
     /// Coarsest thinning tier applied to the brick.
     tier: u8,
-    /// Whether the brick has been packed before, which may have moved its samples.
+    /// Whether the brick has ever been packed, which may have moved its samples.
     moved: bool,
 }
 
@@ -123,14 +123,14 @@ impl Brick {
     }
 }
 
-/// Store of samples in bricks; see the module's description.
+/// Store of samples in bricks; see the description of the module `store`.
 #[derive(Debug, Clone)]
 pub struct SampleStore {
     pub(super) layout: StoreLayout,
     pub(super) rows: i64,
     pub(super) columns: i64,
     pub(super) column_m: f64,
-    /// Number of rows of a brick, as a power of two.
+    /// Binary logarithm of the number of rows in a brick.
     rows_shift: u32,
     bricks: Vec<Brick>,
     pub(super) open: OpenBricks,
@@ -146,7 +146,7 @@ stateful!(SampleStore { state: open, arena, longest_step_m, kept, thinned; slots
 impl SampleStore {
     /// Creates an empty store.
     ///
-    /// Allocates: at startup, all that it will ever use.
+    /// Allocates: at startup, all memory that it will ever use.
     pub fn new(layout: StoreLayout) -> Self {
         let rows = math::floor_to_i64((layout.to_m - layout.from_m) / layout.cell_m).max(0) + 1;
         let columns = math::floor_to_i64(layout.perimeter_m / layout.cell_m).max(1);
@@ -156,7 +156,7 @@ impl SampleStore {
         let bricks = to_usize(rows).div_ceil(rows_per_brick);
         let capacity = layout.capacity as usize;
         let open_samples = OPEN_SAMPLES.min(capacity);
-        // Nearly all packed samples take one word. The open samples are budgeted at the maximum number of words.
+        // Nearly all packed samples take one word. But for the open samples, the maximum number of words is reserved.
         let words = capacity
             + capacity / 8
             + MOST_WORDS * (open_samples + 1)
@@ -178,7 +178,7 @@ impl SampleStore {
 
     /// Frees all samples and their memory.
     ///
-    /// Nothing can be stored afterwards. The number of thinned samples remains available.
+    /// Afterwards, nothing can be stored. The number of thinned samples is kept.
     pub fn release(&mut self) {
         let layout = StoreLayout { to_m: self.layout.from_m, capacity: 0, ..self.layout };
         *self = Self { thinned: self.thinned, ..Self::new(layout) };
@@ -211,10 +211,9 @@ impl SampleStore {
         }
     }
 
-    /// Stores a sample, unless its cell is full and holds a nearby sample.
+    /// Stores a sample, unless its cell is full and contains a nearby sample.
     ///
-    /// Errors: the sample lies outside the store's extent, or the store is full.
-    /// Allocates: never.
+    /// Errors: the sample lies outside the store's extent, or the store is full. Allocates: never.
     pub fn insert(&mut self, sample: WallSample) -> Result<Kept, StoreError> {
         let row = self.row(sample.x_m).filter(|_| sample.arc_m.is_finite()).ok_or(StoreError::Outside)?;
         let arc_m = math::wrap(sample.arc_m, self.layout.perimeter_m);
@@ -234,7 +233,7 @@ impl SampleStore {
             }
             return Ok(Kept::Thinned);
         }
-        // All open samples must fit into the arena when packed.
+        // When all open samples are packed, they must fit into the arena.
         if self.arena.free_words() < MOST_WORDS * (self.open.used() + 1) + WORDS_PER_BRICK * OPEN_BRICKS {
             return Err(StoreError::Full);
         }
@@ -267,7 +266,7 @@ impl SampleStore {
 
     /// Calls `take` with the place and visit number of all samples between two chainages, m.
     ///
-    /// Some samples beyond the two chainages may be included.
+    /// It may also be called for some samples beyond them.
     ///
     /// Allocates: never.
     pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(WallPoint, u32)) {
@@ -315,7 +314,7 @@ impl SampleStore {
     }
 
     fn bricks_between(&self, from_m: f64, to_m: f64) -> core::ops::RangeInclusive<u32> {
-        // Packing may have moved a sample near the edge of a brick across this edge.
+        // A sample near the edge of a brick may have been moved across this edge by packing.
         self.brick_of(self.row_near(from_m - packed::MOVED_M))
             ..=self.brick_of(self.row_near(to_m + packed::MOVED_M))
     }
@@ -336,7 +335,7 @@ impl SampleStore {
 
     /// Returns the slot of a brick.
     ///
-    /// The function opens the brick if it is packed, or if it is empty and `wanted` is true.
+    /// Opens the brick if it is packed, or if it is empty and `wanted` is true.
     pub(super) fn opened(&mut self, number: u32, wanted: bool) -> Option<usize> {
         let brick = *self.bricks.get(number as usize)?;
         if brick.slot > 0 || (brick.count == 0 && !wanted) {
@@ -388,7 +387,7 @@ impl SampleStore {
         );
     }
 
-    /// Packs the bricks farthest from `number` until there is room for `samples`.
+    /// Packs the open bricks farthest from `number` until there is room for `samples` more samples.
     fn make_room(&mut self, number: u32, samples: usize) {
         while self.open.room() < samples && self.pack_farthest_from(number).is_some() {}
     }

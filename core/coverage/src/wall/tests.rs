@@ -1,4 +1,4 @@
-//! Heads in a round tunnel whose wall has an arbitrary shape, and the classification of their returns.
+//! Classification of the returns of heads in a round tunnel. Its wall may have any shape.
 
 use super::*;
 use headrace_geometry::math::{self, TAU};
@@ -19,7 +19,7 @@ struct Turning {
 struct Count {
     wall: usize,
     doubtful: usize,
-    /// Sonar returns at wall that another head has found, too.
+    /// Number of returns from wall that another head has found too.
     confirming: usize,
     named: Vec<Distrust>,
 }
@@ -37,8 +37,8 @@ impl Turning {
 
     /// Simulates some turns of the heads.
     ///
-    /// `heard` returns the range from the centre that a head measures, for head, chainage, angle, and the numbers of
-    /// turn and step; `None` without a return.
+    /// `heard` returns the range from the centre that a head measures; `None` without a return. Its arguments are head,
+    /// chainage, angle, and the numbers of turn and step.
     fn turn(&mut self, turns: u32, heard: impl Fn(usize, f64, f64, [u32; 2]) -> Option<f64>) -> Vec<Count> {
         let radius_m = self.limits.radius_m;
         let mut counts = vec![Count::default(); self.heads.len()];
@@ -81,7 +81,7 @@ impl Turning {
     }
 }
 
-/// Pseudo-random number from -1 to 1, determined by its inputs.
+/// Pseudo-random number from -1 to 1 that depends only on the inputs.
 fn noise(a: u32, b: u32) -> f64 {
     let mixed = (u64::from(a) << 32 | u64::from(b)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -93,18 +93,16 @@ fn smooth_rough_and_wide_walls_are_accepted_in_tunnels_of_any_size() {
     for radius_m in [0.3, 1.0, 6.0] {
         Turning::new(radius_m, 1).all_wall(10, |_, _| radius_m);
         Turning::new(radius_m, 1).all_wall(10, |_, _| 1.06 * radius_m);
-        // The test wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one
-        // lobe along it.
+        // The wall has overbreak of a quarter of the radius, with three lobes around the tunnel and one along it.
         Turning::new(radius_m, 2)
             .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
-        // The vehicle measures such ranges if it is beside the centre while its estimated position is in the
-        // centre.
+        // A vehicle beside the centre measures such ranges while its estimated position is in the centre.
         Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
     }
 }
 
-/// Objects are at least three steps wide. At their edges the range jumps from one return to the next. Returns of the
-/// first pass may be doubtful, because one pass can't tell a boulder from a large fish.
+/// Objects are at least three steps wide. At their edges, the range jumps from one return to the next. Returns of the
+/// first pass may be doubtful, because one pass cannot distinguish a boulder from a large fish.
 #[test]
 fn boulders_and_niches_are_wall_once_a_second_pass_has_met_them() {
     for (inward_m, half_width) in [(1.5, 0.1), (-2.0, 0.15), (3.0, 0.3)] {
@@ -118,9 +116,9 @@ fn boulders_and_niches_are_wall_once_a_second_pass_has_met_them() {
     }
 }
 
-/// In one turn only, a cloud of bubbles gives five successive returns that agree and are far from the wall.
+/// A cloud of bubbles gives five successive returns that agree and are far from the wall, but only in one turn.
 ///
-/// A pole at the same place is met again in later turns, and is wall from the fourth turn on at the latest.
+/// A pole at the same place is met again in later turns. It is wall from the fourth turn on at the latest.
 #[test]
 fn object_is_doubtful_in_its_first_turn_but_wall_if_met_again() {
     let near = |angle: f64| (angle - 3.0).abs() < 2.6 * TAU / f64::from(STEPS);
@@ -136,7 +134,7 @@ fn object_is_doubtful_in_its_first_turn_but_wall_if_met_again() {
         let count = &Turning::new(radius_m, 1).turn(9, pole)[0];
         assert!((5..=15).contains(&count.doubtful), "{radius_m}: {count:?}");
         assert_eq!(count.wall + count.doubtful, 9 * STEPS as usize, "{radius_m}");
-        // An echo off two walls gives three successive returns, in one turn only.
+        // An echo off two walls gives three successive returns, but only in one turn.
         let echo = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
             Some(if turn == 2 && (angle - 3.0).abs() < 1.6 * TAU / f64::from(STEPS) {
                 1.9 * radius_m
@@ -230,7 +228,7 @@ fn outvoted_head_is_distrusted_until_it_agrees_with_the_other_heads() {
         }
         let counts = turning.turn(6, frozen);
         assert_eq!((counts[wrong].wall, counts[wrong].doubtful), (0, 6 * STEPS as usize));
-        // The test's chainage begins at zero again, as if the vehicle had gone back to its start.
+        // The simulated chainage begins at zero again, as if the vehicle had gone back to its start.
         turning.turn(4, |_, _, _, _| Some(1.0));
         let counts = turning.turn(4, |_, _, _, _| Some(1.0));
         assert_eq!(counts[wrong].doubtful, 0, "the head is trusted again");
@@ -250,7 +248,7 @@ fn constant_range_counts_as_wall_only_in_the_centre_of_a_pipe() {
         let mut names = 0;
         for step in 0..5 * STEPS {
             let angle = TAU * f64::from(step % STEPS) / f64::from(STEPS);
-            // With the head `out_m` left of the centre, a constant range of 0.95 m makes a circle about the head.
+            // The head is `out_m` left of the centre. Its constant range of 0.95 m makes a circle about it.
             let (sine, cosine) = math::sin_cos(angle);
             let (y, z) = (out_m + 0.95 * sine, -0.95 * cosine);
             let design_m = -out_m * sine + math::sqrt(1.0 - out_m * out_m * cosine * cosine);
@@ -268,8 +266,8 @@ fn constant_range_counts_as_wall_only_in_the_centre_of_a_pipe() {
     }
 }
 
-/// Heads that are frozen at one range in the centre of a pipe seem to find the same wall, 22 % outside the design. At a
-/// true wall of this size, the vehicle is beside the centre, and the ranges vary with the direction.
+/// Heads that are frozen at one range in the centre of a pipe seem to find the same wall, 22 % outside the design. But
+/// at a true wall of this size, the vehicle is beside the centre, so the ranges vary with the direction.
 #[test]
 fn frozen_heads_never_confirm_wall_but_heads_at_a_true_wall_do() {
     let confirming_share = |beside_m: f64, noise_m: f64| {
@@ -288,7 +286,7 @@ fn frozen_heads_never_confirm_wall_but_heads_at_a_true_wall_do() {
     assert!(seen.iter().all(|share| *share > 0.9), "{seen:?}");
 }
 
-/// Off the centre, a constant range agrees with the wall for a part of each turn.
+/// A constant range off the centre agrees with the wall for a part of each turn.
 #[test]
 fn stuck_head_is_distrusted_until_its_range_varies() {
     for (radius_m, out_m) in [(1.0, 0.3), (6.0, 1.0)] {
@@ -301,7 +299,7 @@ fn stuck_head_is_distrusted_until_its_range_varies() {
             let (sine, cosine) = math::sin_cos(angle);
             let design_m = -out_m * sine + math::sqrt(radius_m * radius_m - out_m * out_m * cosine * cosine);
             let sticks = (2 * STEPS..2 * STEPS + STEPS / 2).contains(&step);
-            // The range is correct at the moment when the head gets stuck.
+            // When the head gets stuck, its range is still correct.
             let range_m = if sticks { *stuck_m.get_or_insert(design_m) } else { design_m };
             let (y, z) = (out_m + range_m * sine, -range_m * cosine);
             let placed = PlacedReturn {
@@ -319,7 +317,7 @@ fn stuck_head_is_distrusted_until_its_range_varies() {
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
-        // All wall samples since the head got stuck are withdrawn. Earlier samples are kept.
+        // All wall samples since the head got stuck are withdrawn. Those before it are kept.
         let begun_m = 0.001 * f64::from(2 * STEPS);
         assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
         assert!(

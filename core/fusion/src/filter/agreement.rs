@@ -12,7 +12,8 @@ use headrace_sensor::device::SensorKind;
 const MEMORY: u32 = 40;
 /// Minimum share of measurements within the gate. Below it, the measured quantity counts as lost and is reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// If a quantity is lost, the square of its constant below is added to its variance. Units: m, m/s, radians, a ratio.
+/// If a quantity is lost, the square of one of these standard deviations is added to its variance. Units: m, m/s,
+/// radians, a ratio.
 ///
 /// `LOST_M` and `LOST_MPS` apply to position and velocity across the tunnel. `LOST_WAY_M` and `LOST_WAY_MPS` apply to
 /// position and velocity along the tunnel. The other constants apply to the attitude and to the scale of ranges.
@@ -53,7 +54,7 @@ impl Memory {
         self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
     }
 
-    /// Whether the estimate is wrong, because too few measurements passed the gate. If true, restarts the average.
+    /// Whether the estimate is wrong, because too few measurements passed the gate. If so, the average restarts.
     fn is_lost(&mut self) -> bool {
         let is_lost = self.seen == MEMORY && self.agreeing < LEAST_AGREEING;
         if is_lost {
@@ -96,8 +97,8 @@ impl Agreement {
     }
 }
 
-/// Increases the variances of chainage, speed and tilt when the chainage is lost. The increase of the chainage's
-/// variance may be large, because no model is linearised about the chainage.
+/// Increases the variances of chainage, speed and tilt when the chainage is lost. The chainage's variance may increase
+/// by (100 m)^2, because no model is linearised about the chainage.
 pub fn seek_way(variances: &mut Errors) {
     add(variances, POSITION..POSITION + 1, LOST_WAY_M);
     add(variances, VELOCITY..VELOCITY + 1, LOST_WAY_MPS);

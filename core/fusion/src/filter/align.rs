@@ -38,17 +38,17 @@ const CHAINAGE_UNTOLD_SD_M: f64 = 10.0;
 const YAW_UNTOLD_SD_RAD: f64 = 0.2;
 const VELOCITY_SD_MPS: f64 = 0.5;
 const TILT_SD_RAD: f64 = 0.05;
-/// Initial standard deviation of the cable's local scale error, a ratio; practically zero.
+/// Initial standard deviation of the cable's local scale error, a ratio. It is practically zero.
 ///
-/// Only a velocity log could distinguish a scale error from a speed error. With a larger value, the smallest persistent
-/// speed error would be taken for a scale error, and would become metres of chainage error.
+/// Only a velocity log could distinguish a scale error from a speed error. With a larger value, the filter would take
+/// the smallest persistent speed error for a scale error, and the chainage would become wrong by metres.
 const SCALE_SD: f64 = 1e-6;
 
 /// Readings collected during the alignment.
 #[derive(Debug, Clone)]
 pub struct Listening {
     since: Option<MonoNs>,
-    /// Chainage of the previous estimate, which was lost, and the standard deviation of that chainage, m.
+    /// Chainage of the previous estimate, which was lost, and its standard deviation, m.
     before: Option<(f64, f64)>,
     hears_wall: bool,
     attitude: Option<Rot<Tunnel, Body>>,
@@ -134,18 +134,19 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // The estimate was lost in a silence of the sensors. Other sensors may also have begun to send again only
-            // now, so the alignment restarts at this echo.
+            // All sensors were silent, so the earlier estimate was lost. Other sensors may begin to send again only at
+            // this echo, so the alignment restarts here.
             self.since = Some(at);
         }
     }
 
-    /// Creates an alignment after an estimate was lost; `before` is the lost chainage and its standard deviation, m.
+    /// Creates an alignment after an estimate was lost. `before` is that estimate's chainage and its standard
+    /// deviation, m.
     pub fn after(before: Option<(f64, f64)>) -> Self {
         Self { before, ..Self::default() }
     }
 
-    /// Returns the chainage of the previous, lost estimate and the standard deviation of that chainage, m.
+    /// Returns the chainage of the previous estimate, which was lost, and its standard deviation, m.
     pub fn before(&self) -> Option<(f64, f64)> {
         self.before
     }
@@ -195,9 +196,9 @@ impl Listening {
 
     /// Builds the initial covariance.
     ///
-    /// Chainage and yaw errors are correlated with the errors of cable and compass. So repeated readings of cable and
-    /// compass do not reduce the uncertainty of chainage and yaw below these errors. The slack error is correlated with
-    /// the error of the slack rate.
+    /// The chainage error is correlated with the cable's errors, and the yaw error with the compass's. So repeated
+    /// readings of cable and compass do not reduce the uncertainty of chainage and yaw below these errors. The slack
+    /// error is correlated with the error of the slack rate.
     fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
         let uncounted_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
@@ -288,10 +289,10 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sensor::reading::{Level, TetherLength};
 
-    /// Repeated readings of cable and compass have the same errors, so they do not make the estimate more certain.
+    /// The errors of cable and compass are the same in every reading, so repeated readings do not make the estimate
+    /// more certain.
     ///
-    /// The chainage stays as uncertain as slack and scale errors make it, and the yaw as uncertain as the compass
-    /// deviation makes it.
+    /// Slack and scale errors limit the certainty of the chainage. The compass deviation limits that of the yaw.
     #[test]
     fn repeated_readings_do_not_reduce_systematic_errors_of_cable_and_compass() {
         let context = Context {

@@ -1,4 +1,4 @@
-//! Drift of inertial biases in excess of the declared drift, learnt from corrections of the biases.
+//! Drift of inertial biases that exceeds the declared drift. It is learnt from corrections of the biases.
 //!
 //! A measurement corrects a bias by its gain times the innovation. The expected square of this correction is the gain
 //! squared times the innovation's variance. If the squared corrections are larger than expected, the bias drifts more
@@ -11,11 +11,11 @@ use headrace_geometry::math;
 
 /// Averaging time of the ratio of squared corrections to expected squares, s.
 const MEMORY_S: f64 = 10.0;
-/// The process noise is raised if the mean ratio of squared to expected corrections is above this. Each second, the
-/// noise is then multiplied by this mean ratio to the power `RAISES_PER_S`.
+/// Mean ratio of squared corrections to expected squares above which the process noise is raised. Each second, the
+/// noise is then multiplied by this ratio to the power `RAISES_PER_S`.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// A raised process noise decays if the mean ratio is below this. `FALLS_OVER_S` is the time constant of the decay, s.
+/// Mean ratio below which a raised process noise decays. `FALLS_OVER_S` is the time constant of the decay, s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
 /// Initial noise factor: biases of an inertial unit are assumed to drift fast until its readings show otherwise.
@@ -31,7 +31,7 @@ pub struct BiasDrift([Ratio; 2]);
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Ratio {
-    /// Decaying sums: `corrected` of the squared corrections, `expected` of their expected squares.
+    /// Decaying sums: `corrected` of the squared corrections, `expected` of the squares that the filter expects.
     corrected: f64,
     expected: f64,
     factor: f64,
@@ -51,10 +51,10 @@ fn most(wander: GaussMarkov, worst: f64) -> f64 {
 }
 
 impl BiasDrift {
-    /// Records the correction of the biases by a measurement.
+    /// Records how a measurement has corrected the biases.
     ///
-    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the innovation's variance, and the
-    /// normalised squared innovation.
+    /// `covariances` are those of gyro and accelerometer biases with the innovation. `variance` is the innovation's
+    /// variance, and `nis` the normalised squared innovation.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
             // The expected square is (c / s)^2 s, summed over the axes. c is the covariance of a bias with the

@@ -1,9 +1,9 @@
 //! Decides whether cable counter and estimate agree.
 //!
 //! A counter may stick, slip or run free, and an estimate may drift. During a disagreement, either of them may be
-//! wrong. The counter's readings are withheld, and the inertial unit alone carries the chainage. The uncertainty of the
-//! chainage equals the difference between counter and estimate. Derivation: `docs/why/navigation.md`, "When cable and
-//! estimate disagree".
+//! wrong. So the counter's readings are withheld, and the inertial unit alone carries the chainage. The difference
+//! between counter and estimate serves as the uncertainty of the chainage. Derivation: `docs/why/navigation.md`, "When
+//! cable and estimate disagree".
 
 use serde::{Deserialize, Serialize};
 
@@ -17,14 +17,14 @@ const RECENT_S: f64 = 1.0;
 /// Mean innovation at which counter and estimate disagree, in units of the sd that the mean would have for white
 /// innovations.
 ///
-/// With any limit from 3 to 6, about the same number of seeded dives has an unreported error. With a limit of 4, a
+/// Any limit from 3 to 6 leaves about the same number of seeded dives with an unreported error. With a limit of 4,
 /// slack of seven times the declared size makes a sound counter disagree.
 const DISPUTED_SDS: f64 = 5.0;
 /// Each innovation is clipped at this many standard deviations.
 const MOST_SDS: f64 = 6.0;
-/// A mean innovation beyond `DISPUTED_SDS` starts a disagreement only if the latest innovation is larger than this, m.
+/// Minimum size of the latest innovation, m. With a smaller one, a mean beyond `DISPUTED_SDS` starts no disagreement.
 const LEAST_M: f64 = 0.01;
-/// If slack has kept the count changing, a count that then stays the same for this time means a stuck counter.
+/// Time without a change of the count that shows a stuck counter, if slack has kept the count changing before.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
 /// Counts that differ by less than this are equal, m.
 const SAME_COUNT_M: f64 = 1e-6;
@@ -32,35 +32,36 @@ const SAME_COUNT_M: f64 = 1e-6;
 /// estimate for `RETURNED_AFTER`.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// A reading that agrees with the estimate proves that the counter has lost no length, but only if the innovation's sd
-/// is at most this, m.
+/// Maximum sd of an innovation, m, at which agreement with the estimate proves that the counter has lost no length.
 const SURE_M: f64 = 0.3;
-/// The counter has caught up with the vehicle if it differs from the estimate by at most `MISSING_SHARE` of the
-/// distance travelled since the disagreement began, plus `MISSING_M`.
+/// Largest remaining difference between a counter that has caught up and the estimate: `MISSING_SHARE` of the distance
+/// travelled since the disagreement began, plus `MISSING_M`.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// The counter follows the vehicle if their distances differ by at most `SAME_SHARE` of the distance, plus `SAME_M`.
+/// The counter follows the vehicle if the distances by counter and by estimate differ by at most `SAME_SHARE` of the
+/// distance, plus `SAME_M`.
 ///
-/// The agreement must last for the time `RUNS_FOR` and the distance `RUNS_M`.
+/// They must agree for at least the time `RUNS_FOR` and the distance `RUNS_M`.
 const SAME_SHARE: f64 = 0.1;
 const SAME_M: f64 = 0.01;
 /// Share of the distance that is added to `SAME_SHARE` while the estimated distance is uncertain.
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// The estimate is given up if it differs from the counter by more than this, m. The difference is the root sum square
-/// of the innovation and the innovation's sd.
+/// Difference from the counter beyond which the estimate is given up, m. The difference is the root sum square of the
+/// innovation and its sd.
 ///
-/// The counter must also have counted `ALIVE_M` since the limit was exceeded, which shows that its wheel turns.
+/// Since exceeding this limit, the counter must also have counted `ALIVE_M`, which shows that its wheel turns.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
 /// A disagreement of the cable counter with the estimate or the velocity log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableDoubt {
-    /// Time since which the counter's readings are outside the range that the estimate predicts.
+    /// Time since which the counter disagrees with the estimate or the velocity log.
     pub since: MonoNs,
-    /// Chainage that the estimate predicted when the disagreement began, m.
+    /// Chainage at which the disagreement began, m: as the estimate predicted it, or as the counter showed it if a
+    /// comparison of distances found the disagreement.
     pub from_m: f64,
     /// Largest difference so far between the counter and the estimate or velocity log, m.
     pub differs_m: f64,
@@ -81,7 +82,7 @@ pub struct CableReading {
     pub sd_m: f64,
     /// Whether the reading is within the gate.
     pub agrees: bool,
-    /// Whether the count differs from the motion by the inertial unit by no more than usual.
+    /// Whether counter and inertial unit differ in their motion by no more than usual.
     pub is_usual: bool,
     /// Whether varying cable slack keeps the count changing by several steps.
     pub is_lively: bool,
@@ -93,18 +94,18 @@ impl CableReading {
     }
 }
 
-/// Decision about the use of a cable reading.
+/// Decision on how to use a cable reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Use {
     /// Fuse the cable reading.
     Fuse,
     /// Ignore the cable reading.
     Withhold,
-    /// Counter and estimate disagree: ignore readings from now on, and revert the counter's last corrections.
+    /// Counter and estimate disagree. Ignore readings from now on, and revert the counter's last corrections.
     ///
-    /// The values are the corrections of chainage and speed to revert, m and m/s.
+    /// The values are the corrections to revert: chainage, m, and speed, m/s.
     Dispute([f64; 2]),
-    /// The counter runs correctly again. The value is the difference that remains: shown minus expected chainage, m.
+    /// The counter runs correctly again. The value is the chainage that it shows minus the expected chainage, m.
     Slipped(f64),
     /// Give up the estimate and restart from the running counter, which may be wrong by this length, m.
     Seek(f64),
@@ -136,8 +137,8 @@ struct Dispute {
     agreeing_from: Option<MonoNs>,
     /// Counter reading when the difference from the estimate first exceeded `LOST_M`, m.
     lost_from_m: Option<f64>,
-    /// Since the first withheld reading: `longest_m` is the longest distance, by counter or estimate. `most_m` is the
-    /// largest difference between the two, m.
+    /// `longest_m` is the longest distance since the first withheld reading, by counter or by estimate, m. `most_m` is
+    /// the largest difference between counter and estimate since then, m.
     longest_m: f64,
     most_m: f64,
 }
@@ -150,7 +151,7 @@ impl Cable {
         has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), differs_m, log: None })
     }
 
-    /// Difference between the chainages by counter and by estimate, m; 0 while both agree and the count changes.
+    /// Difference between the chainages by counter and by estimate, m. It is 0 while both agree and the count changes.
     pub fn differs_m(&self) -> f64 {
         let disagrees = self.dispute.is_some() || self.left.is_some();
         let off_m = self.last.filter(|_| disagrees).map_or(0.0, |last| last.off_m);
@@ -175,7 +176,7 @@ impl Cable {
         self.corrections.pass(dt_s, is_same);
         let off_sds = (reading.off_m / reading.sd_m).clamp(-MOST_SDS, MOST_SDS);
         self.mean_sds = left * self.mean_sds + (1.0 - left) * off_sds;
-        // The limit is a multiple of the standard deviation that this running mean has for white innovations.
+        // The limit is `DISPUTED_SDS` times the standard deviation that this running mean has for white innovations.
         let is_apart = self.mean_sds.abs() > DISPUTED_SDS * math::sqrt((1.0 - left) / (1.0 + left));
         if let Some(first) = self.goes_wrong(reading, is_apart) {
             self.dispute = Some(Dispute::between(first, reading));
@@ -184,7 +185,7 @@ impl Cable {
         if reading.agrees { Use::Fuse } else { Use::Withhold }
     }
 
-    /// Returns the first of the readings that show a disagreement between counter and estimate.
+    /// Returns the reading with which a disagreement between counter and estimate began.
     ///
     /// `None` if counter and estimate agree.
     fn goes_wrong(&mut self, reading: &CableReading, is_apart: bool) -> Option<CableReading> {

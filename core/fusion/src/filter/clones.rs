@@ -1,8 +1,8 @@
 //! Relative error covariance between two epochs, by stochastic cloning.
 //!
-//! The relative error is the error of the displacement between the epochs. The relative error matters because coverage
-//! compares two head passes. It is smaller than the error of either position. A sample stays where it was
-//! georeferenced, so its error is that of the estimate at the time of its ping.
+//! The relative error is the error of the displacement between the epochs. Coverage needs it, because it compares two
+//! head passes. It is smaller than the error of either position. A sample stays where it was georeferenced, so its
+//! error is that of the estimate at the time of its ping.
 //!
 //! Each clone keeps the error covariance at its time, and the transition of errors since the previous clone. The
 //! transition includes propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative uncertainty".
@@ -20,9 +20,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Number of clones kept. Together, these clones cover over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// The chainage counts as suddenly more certain if its variance falls below this share of its earlier variance.
+/// The chainage has suddenly become more certain if its variance falls below this share of its earlier variance.
 ///
-/// This happens, for instance, when the cable counter sends again after a silence.
+/// For instance, this happens when the cable counter sends again after a silence.
 const SURE_SHARE: f64 = 0.1;
 /// Errors that move a sample along the tunnel: chainage, pitch and yaw.
 pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
@@ -135,8 +135,8 @@ impl ErrorClones {
             let clone = self.back(back)?;
             let age_s = newest.at.since(clone.at).as_secs_f64();
             if age_s >= wanted_s {
-                // Soundings from before the chainage suddenly became more certain are all as uncertain as the older
-                // clone.
+                // The chainage has suddenly become more certain since this older clone. All soundings from before are
+                // as uncertain as this clone.
                 if clone.is_unsure_beside(newer_m2) {
                     return Some(clone.relative);
                 }
@@ -150,10 +150,10 @@ impl ErrorClones {
         (kept > 1).then(|| newer.weighted(wanted_s / newer_s, &newer, 0.0))
     }
 
-    /// Computes the covariance of each older clone relative to the newest one.
+    /// Computes the covariance of each older clone relative to the newest clone.
     ///
-    /// The method goes back through the clones. At each clone, the method updates the matrix that maps the clone's
-    /// errors to those of the newest clone.
+    /// It goes back through the clones. At each clone, it updates the matrix that maps the errors of this clone to
+    /// those of the newest clone.
     fn compare(&mut self) {
         let Some(now) = self.newest().copied() else {
             debug_assert!(false, "there is a clone to compare with: {} so far", self.count);
@@ -222,7 +222,7 @@ mod tests {
 
     /// Soundings placed while the cable counter is silent stay uncertain.
     ///
-    /// In the last 2 s before the counter sends again, soundings do not become gradually more certain.
+    /// Those placed in the last 2 s before the counter sends again are as uncertain as the earlier ones.
     #[test]
     fn soundings_placed_while_the_cable_counter_is_silent_stay_uncertain() {
         let mut clones = ErrorClones::default();

@@ -21,7 +21,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// Returns the part of the context that the detection of wrong settings needs.
+    /// Returns the design, the site and the settings, from which wrong settings are detected.
     pub(super) fn design(&self) -> Design<'_> {
         let Self { profile, site, settings, unit_at } = self;
         Design { profile, site, settings, unit_at: *unit_at }

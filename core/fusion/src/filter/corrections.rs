@@ -12,7 +12,7 @@ use headrace_geometry::math;
 
 /// Time constant with which the correction sums decay while the cable count changes, s.
 ///
-/// Corrections are summed up for a while, because a counter fails some time before the failure is noticed.
+/// Recent corrections are kept for a while, because a counter fails some time before the failure is noticed.
 const RECENT_S: f64 = 1.0;
 /// Minimum time after which an unchanged count means a stop of the vehicle, s. Shorter pauses may come from slow
 /// motion and coarse steps.
@@ -22,17 +22,17 @@ const STANDS_S: f64 = 2.0;
 /// The wheel is assumed to be stuck in one of ten cases of a stationary count, so the variance of the lost length is a
 /// tenth of the squared corrections.
 const STUCK_SHARE: f64 = 0.3;
-/// A sum of corrections counts as chance if it is at most this many of its predicted standard deviations.
+/// Corrections count as chance if their sum is at most this many of its predicted standard deviations.
 ///
-/// With a limit of 0, stops of the vehicle make positions uncertain: 24 % of all epochs of the seeded dives are
-/// `cannot_say`, and 19 % with 0.5. With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives, and in 6
-/// dives with 0.5.
+/// With a limit of 0, stops of the vehicle make positions uncertain, so 24 % of all epochs of the seeded dives are
+/// `cannot_say`; with 0.5, 19 %. With a limit of 1, stuck wheels cause unreported errors in 9 of 800 dives; with 0.5,
+/// in 6.
 const CHANCE_SDS: f64 = 0.5;
 /// Time constant with which a possibly lost length fades from the relative error between head passes, s. It is about
 /// one turn of a head.
 ///
-/// After the count stops changing, corrections are added up only for this time. Later corrections of a hovering vehicle
-/// say nothing about the wheel.
+/// Corrections are added up only for this time after the count stops changing. Later corrections say nothing about the
+/// wheel, because they come from a hovering vehicle.
 const PASSES_S: f64 = 20.0;
 
 /// Corrections by the cable counter, and the length that the counter has lost if its wheel has stuck.
@@ -40,15 +40,15 @@ const PASSES_S: f64 = 20.0;
 pub struct CounterCorrections {
     /// Sums of the corrections of chainage and speed in the last second, m and m/s.
     recent: [f64; 2],
-    /// Sums of the corrections since shortly before the count stopped changing, m and m/s. The chainage sum includes
-    /// the integral of the speed sum.
+    /// Sums of the corrections since shortly before the cable count stopped changing, m and m/s. The chainage sum
+    /// includes the integral of the speed sum.
     sums: [f64; 2],
-    /// Standard deviations of the correction sums that the filter's covariance predicts, m and m/s.
+    /// Standard deviations of the sums of corrections, as predicted by the filter's covariance, m and m/s.
     by_chance: [f64; 2],
     /// Time for which the cable count has not changed, s.
     stood_s: f64,
-    /// Standard deviations of the length lost if the wheel has stuck, m: `lacks_m` since the count became stationary,
-    /// `lost_m` between two head passes.
+    /// Standard deviations of the length that a stuck wheel may have lost, m: `lacks_m` since the count became
+    /// stationary, `lost_m` between two head passes.
     lacks_m: f64,
     lost_m: f64,
     /// Variance of the length that the counter may have lost permanently since the last call of `take_slipped_m2`,
@@ -59,8 +59,8 @@ pub struct CounterCorrections {
 impl CounterCorrections {
     /// Records how a fused cable reading changed the estimate.
     ///
-    /// Inputs: the corrections of chainage and speed, m and m/s, and the reductions of their variances, m^2 and
-    /// m^2/s^2.
+    /// `by` are the corrections of chainage and speed, m and m/s. `variances` are the reductions of their variances,
+    /// m^2 and m^2/s^2.
     pub fn note(&mut self, by: [f64; 2], variances: [f64; 2]) {
         for sums in [&mut self.recent, &mut self.sums] {
             for (sum, by) in sums.iter_mut().zip(by) {
@@ -171,8 +171,8 @@ mod tests {
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
     }
 
-    /// The possibly lost length is the difference between the estimates with and without the counter. So a correction
-    /// of the speed adds the corrected speed times the time since then.
+    /// The length that a stuck wheel may have lost is the difference between the estimates with and without the
+    /// counter. So a correction of the speed adds this speed times the time since then.
     #[test]
     fn speed_corrections_increase_the_length_that_a_stuck_counter_may_have_lost() {
         let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));

@@ -23,16 +23,15 @@ pub struct CountStep {
     last_m: Option<f64>,
     /// Time of the last change of the count.
     changed: MonoNs,
-    /// `smallest` and `largest` change of the count in the present block, and the greatest common divisor of all
+    /// Smallest and largest change of the count in the present block, and the greatest common divisor of all its
     /// changes.
     smallest: u64,
     largest: u64,
     common: u64,
-    /// `changes` is the number of readings that differ from the previous reading, and `stands` the number of readings
-    /// equal to it.
+    /// `changes` counts the readings that differ from the reading before, and `stands` those that are equal to it.
     changes: u32,
     stands: u32,
-    /// Steps found in the last two blocks that showed a step, in units of the stated step.
+    /// Steps found in the last two blocks that showed a step, in units of the stated step. 0 means none yet.
     blocks: [u64; 2],
 }
 
@@ -83,9 +82,9 @@ impl CountStep {
 
     /// Returns how many readings share the rounding error of the present reading.
     ///
-    /// `period` is the time between two readings, and `way_m` the counter's movement in this time, m. All readings
-    /// since the last change of the count share a rounding error. Readings also share it if the movement between them
-    /// is a whole number of steps.
+    /// All readings since the last change of the count share a rounding error. Readings also share it if the counter
+    /// moves a whole number of steps between them. `period` is the time between two readings, and `way_m` the counter's
+    /// movement in this time, m.
     pub fn looks_at_an_error(&self, at: MonoNs, period: DurNs, way_m: f64, step_m: f64) -> f64 {
         let stood = at.since(self.changed).as_secs_f64() / period.as_secs_f64();
         let steps = way_m / step_m;
@@ -187,7 +186,7 @@ mod tests {
         }
     }
 
-    /// Before the first movement, a common step is assumed. After it, the smallest change so far is assumed.
+    /// A common step is assumed before the first movement, and then the smallest change so far.
     #[test]
     fn counter_step_is_guessed_before_the_first_block_of_readings() {
         let mut step = CountStep::default();

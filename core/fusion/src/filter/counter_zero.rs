@@ -1,14 +1,15 @@
 //! Decides whether the cable counter still counts from its first zero.
 //!
 //! A count that restarts from zero gives no position. The counter may have been plugged in again or replaced, or the
-//! log may jump back to an earlier time of a dive. The chainage is kept only if the counter alone was silent and the
-//! other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter begins again from zero".
+//! log may have jumped back to an earlier time of the dive. The chainage is kept only if the counter alone was silent,
+//! so that the other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter begins again
+//! from zero".
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::TetherLength;
 use serde::{Deserialize, Serialize};
 
-/// Record that shows whether the cable counter still counts from its first zero.
+/// Detector of a cable counter that no longer counts from its first zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CounterZero {
     /// Number of the counter's last restart.
@@ -23,7 +24,7 @@ pub struct CounterZero {
 }
 
 impl CounterZero {
-    /// Whether the counter's zero, and with it the chainage, is unknown.
+    /// Whether the counter has lost its zero, so that its count shows no chainage.
     pub fn is_lost(&self) -> bool {
         self.is_lost
     }

@@ -5,8 +5,8 @@
 //! has settled on a wrong speed. The inertial unit is not compared here, because it measures only changes of speed;
 //! `slack_level.rs` compares it with the counter.
 //!
-//! Over a time window of W seconds, a difference in m counts if it exceeds the following limit. In it, n is the
-//! variance of the counter, m^2, and v the noise of the velocity log, m/s:
+//! Distances over a time window of W seconds differ significantly if they differ by more than the following limit in m.
+//! n is the variance of a counter reading, m^2, and v the noise of the velocity log, m/s:
 //!
 //! ```text
 //! 2 max(0.15 m, 3 slack_sd) + 5 sqrt(2 n + (scale distance)^2 + v^2 0.25 s W)
@@ -29,18 +29,18 @@ const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
 /// `EVERY` is the time between two rows of distances. `ROOM` rows suffice for the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// At most `READINGS` readings of a source are kept, at least `NEAR` apart.
+/// Number of readings kept per source, and least time between two of them.
 ///
-/// Together, these readings cover more than the filter's longest window at any reading rate.
+/// Together, these readings cover more than the longest delay of the filter's estimate, at any reading rate.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
-/// Duration of silence after which a source is no longer compared. It is this long because a velocity log may send a
-/// reading only every two seconds.
+/// Duration of silence after which a source is no longer compared. A velocity log may send only every two seconds, so
+/// it must be longer.
 const SILENT: DurNs = DurNs(3_000_000_000);
 /// Time by which the comparison lags behind the present, because some readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
-/// Maximum difference between two distances, in standard deviations. A larger difference counts once it has lasted for
-/// `LASTS`.
+/// Maximum difference between two distances, in standard deviations. A larger difference causes a doubt once it has
+/// lasted for `LASTS`.
 const MOST_SDS: f64 = 5.0;
 const LASTS: DurNs = DurNs(1_000_000_000);
 /// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, plus the error of its mounting angle.
@@ -56,8 +56,8 @@ const ESTIMATE: usize = 2;
 /// Recent distances by each source, and the doubt about the cable counter if the distances differ.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceComparison {
-    /// Recent values by source, m: `cable` holds chainages by the counter, `log` distances by the velocity log,
-    /// `estimate` chainages by the estimate.
+    /// Recent values, m: `cable` holds chainages by the counter, `log` distances by the velocity log, and `estimate`
+    /// chainages by the filter.
     cable: Vec<(MonoNs, [f64; 1])>,
     log: Vec<(MonoNs, [f64; 1])>,
     estimate: Vec<(MonoNs, [f64; 1])>,
@@ -67,8 +67,8 @@ pub(super) struct DistanceComparison {
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
     /// Rows of the distances by each source at one time, m; NaN for a missing distance.
     rows: Vec<(MonoNs, [f64; 3])>,
-    /// Times since which the distance by cable has differed: first from the distance by velocity log, second from that
-    /// by the estimate.
+    /// Times since which the distance by cable has differed from the distance by velocity log, and from that by the
+    /// estimate.
     since: [Option<MonoNs>; 2],
     doubt: Option<CableDoubt>,
     /// Value of [`super::eskf::Eskf::ties`] at the last comparison.
@@ -166,8 +166,8 @@ impl DistanceComparison {
         self.judge(at, settings);
     }
 
-    /// Updates the times since which the distance by cable has differed from those by log and estimate. Also updates
-    /// the doubt, which states the largest of the differences that have lasted.
+    /// Updates the times since which the distance by cable has differed from those by log and estimate. Then updates
+    /// the doubt, which states the largest difference that has lasted for `LASTS`.
     fn judge(&mut self, at: MonoNs, settings: &Settings) {
         let mut doubt: Option<CableDoubt> = None;
         for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
@@ -219,8 +219,8 @@ impl DistanceComparison {
 
     /// Returns the difference between the distances by the cable and by another source in a time window, m.
     ///
-    /// If the sources were not both available for the whole window, a shorter time is compared. `None` if a
-    /// distance is missing or the difference is within its tolerance.
+    /// If a distance was missing at the window's beginning or end, a shorter time is compared. `None` if no time is
+    /// left or if the difference is within its tolerance.
     fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
         let (at, _) = self.rows.last()?;
         let both = |row: &[f64; 3]| {
@@ -237,7 +237,7 @@ impl DistanceComparison {
         let of_scale_m = math::hypot(settings.scale_sd, log_scale) * f64::max(cable_m.abs(), other_m.abs());
         let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
         let variance_m2 = counter_m2 + of_scale_m * of_scale_m + log_mps * log_mps * LOG_TIME_S * window_s;
-        // Slack may change from its negative to its positive limit, so a distance may be wrong by twice the limit.
+        // Slack may change from its negative to its positive limit in the window, so it may explain twice the limit.
         let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
         (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
     }

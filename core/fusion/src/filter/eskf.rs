@@ -43,30 +43,30 @@ const REST_SD_RADPS: f64 = 1e-3;
 /// Gate for zero-velocity updates (chi-square). An update of a vehicle at rest exceeds the gate once in ten thousand
 /// times.
 const REST_GATE: f64 = 15.1;
-/// The wall counts as flat if the standard deviation of a predicted range is below this, m.
+/// Standard deviation of a predicted range below which the wall counts as flat, m.
 ///
-/// If the standard deviation of the range noise is smaller, this standard deviation is the limit.
+/// If the sd of the range noise is smaller, that sd is the limit.
 const NEAR_M: f64 = 0.03;
 /// Standard deviation of the prior for the vehicle's speed, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// If an estimate is beyond the wall, the square of this is added to the variances of its position, m.
+/// The variances of a position beyond the wall increase by the square of this, m.
 const BEYOND_M: f64 = 1.5;
 
 /// Standard deviation below which the gyro bias counts as known, rad/s.
 ///
-/// An error of this size turns the attitude by a milliradian in a head pass of 3 s. A longer stop would gain little.
+/// A bias error of this size turns the attitude by a milliradian in a head pass of 3 s. So a longer stop would gain
+/// little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
-/// The learnt smoothness of the wall is applied to a range if the range's normalised squared innovation is at most
-/// this.
+/// Largest normalised squared innovation at which a range gets the learnt noise of a smooth wall.
 const SMOOTH: f64 = 4.0;
-/// The rounding of a counter is negligible if the counter's step is at most this share of its noise.
+/// Largest ratio of a counter's step to its noise at which the rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
-/// Time after its start in which an estimate settles, which means that its yaw becomes certain.
+/// Maximum time for which an estimate settles after its start. While it settles, its yaw becomes more certain.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
-/// An estimate counts as settled if the standard deviation of its yaw is at most this.
+/// Standard deviation of yaw at which an estimate counts as settled, radians.
 ///
-/// A yaw error of this size moves a sounding at 6 m by 5 cm. Smaller changes of yaw do not justify that the relation
-/// between earlier and later soundings is lost once more.
+/// A yaw error of this size moves a sounding at 6 m by 5 cm. When yaw becomes more certain than this, earlier and later
+/// soundings are still compared.
 const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
 /// Maximum number of recorded steps in an epoch: the propagation, two additions to the covariance, and an end.
@@ -87,10 +87,9 @@ pub struct Eskf {
     pub way_sought: Option<MonoNs>,
     /// Variance of the length that the counter may have lost permanently, m^2.
     slipped_m2: f64,
-    /// Number of times that the position of later soundings relative to earlier ones has become unknown.
+    /// Number of times that the offset between earlier and later soundings has become unknown.
     pub ties: u32,
-    /// Start time of the estimate, and the standard deviation of yaw, radians, at the start or when it was last found
-    /// halved.
+    /// Start time of the estimate, and standard deviation of yaw at the start or when it had last halved, radians.
     begun: (MonoNs, f64),
     /// Number of times that the standard deviation of yaw has halved while the estimate settled.
     pub settled: u32,
@@ -104,9 +103,8 @@ pub struct Eskf {
     /// Learnt roughness of the wall.
     roughness: Roughness,
     seen_again: RepeatedBumps,
-    /// Share of the declared variance that is used for ranges of heads until the gyro bias is known.
-    ///
-    /// Each head has learnt such a share; the largest one is used.
+    /// Share of the declared variance that is used for ranges of heads until the gyro bias is known. It is the largest
+    /// share that a head has learnt.
     smoothness: f64,
     /// Whether the vehicle is known to be at rest. Its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
@@ -114,9 +112,9 @@ pub struct Eskf {
     is_blind: bool,
     /// Checks of settings by the residuals of ranges.
     pub suspicions: SettingChecks,
-    /// Variances to add to those of the errors at the end of the epoch, because the estimate may be wrong.
+    /// Variances to add at the end of the epoch, because the estimate may be wrong.
     doubts: Errors,
-    /// Filter steps of the last epoch, for smoothing; empty unless `keeps_steps`.
+    /// Filter steps of the last epoch, for smoothing. Empty unless `keeps_steps` is true.
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
@@ -161,9 +159,9 @@ struct Weighed {
     of_estimate: f64,
     /// Declared variance of the measurement noise.
     declared: f64,
-    /// Learnt noise variance of a single reading.
+    /// Learnt variance of the noise of a single reading.
     white: f64,
-    /// Variance that bumps of the wall cause, if many readings see the same bump.
+    /// Variance caused by bumps of the wall, if many readings see the same bump.
     bumps: f64,
 }
 
@@ -191,10 +189,10 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// Records that earlier samples are unrelated to later ones each time the standard deviation of yaw has halved.
+    /// Marks earlier samples as unrelated to later ones each time the standard deviation of yaw has halved.
     ///
-    /// While the estimate settles, samples become ever more certain. The errors of earlier samples then say nothing
-    /// about the errors between later passes.
+    /// While the estimate settles, samples become ever more certain. So the errors of earlier samples say nothing about
+    /// the errors between later passes.
     fn settle(&mut self) {
         debug_assert!(self.factors.has_variances(), "variances aren't negative: {:?}", self.factors);
         let (begun, yaw_rad) = self.begun;
@@ -290,7 +288,8 @@ impl Eskf {
         }
     }
 
-    /// Adds the speed change that an implausible force would cause to the uncertainty, because the force may be real.
+    /// Adds the speed change by an implausible force to the uncertainty. The filter ignores the force, but it may be
+    /// real.
     fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
         let way = variance * epoch_s * epoch_s;
@@ -381,7 +380,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Fuses a scalar update. The residual of `row` refers to the estimate after the corrections in `known`.
+    /// Fuses a scalar update. The residual of `row` already takes account of the corrections in `known`.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
@@ -403,8 +402,7 @@ impl Eskf {
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         if settings.learns && is_head_square {
-            // If the residual of a range is too large for a smooth wall, the declared noise, which suits a rough wall,
-            // is used.
+            // The declared noise suits a rough wall. It stays in use if the residual is too large for a smooth wall.
             let smooth = row.noise * self.smoothness;
             if innovation * innovation <= SMOOTH * (of_estimate + smooth) {
                 row.noise = smooth;
@@ -421,8 +419,7 @@ impl Eskf {
             source.noise_level.note_share((innovation * innovation - of_estimate) / declared, is_near);
         }
         let relative = source.noise_level.relative(nis.min(settings.gate));
-        // Ranges of heads are excluded, because rocks change these ranges in the same way as drifting gyro biases
-        // would.
+        // Ranges of heads are excluded, because rocks change them in the same way as a drifting gyro bias does.
         if kind != SensorKind::Head {
             self.unrest.note([part(RATE_BIAS), part(FORCE_BIAS)], variance, relative);
         }
@@ -443,7 +440,7 @@ impl Eskf {
         }
     }
 
-    /// Returns the noise with which an accepted update corrects the estimate.
+    /// Returns the noise variance with which an accepted update corrects the estimate.
     fn noise_of_correction(
         &mut self,
         row: &ScalarUpdate,
@@ -522,10 +519,10 @@ impl Eskf {
         noise_m2
     }
 
-    /// Returns the variance of the second-order terms that an update neglects.
+    /// Returns the variance of the second-order terms that a linearised update neglects.
     ///
-    /// The terms matter only while position or attitude is very uncertain. For a normal error e, the mean square of
-    /// f'' e^2 / 2 is 3/4 (f'' sd^2)^2.
+    /// They matter only while position or attitude is very uncertain. For a normal error e, the mean square of f'' e^2
+    /// / 2 is 3/4 (f'' sd^2)^2.
     fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
         let sum = |axes: Range<usize>| axes.map(|i| self.factors.variance(i)).sum::<f64>();
         let (place, turn) = (sum(POSITION + 1..POSITION + 3), sum(ATTITUDE..ATTITUDE + 3));
@@ -560,8 +557,7 @@ impl Eskf {
         Some(row)
     }
 
-    /// Moves an estimate that lies beyond the wall back into the tunnel, because no beam can be predicted from beyond
-    /// the wall.
+    /// Moves an estimate beyond the wall back into the tunnel, because ranges cannot be predicted from beyond the wall.
     fn stay_inside(&mut self, profile: &Profile) {
         let place = [self.state.position.y(), self.state.position.z()];
         if profile.contains(place) {
@@ -596,7 +592,8 @@ impl Eskf {
         math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
 
-    /// Fuses the prior of the speed. Otherwise accelerometers without aiding would integrate gravity without limit.
+    /// Fuses zero speed with the sd `SPEED_SD_MPS`. Without it, an unaided accelerometer would integrate gravity
+    /// without limit.
     fn bound_speed(&mut self) {
         let mut errors = [0.0; ERRORS];
         for (axis, row) in measure::rest(&self.state, SPEED_SD_MPS).iter().enumerate() {
@@ -612,10 +609,10 @@ impl Eskf {
         self.apply(row, &gain, known, errors);
     }
 
-    /// Corrects by a range to the wall, with only a share of the computed correction of attitude and related errors.
+    /// Corrects by a range to the wall. Attitude and related errors get only a share of the computed correction.
     ///
-    /// The covariance has Joseph's form with the smaller gain. This covariance equals the optimal one plus a dyad of
-    /// the omitted gain.
+    /// The covariance has Joseph's form with the smaller gain. It equals the optimal covariance plus a dyad of the
+    /// omitted gain.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
@@ -684,7 +681,7 @@ impl Eskf {
         self.cable.corrections.note(by, [before_p[1] - after_p[1], before_v[1] - after_v[1]]);
     }
 
-    /// Decides whether to fuse a cable reading. If the counter has lost a length, this length is added to the creep.
+    /// Decides whether to fuse a cable reading. A length that the counter has lost is added to the creep.
     fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
         let used = self.cable.take(reading);
         self.slipped_m2 += self.cable.corrections.take_slipped_m2();
@@ -704,7 +701,7 @@ impl Eskf {
                 // disagreement.
                 add_to(errors, CREEP, lost_m);
                 add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                // Either the counter has lost the length `lost_m`, or the estimated motion was wrong during the
+                // Either the counter has lost `lost_m`, or the estimated motion was wrong during the cable
                 // disagreement.
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
@@ -722,10 +719,10 @@ impl Eskf {
     }
 }
 
-/// Whether the noise of a reading is independent of the noise of other readings.
+/// Whether the noise of a reading is independent of that of other readings.
 ///
-/// Several readings share the rounding error of a counter. If this error matters, no noise is learnt from the
-/// innovation.
+/// Several readings of a counter share one rounding error. If the rounding is not negligible, no noise is learnt from
+/// the innovation.
 fn is_white(reading: &Reading, source: &Source, settings: &Settings) -> bool {
     !matches!(reading, Reading::TetherLength(length)
         if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m)

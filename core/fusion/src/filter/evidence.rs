@@ -1,5 +1,4 @@
-//! Sums of residuals that show whether a setting is wrong. The setting is the value of a parameter or the mount of a
-//! sensor.
+//! Sums of residuals that show whether a setting is wrong: the value of a parameter, or the mount of a sensor.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,33 +6,31 @@ use headrace_geometry::math;
 
 /// Maximum number of range sources whose settings are checked.
 pub(super) const FOLLOWED: usize = 12;
-/// Only one reading in this many is compared with predictions for alternative mounts, because each comparison costs a
-/// ray cast.
+/// Number of readings per comparison with alternative mounts. The other readings are skipped, because a comparison
+/// costs a ray cast.
 pub(super) const COMPARED: u32 = 4;
-/// Minimum number of blocks for computing the uncertainty of a parameter. A block covers a distance of at least 3 m.
+/// Minimum number of blocks from which a parameter's uncertainty is computed. A block covers at least 3 m of tunnel.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// A fitted parameter is certainly not zero if it is at least this many standard deviations from zero.
+/// A fitted parameter is certainly not zero if its distance from zero is at least this many standard deviations.
 ///
-/// The limit for an alternative mount is lower (`SURE_GAIN`), because the gain by another mount varies with the
+/// The limit for an alternative mount, `SURE_GAIN`, is lower, because the gain by another mount varies with the
 /// vehicle's position.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
-/// Minimum sum of normalised squared residuals that a parameter must explain, divided by the number of all sources'
-/// readings.
+/// Minimum sum of normalised squared residuals that a parameter must explain, per reading of all sources.
 ///
-/// A parameter that changes ranges by a seventh of their noise explains this much.
+/// A parameter explains this much if it changes ranges by a seventh of their noise.
 const EXPLAINS: f64 = 0.02;
 /// Unknowns of the vehicle's pose within a pose window of a few seconds: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// Residuals are clipped at this limit in a comparison of mounts, m, because some echoes come from objects other than
-/// the wall.
+/// Limit at which residuals are clipped when mounts are compared, m. Some echoes come from objects other than the wall.
 const MOST_MISSED_M: f64 = 0.5;
-/// A mount is doubted if its mean square residual is at least `MISSES_M2`, m^2, and if an alternative mount would leave
+/// Limits for doubting a mount. Its mean square residual is at least `MISSES_M2`, m^2, and an alternative mount leaves
 /// at most the share `LEAVES` of its squared residuals.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Least-squares sums of one parameter within a pose window, and the cross sums of parameter and pose.
+/// Least-squares sums of one parameter within a pose window, including its cross sums with the pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) by_pose: [f64; POSE],
@@ -60,9 +57,10 @@ pub(super) struct Alternative {
     pub(super) source: u16,
     pub(super) other: u16,
     pub(super) is_echo: bool,
-    /// Sums of the present block (`block`) and of all earlier blocks.
+    /// Sums of the present block (`block`), and of all blocks before it (`all`).
     ///
-    /// Each contains the squared residuals at the configured mount and at the alternative, and the number of readings.
+    /// The values are the squared residuals at the configured mount, those at the alternative, and the number of
+    /// readings.
     pub(super) block: [f64; 3],
     pub(super) all: [f64; 3],
     pub(super) blocks: u32,
@@ -127,12 +125,12 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// Returns the estimated parameter and its distance from zero in sd, if its size is at least `least` and it is
-    /// certainly not zero.
+    /// Returns the estimated parameter and its distance from zero in sd. `None` if its size is below `least` or if it
+    /// may be zero.
     ///
-    /// The standard deviation is the larger of two: one from the scatter of blocks, and one from the noise of ranges.
-    /// The second one is needed because blocks may hardly scatter. `None` if the parameter changes ranges only by
-    /// millimetres, because such changes show mere errors of the wall and beam models.
+    /// The sd is the larger of two: one from the scatter of blocks, and one from the noise of ranges, because blocks
+    /// may hardly scatter. `None` also if the parameter changes ranges only by millimetres, because errors of the wall
+    /// and beam models do the same.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
@@ -177,8 +175,8 @@ impl Alternative {
 
     /// Returns by how many standard deviations the alternative mount fits better than the configured one.
     ///
-    /// `None` unless the alternative certainly fits better and the ratio `share_left` is small. For two swapped
-    /// sources, `share_left` is the ratio for both together.
+    /// `None` unless the alternative certainly fits better and `share_left` is small. If two sources may be swapped,
+    /// the caller gives the ratio for both together.
     pub(super) fn certain(&self, share_left: f64) -> Option<f64> {
         let [own, _, readings] = self.all;
         let n = f64::from(self.blocks);
@@ -211,8 +209,7 @@ mod tests {
         fit
     }
 
-    /// The gain by an alternative mount varies between blocks. The alternative is only as certain as the mean of these
-    /// gains.
+    /// The gain by an alternative mount varies between blocks. The alternative is only as certain as the mean gain.
     #[test]
     fn alternative_mount_is_less_certain_if_its_gain_scatters_between_blocks() {
         let sure_sd = |scatter_m2: f64| {
@@ -225,8 +222,8 @@ mod tests {
             }
             alternative.certain(alternative.share_left())
         };
-        // The mean gain is 0.2 m^2. Eight gains lie alternately above and below this mean by the scatter. So the mean's
-        // sd is the scatter divided by the root of seven.
+        // The mean gain is 0.2 m^2. Eight gains lie alternately above and below it by the scatter, so the sd of the
+        // mean is the scatter divided by the root of seven.
         for scatter_m2 in [0.05, 0.04, 0.02] {
             let expected = 0.2 / scatter_m2 * math::sqrt(7.0);
             let found = sure_sd(scatter_m2).unwrap();

@@ -31,7 +31,7 @@ pub struct Gain<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     variance: f64,
-    /// Indices and weights of the driven errors. The first error has the higher index.
+    /// Indices and weights of the errors that the noise drives. The first error has the higher index.
     weights: [(usize, f64); 2],
 }
 
@@ -137,9 +137,9 @@ impl<const N: usize> Factors<N> {
         rest
     }
 
-    /// Returns the factors of the covariance of a sum of independent, transformed errors.
+    /// Returns the factors of the covariance of a sum of independent errors, each transformed by a matrix.
     ///
-    /// The rows of each matrix give the transformation of one part of the sum.
+    /// `parts` gives the factors of each error vector and the rows of its matrix.
     ///
     /// Source: Thornton's modified weighted Gram-Schmidt, in Bierman 1977, VI.4.
     pub fn of_sum<const M: usize>(parts: [(&Self, &[[f64; N]; N]); M]) -> Self {
@@ -225,7 +225,7 @@ impl<const N: usize> Factors<N> {
         Gain { k: k.map(|k| k / variance), variance }
     }
 
-    /// Adds noise with this variance to all errors, weighted by `a`. Entries of `a` from `len` on are zero.
+    /// Adds noise with this variance and the weights `a` to all errors. Weights from index `len` on are zero.
     pub fn add(&mut self, mut variance: f64, mut a: [f64; N], len: usize) {
         debug_assert!(is_variance(&variance), "added noise has a variance: {variance}");
         for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().take(len).rev() {
@@ -238,7 +238,7 @@ impl<const N: usize> Factors<N> {
         self.add_all([Noise::of_one(i, variance)]);
     }
 
-    /// Adds to the variances of the errors. Additions that are not positive are ignored.
+    /// Increases the variances of the errors. Increases that are not positive are ignored.
     pub fn widen(&mut self, variances: &[f64; N]) {
         for (i, variance) in variances.iter().enumerate().filter(|(_, variance)| **variance > 0.0) {
             self.add_to(i, *variance);
@@ -247,9 +247,9 @@ impl<const N: usize> Factors<N> {
 
     /// Adds several noises in order, interleaved column by column.
     ///
-    /// The result is bit-identical to adding the noises one after the other, because earlier noises affect a noise only
-    /// through the current column. Interleaving is faster: while one noise waits for the quotient for its next column,
-    /// the processor works on other noises.
+    /// Earlier noises affect a later noise only through the current column. So the result is bit-identical to adding
+    /// one noise after the other. Interleaving is faster, because the processor works on other noises while one noise
+    /// waits for the quotient for its next column.
     pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
         let mut variances = noises.map(|noise| noise.variance);
         debug_assert!(variances.iter().all(is_variance), "added noises have variances: {variances:?}");
@@ -269,7 +269,7 @@ impl<const N: usize> Factors<N> {
 
     /// Replaces the errors e by F e, where F is unit upper triangular.
     ///
-    /// `transform` changes one vector of errors in place. Its entries from the given index on are zero.
+    /// `transform` applies F to one vector of errors in place. The vector's entries from the given index on are zero.
     pub fn shear(&mut self, transform: impl Fn(&mut [f64; N], usize)) {
         for (j, column) in self.u.iter_mut().enumerate() {
             transform(column, j + 1);
@@ -294,10 +294,9 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Whether no variance is negative.
+    /// Whether no variance is negative, which is true after any sequence of changes.
     ///
-    /// The result is true after any sequence of changes. Numbers that are not finite are accepted here;
-    /// [`Self::is_sound`] detects them.
+    /// Numbers that are not finite are accepted here; [`Self::is_sound`] detects them.
     pub fn has_variances(&self) -> bool {
         self.d.iter().all(is_variance)
     }
@@ -321,7 +320,7 @@ impl Noise {
         Self { variance, weights: [(i, 1.0); 2] }
     }
 
-    /// Creates process noise of one error. The share `share` of this noise also acts on an error with a lower index.
+    /// Creates process noise of the error `i` that also acts, with the weight `share`, on an error with a lower index.
     pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0), (before, share)] }
     }
@@ -364,7 +363,7 @@ fn at<const N: usize>(column: &[f64; N], i: usize) -> f64 {
     column.get(i).copied().unwrap_or(0.0)
 }
 
-/// Dot product of the first `len` elements, in four partial sums of fixed order.
+/// Dot product of the first `len` elements. It uses four partial sums in a fixed order.
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
     let (a, b) = (a.get(..len).unwrap_or_default(), b.get(..len).unwrap_or_default());
     let mut sums = [0.0; 4];

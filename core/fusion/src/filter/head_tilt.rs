@@ -1,35 +1,35 @@
-//! Sums that detect a head with a tilted axis, which is yawed or pitched on its mount.
+//! Sums that detect a tilted head: a head whose axis is yawed or pitched on its mount.
 //!
-//! The range of a beam that leans along the tunnel is longer, by about the square of the lean. If the head itself
-//! is tilted, its ranges are too long while the vehicle turns to one side, and too short while it turns to the
-//! other side. So a tilt shows as an asymmetry. A constant excess of the ranges may also come from the wall's
-//! shape, so it is eliminated. Derivation: `docs/why/navigation.md`, "Settings in doubt".
+//! A beam that leans along the tunnel has a longer range, by about the square of the lean. If the head itself is
+//! tilted, its ranges are too long while the vehicle turns to one side, and too short while it turns to the other side.
+//! So a tilt shows as an asymmetry. The wall's shape may also make ranges too long, but to the same extent on both
+//! sides. This constant excess is eliminated. Derivation: `docs/why/navigation.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
 use headrace_geometry::math;
 
-/// Minimum share of a tilt's weight that must remain after the constant excess of the ranges is eliminated.
+/// Minimum share of a tilt's weight that remains after the constant excess of the ranges is eliminated.
 ///
-/// If less weight remains, the vehicle has not turned enough to both sides.
+/// A smaller share shows that the vehicle has not turned enough to both sides.
 const LEAST_LEFT: f64 = 0.05;
 /// Minimum lean of the beams along the tunnel in a pose window, rms, radians.
 ///
 /// A smaller lean comes mostly from errors of the heading, so the pose window shows nothing about the tilt.
 const LEAST_LEAN_RAD: f64 = 0.012;
 
-/// A head's tilt is judged only if the smallest reported tilt is this many times the sd that declared range noise
-/// causes.
+/// A head's tilt is judged only if the smallest tilt to report is this many times the sd caused by declared range
+/// noise.
 const SHOWS: f64 = 3.0;
 /// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
 
-/// Number of sums. They add up these products: pattern squared, pattern times derivative, derivative squared, pattern
-/// times residual, derivative times residual.
+/// Number of sums. Their terms: pattern squared, pattern times derivative, derivative squared, pattern times residual,
+/// derivative times residual.
 const SUMS: usize = 5;
 
-/// Tilt sums of one head about one axis within a pose window, and the cross sums with the vehicle's pose.
+/// Tilt sums of one head about one axis within a pose window, and their cross sums with the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltSums {
     pattern_by_pose: [f64; POSE],
@@ -37,7 +37,7 @@ pub(super) struct TiltSums {
     sums: [f64; SUMS],
 }
 
-/// Tilt sums over pose windows after the vehicle's pose is eliminated, and their second moments.
+/// Tilt sums and their second moments over pose windows, after the vehicle's pose is eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltFit {
     windows: u32,
@@ -48,8 +48,8 @@ pub(super) struct TiltFit {
 impl TiltSums {
     /// Adds a reading.
     ///
-    /// Inputs: derivatives of the range with respect to the pose, to the tilt, and to half of the squared tilt. The
-    /// last one is taken at zero lean (`pattern`).
+    /// `by_pose` and `by_tilt` are derivatives of the range with respect to pose and tilt. `pattern` is the derivative
+    /// with respect to half of the squared tilt, at zero lean.
     pub(super) fn add(
         &mut self,
         by_pose: [f64; POSE],
@@ -101,9 +101,9 @@ impl TiltSums {
 impl TiltFit {
     /// Adds the tilt sums of a pose window to the fit.
     ///
-    /// Unlike other settings, a tilt needs no blocks of distance: its effect changes sign as the vehicle swings, but
-    /// the effect of the wall's shape does not. The vehicle must move on between windows, because bumps that are seen
-    /// again in every swing do not average out.
+    /// A tilt needs no blocks of distance, unlike other settings. Its effect changes sign as the vehicle swings, but
+    /// the effect of the wall's shape does not. The vehicle must still move on between windows. Otherwise it sees the
+    /// same bumps in every swing, and they do not average out.
     pub(super) fn add(&mut self, window: [f64; SUMS]) {
         let [pattern_2, _, tilt_2, ..] = window;
         if pattern_2 <= 0.0 || tilt_2 < LEAST_LEAN_RAD * LEAST_LEAN_RAD * pattern_2 {
@@ -135,14 +135,14 @@ impl TiltFit {
 
     /// Returns the standard deviation of the head's tilt, radians; `None` if the vehicle has not turned enough.
     ///
-    /// The value comes from the scatter of pose windows, but is at least the sd that range noise causes. The variance
-    /// of range noise is `level` times the declared variance.
+    /// The value comes from the scatter of pose windows. It is at least the sd that range noise causes, whose variance
+    /// is `level` times the declared variance.
     pub(super) fn sd_rad(&self, level: f64) -> Option<f64> {
         let (rad, weight) = self.estimate()?;
         let [pattern_2, both, _, pattern_off, _] = self.sums;
         let share = both / pattern_2;
         let steady = (pattern_off - rad * both) / pattern_2;
-        // Weights of a window's sums; the weighted sum is the residual that the fit leaves in this window.
+        // Weights of a window's sums. Weighted by them, the sums give the residual that the fit leaves in this window.
         let left = [share * steady, share * rad - steady, -rad, -share, 1.0];
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.windows);
@@ -150,10 +150,10 @@ impl TiltFit {
         Some(sd_rad.max(math::sqrt(level / weight)))
     }
 
-    /// Returns the head's tilt and its distance from zero in standard deviations, if its size is at least `least_rad`
-    /// and it is certainly not zero.
+    /// Returns the head's tilt and its distance from zero in sd, if its size is at least `least_rad` and it is
+    /// certainly not zero.
     ///
-    /// `None` if declared range noise would hide a tilt of `least_rad`, or if the tilt is too large for the linear
+    /// `None` also if declared range noise would hide a tilt of `least_rad`, or if the tilt is too large for the linear
     /// model.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
@@ -209,7 +209,7 @@ mod tests {
         fit
     }
 
-    /// The oracle is a least-squares fit to the readings themselves, for two unknowns by Cramer's rule.
+    /// The oracle is a least-squares fit to the readings themselves. Cramer's rule solves it for its two unknowns.
     #[test]
     fn head_tilt_and_its_certainty_equal_a_least_squares_fit() {
         let weight = 1.0 / (NOISE_M * NOISE_M);
@@ -222,8 +222,8 @@ mod tests {
             let whole = pp * tt - pt * pt;
             let (found_rad, found_steady) = ((pp * to - pt * po) / whole, (tt * po - pt * to) / whole);
             let fit = fit(&blocks);
-            // The tilt explains the difference between two sums of squared residuals: that of a fit without a tilt, and
-            // that of a fit with a tilt.
+            // The tilt explains the difference between the sums of squared residuals of two fits, one without and one
+            // with a tilt.
             let left = |tilt: f64, steady: f64| sum(&|r| square(r[2] - tilt * r[1] - steady * r[0]));
             let explained = left(0.0, po / pp) - left(found_rad, found_steady);
             assert!((fit.explains() / explained - 1.0).abs() < 1e-6, "{} {explained}", fit.explains());
@@ -248,8 +248,8 @@ mod tests {
             None,
             "a tilt below the limit is not reported"
         );
-        // Large range noise limits the certainty of the tilt. With less range noise, the scatter of pose windows limits
-        // it.
+        // With large range noise, this noise limits the certainty of the tilt. With less noise, the scatter of pose
+        // windows does.
         let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
         assert!(
             (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,

@@ -17,14 +17,13 @@ use headrace_geometry::math;
 /// Mean of an inertial unit's samples over an interval, in the body frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InertialSample {
-    /// Turn rate, rad/s; `None` without gyro data. Without gyro data, the attitude is kept, and its error grows fast.
+    /// Turn rate, rad/s. `None` without gyro data; the attitude is then kept, and its error grows fast.
     pub rate_radps: Option<Vec3<Body>>,
-    /// Specific force, m/s^2; `None` without accelerometer data. Without such data, the velocity is kept, and its error
-    /// grows fast.
+    /// Specific force, m/s^2. `None` without accelerometer data; the velocity is then kept, and its error grows fast.
     pub force_mps2: Option<Vec3<Body>>,
 }
 
-/// Number of values in the record of a leg, which is the inertial motion of an epoch.
+/// Number of values in the record of a leg. A leg is the inertial motion of an epoch.
 pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 2 + 2;
 
 /// Inertial motion accumulated since the errors were last propagated.
@@ -36,17 +35,16 @@ pub struct Leg {
     /// Integral (`pushed`) and double integral of the rotation matrix over times with accelerometer data.
     pushed: Matrix3<f64>,
     pushed_twice: Matrix3<f64>,
-    /// Change of velocity and displacement (`way`) that specific force without gravity causes.
+    /// Velocity change and displacement (`way`) by the specific force. Gravity is not included.
     velocity: Vector3<f64>,
     way: Vector3<f64>,
-    /// Effects of a gyro bias on velocity (`tilting`) and displacement, because the bias tilts the estimated direction
-    /// of the force.
+    /// Effects of a gyro bias on velocity (`tilting`) and displacement. They arise because the bias tilts the estimated
+    /// direction of the force.
     tilting: Matrix3<f64>,
     tilting_twice: Matrix3<f64>,
     /// Duration without gyro data, and duration without accelerometer data, s.
     blind_s: [f64; 2],
-    /// Distance along the tunnel, m, and the cable's scale error on this distance; the product of both adds to the
-    /// creep.
+    /// Distance along the tunnel, m, and the cable's scale error on it, a ratio. Their product adds to the creep.
     creeping: [f64; 2],
     /// Factors that multiply the process noise of gyro and accelerometer biases.
     unrest: [f64; 2],
@@ -130,7 +128,7 @@ impl Leg {
         *without_force += if force.is_some() { 0.0 } else { dt_s };
     }
 
-    /// Returns the process noise of the cable's slack, which is modelled as white noise that passes two equal lags in
+    /// Returns the process noise of the cable's slack. The model of slack is white noise that passes two equal lags in
     /// series.
     fn slack_noises(&self) -> [Noise; 2] {
         let slack = self.slack();
@@ -154,7 +152,7 @@ impl Leg {
         GaussMarkov { reach, time_s }
     }
 
-    /// Returns the values of this leg for its record.
+    /// Returns the values of this leg, from which [`Self::of_numbers`] restores it.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
@@ -183,9 +181,9 @@ impl Leg {
         Some(leg)
     }
 
-    /// Returns this inertial motion of an epoch (leg) with these noise factors and this slack model.
+    /// Returns this leg with other noise factors and another slack model.
     ///
-    /// `unrest` contains the factors by which the process noise of gyro and accelerometer biases is multiplied.
+    /// `unrest` multiplies the process noise of gyro and accelerometer biases.
     #[must_use]
     pub fn with_noise(self, unrest: [f64; 2], slack: GaussMarkov) -> Self {
         debug_assert!(unrest.iter().all(|factor| *factor >= 1.0), "noise is only raised: {unrest:?}");
@@ -243,8 +241,8 @@ impl Leg {
         let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
         for k in 0..3 {
             factors.add_all([
-                // White force noise over the leg causes a displacement of two parts. One part is correlated with the
-                // velocity. The other part is independent of it, with the noise variance times dt^2 / 12.
+                // White force noise over the leg causes a displacement of two parts. One is correlated with the
+                // velocity. The other is independent of it; its variance is that of the force noise times dt^2 / 12.
                 Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
                 Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
                 Noise::of_one(ATTITUDE + k, rate),
@@ -281,7 +279,7 @@ impl Leg {
     }
 }
 
-/// Minimum decay factor of an error over a leg. It avoids a division by zero. An error with a smaller factor would be
+/// Minimum decay factor of an error over a leg, to avoid a division by zero. An error that decays by more is
 /// negligible.
 const LEAST_FADING: f64 = 1e-3;
 

@@ -10,7 +10,7 @@ use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// A head's range may get more weight than declared only if the cosine of the beam's incidence is above this.
+/// Cosine of the beam's incidence above which a head's range may get more weight than declared.
 ///
 /// If the hull is pitched steeply, the beams look along the tunnel, and only few of them determine the attitude.
 const SQUARE: f64 = 0.8;
@@ -28,21 +28,21 @@ pub struct ScalarUpdate {
     pub lean: Option<Lean>,
     /// Second derivatives of the expected value, which the update neglects.
     ///
-    /// The three values are the derivatives with respect to position twice, 1/m; to rotation twice, m; and to both.
+    /// They are taken with respect to position twice, 1/m; to rotation twice, m; and to position and rotation.
     pub bends: [f64; 3],
 }
 
 /// Inclination of a beam along the tunnel.
 ///
-/// An inclination to either side lengthens the range. So a filter that does not know the side would only confirm its
-/// first guess of the side.
+/// An inclination to either side lengthens the range equally. So a filter that does not know the side would only
+/// confirm its first guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lean {
     /// Component of the beam's unit vector along the tunnel.
     pub along: f64,
     /// Change of `along` per unit of each error of the estimate.
     pub by: Errors,
-    /// Ratio of two values, m: the change of the range per unit of `along`, and `along` itself.
+    /// Change of the range per unit of `along`, divided by `along`, m.
     pub slope_m: f64,
 }
 
@@ -86,13 +86,13 @@ impl ScalarUpdate {
         self
     }
 
-    /// Whether the beam meets the wall squarely. The incidence follows from the change of the range per metre of
-    /// position, which is one over the cosine of incidence.
+    /// Whether the beam meets the wall squarely. The change of the range per metre of position shows this, because it
+    /// is one over the cosine of incidence.
     pub fn is_square(&self) -> bool {
         vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
-    /// Returns the part of the residual that is explained by the corrections made since `known`, up to `errors`.
+    /// Returns the part of the residual that corrections since `known` explain. `errors` are the corrections so far.
     pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
         self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
     }
@@ -112,7 +112,7 @@ impl ScalarUpdate {
 
 /// Minimum cosine of the angle between a beam and the wall's normal.
 ///
-/// The range of a beam at a more grazing angle shows the wall's roughness rather than the position.
+/// At a more grazing angle, a range shows the wall's roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
 /// Smallest distance to the wall that is used to compute the curvature of a range, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
@@ -128,7 +128,7 @@ pub struct Beam {
     pub along: Vec3<Body>,
     /// Half angle of a cone around the beam's axis, radians. The nearest part of the wall in this cone echoes first.
     pub first_rad: f64,
-    /// Half angle of a wider cone, radians. Within it, it is uncertain which part of the wall echoes first.
+    /// Half angle of a wider cone, radians. The first echo may come from any part of the wall within it.
     pub unsure_rad: f64,
 }
 
@@ -159,16 +159,16 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // angle by turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The true range may be as short as the shortest ray of the wider cone. The true range is assumed to be uniformly
-    // distributed between this length and the expected range.
+    // The wall may echo as early as along the shortest ray of the wider cone. The true range is assumed to be uniformly
+    // distributed between this ray's length and the expected range.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
     let across = 1.0 - along.x() * along.x();
-    // By position, the second derivative is that of the range to a circular wall around the sonar. By rotation, it is
-    // that of height / cos(incidence).
+    // The second derivative by position is that of the range to a circular wall around the sonar. The one by rotation
+    // is that of height / cos(incidence).
     let secant = 1.0 / cosine;
     let by_turn = expected_m * (2.0 * secant * secant - 1.0);
     let tangent = math::sqrt((secant * secant - 1.0).max(0.0));
@@ -201,10 +201,10 @@ pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -
         .with_one(SLACK, 1.0)
 }
 
-/// Predicts the attitude that an inertial unit computes, as rotations about the tunnel's x, y and z axes. For the
-/// rotation about z, the unit is modelled as a compass with a deviation.
+/// Predicts the attitude that an inertial unit computes, as rotations about the tunnel's x, y and z axes. About z, the
+/// unit is modelled as a compass with a deviation.
 ///
-/// The model compares rotations instead of angles, so it is smooth at any attitude, including a pitch of 90 degrees.
+/// The model compares rotations, not angles, so it is smooth at any attitude, including a pitch of 90 degrees.
 pub fn attitude(
     state: &State,
     measured: Rot<Tunnel, Body>,

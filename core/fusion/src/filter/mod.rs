@@ -1,8 +1,8 @@
 //! Navigation by an error-state Kalman filter: inertial propagation, corrected by all other sensors.
 //!
-//! Readings wait in a window until all readings of their time have arrived. They are fused at their time of validity,
-//! epoch by epoch. A fix is the estimate of the last epoch, propagated by the later inertial samples. Derivation:
-//! `docs/why/navigation.md`.
+//! Readings wait in a window until all readings of the same time have arrived. They are fused at their time of
+//! validity, epoch by epoch. A fix is the estimate of the last epoch, propagated by the inertial samples after it.
+//! Derivation: `docs/why/navigation.md`.
 
 pub mod agreement;
 pub mod align;
@@ -67,12 +67,12 @@ use headrace_sensor::reading::{MAX_SOURCES, Reading};
 
 /// Maximum time by which a fix is extrapolated beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
-/// If the clock goes back by more than this, the clock has been reset.
+/// Largest plausible step of the clock. If the clock goes back by more than this, it has been reset.
 ///
-/// A reading is rejected if its timestamp is ahead of its receive time by more than this.
+/// A reading is also rejected if its timestamp is ahead of its receive time by more than this.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// An estimate is restarted if its standard deviation of position or tilt is larger than this, because linearised
-/// updates would not converge.
+/// Largest standard deviations of position and tilt. Beyond them, linearised updates would not converge, so the
+/// estimate is restarted.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
 /// The estimate is restarted after all sensors have been silent for this time.
@@ -81,8 +81,8 @@ const SILENCE: DurNs = DurNs(5_000_000_000);
 /// or faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
-/// Maximum number of estimates after the last epoch. The longest window plus the longest epoch is 1.2 s, in which an
-/// inertial unit at 600 Hz needs 720 estimates.
+/// Maximum number of estimates after the last epoch. The longest window plus the longest epoch is 1.2 s. In this time,
+/// an inertial unit at 600 Hz needs 720 estimates.
 const AHEAD: usize = 1024;
 /// Assumed time between two passes of the heads over the same position if no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
@@ -100,15 +100,15 @@ pub struct FilterNavigation {
     zero: CounterZero,
     running: Eskf,
     is_running: bool,
-    /// Start of the first epoch. Each later epoch begins a whole number of epoch lengths after this time.
+    /// Start of the first epoch. Each later epoch begins a whole number of epoch lengths after it.
     epoch_zero: MonoNs,
     /// Latest receive time of any reading.
     received: MonoNs,
     /// Estimates after the last epoch, propagated by inertial samples.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// Error covariance relative to a much earlier visit to this position. That visit's error is assumed independent
-    /// and equally large.
+    /// Error covariance relative to a much earlier visit to this position. The error at that visit is assumed to be
+    /// independent and equally large.
     revisit: Relative,
     /// Number of restarts of the estimate, because it was lost or not finite, or because the clock went back.
     restarts: u64,
@@ -146,10 +146,9 @@ impl FilterNavigation {
         self.is_running.then_some(&self.running)
     }
 
-    /// Returns the time at which the cable readings left the expected range, once the doubt about them has lasted for
-    /// a second.
+    /// Returns the time at which the cable readings left the expected range. `None` while the readings are trusted.
     ///
-    /// `None` while the readings are trusted.
+    /// A doubt is reported once it has lasted for a second.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {
         self.cable_doubt().map(|doubt| doubt.since)
     }
@@ -211,7 +210,7 @@ impl FilterNavigation {
         self.running().and_then(|running| running.cable.doubt(running.at))
     }
 
-    /// Returns the difference between the distances by cable, velocity log and estimate, as an error along the
+    /// Returns the difference of the cable's distance from that of velocity log or estimate, as an error along the
     /// tunnel.
     fn raw_error(&self) -> Relative {
         Relative::along(self.raw_ways.doubt().map_or(0.0, |doubt| doubt.differs_m))
@@ -253,7 +252,7 @@ impl FilterNavigation {
         debug_assert!(sd.is_valid(), "standard deviations of a sound estimate are numbers: {sd:?}");
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        // Until two clones exist, errors of new soundings count as independent of errors of earlier soundings.
+        // Until two clones exist, errors of new soundings count as independent of the errors of earlier soundings.
         self.revisit = sd.independent();
         let differs = Relative::along(self.running.cable.differs_m());
         let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);
@@ -265,11 +264,10 @@ impl FilterNavigation {
         self.carry_ahead();
     }
 
-    /// Whether the chainage was reacquired since the heads last passed this position, or the cable counter's zero is
-    /// lost.
+    /// Whether the offset between earlier and present soundings is unknown.
     ///
-    /// If true, the offset between earlier and present soundings is unknown. Once the counter's zero is lost, this
-    /// offset stays unknown.
+    /// It is unknown if the chainage was reacquired since the heads last passed this position. Once the cable counter's
+    /// zero is lost, it stays unknown.
     fn has_jumped(&self) -> bool {
         if self.zero.is_lost() {
             return true;
@@ -280,7 +278,7 @@ impl FilterNavigation {
 
     /// Ends the estimate and starts a new alignment, because step-by-step correction would not converge.
     ///
-    /// Georeferenced samples keep their positions. The chainage is kept until the next cable reading.
+    /// Samples that are already georeferenced keep their positions. The chainage is kept until the next cable reading.
     fn begin_anew(&mut self, along_m: f64) {
         self.write_end();
         let x_m = self.running.state.position.x();
@@ -312,9 +310,8 @@ impl FilterNavigation {
         self.between_passes(APART_SHARE)
     }
 
-    /// Returns the time between two passes of evenly spread heads.
-    ///
-    /// Adds the share `apart_share` of the time until the rearmost head reaches the position of the foremost head.
+    /// Returns the time between two passes of evenly spread heads, plus the share `apart_share` of the time until the
+    /// rearmost head reaches the position of the foremost head.
     fn between_passes(&self, apart_share: f64) -> DurNs {
         let (mut passes_per_s, mut ahead_m, mut astern_m) = (0.0, f64::NEG_INFINITY, f64::INFINITY);
         for source in self.sources.iter().flatten() {
@@ -330,7 +327,7 @@ impl FilterNavigation {
         DurNs::from_secs_f64(error_time_s(passes_per_s, ahead_m - astern_m, speed_mps, apart_share))
     }
 
-    /// Adds a reading to the window, unless recent readings of the same source make it redundant.
+    /// Adds a reading to the window, unless recent readings of the same source make it superfluous.
     fn take(&mut self, number: usize, at: MonoNs, reading: &Reading) {
         let step_rad = self.context.settings.return_step_rad;
         let Some(Some(source)) = self.sources.get_mut(number) else {
@@ -386,8 +383,8 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // Either the clock was reset, or the previous timestamp was wrong. In both cases, the estimate is
-            // restarted, because the clock may catch up only much later.
+            // Either the clock was reset now, or the previous timestamp was wrong. The estimate is restarted in both
+            // cases, because otherwise the clock may catch up only much later.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();

@@ -1,7 +1,7 @@
 //! Level of a source's white noise relative to the declared noise, learnt from innovations.
 //!
-//! The innovations of a correct filter are white. So half the mean square of the difference between two successive
-//! innovations is their variance. Biases and slow errors of the estimate cancel in this difference. Derivation:
+//! The innovations of a correct filter are white. So their variance is half the mean square of the difference between
+//! two successive innovations. Biases and slow errors of the estimate cancel in this difference. Derivation:
 //! `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
 
-/// Gain of the learning: the natural logarithm of the noise level changes by this, times a normalised squared
-/// difference minus 1.
+/// Gain of the learning. Each normalised squared difference minus 1, times this gain, is added to the natural logarithm
+/// of the noise level.
 const GAIN: f64 = 0.01;
 /// Squared normalised innovations are clipped at this limit, because one outlier does not show the noise.
 const MOST: f64 = 9.0;
@@ -19,18 +19,18 @@ const MOST: f64 = 9.0;
 /// The declared sd of 3 cm suits a rough wall. On a smooth wall, a range step of 2 cm and sensor noise of 1 cm still
 /// cause this share of the variance.
 const LEAST_OF_HEAD: f64 = 0.15;
-/// The square of a rejected innovation is clipped at this multiple of the declared variance.
+/// Multiple of the declared variance at which the square of a rejected innovation is clipped.
 ///
-/// Rejected innovations come from rocks and stray echoes. A single one shows nothing, but many are rejected if the wall
-/// differs from its design.
+/// Rejected innovations come from rocks and stray echoes, so a single one shows nothing. But if the wall differs from
+/// its design, many are rejected.
 const MOST_UNUSED: f64 = 2.0;
-/// `MEMORY` is the number of measurements in the running mean, and `FEW` the number after which this mean is used.
+/// Number of measurements in the running mean (`MEMORY`), and number after which the mean is used (`FEW`).
 const MEMORY: u32 = 200;
 const FEW: u32 = 30;
-/// Number of used returns in a turn of a head, one every three degrees. With fewer returns, not all of the wall has
-/// been seen.
+/// Number of used returns in a turn of a head, one every three degrees. After fewer returns, the head has not seen all
+/// of the wall.
 const TURN: u32 = 120;
-/// Innovations are too large to be noise if their mean normalised square is above this.
+/// Mean normalised square above which innovations are too large to be noise.
 const UNUSUAL: f64 = 1.8;
 
 /// Learnt noise level of a source.
@@ -43,9 +43,9 @@ pub struct NoiseLevel {
     /// Running mean of all squared normalised innovations, and the number of innovations in this mean.
     nis: f64,
     seen: u32,
-    /// Running mean of each squared innovation minus the estimate's variance, as a share of the declared variance.
+    /// Running mean of squared innovations minus the estimate's variance, as a share of the declared variance.
     share: f64,
-    /// The same mean over the last few measurements, which shows changes of the wall.
+    /// The same as `share`, but over the last few measurements, so that it shows changes of the wall.
     latest: f64,
 }
 
@@ -58,9 +58,9 @@ impl Default for NoiseLevel {
 /// Returns the limits of the noise level, as factors of the declared variance; `None` if the level is not learnt.
 ///
 /// The declared tilt noise of an inertial unit covers its slow errors, which differences between successive innovations
-/// do not show. The declared range noise of a head also covers bumps and the shape of the wall. With less noise, these
-/// could be mistaken for yaw if beams lean. So differences of innovations can only raise a head's level. A lower level
-/// comes only from the squares of the innovations themselves ([`NoiseLevel::smoothness`]).
+/// do not show. The declared range noise of a head also covers bumps and the shape of the wall. With less noise, the
+/// filter could mistake bumps for yaw if beams lean. So differences of innovations can only raise a head's level. A
+/// lower level comes only from the squares of the innovations themselves ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
         SensorKind::Head => Some([1.0, 9.0]),
@@ -73,7 +73,8 @@ fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
 }
 
 impl NoiseLevel {
-    /// Processes an innovation of a fused measurement, and its variance; `scalar` is its index within the reading.
+    /// Processes an innovation of a fused measurement, and the innovation's variance. `scalar` is the measurement's
+    /// index within the reading.
     pub fn note(&mut self, kind: SensorKind, scalar: usize, innovation: f64, variance: f64) {
         let Some(before) = self.last.get_mut(scalar).and_then(|last| last.replace(innovation)) else {
             return;
@@ -86,7 +87,7 @@ impl NoiseLevel {
 
     /// Processes the squared normalised innovation of any measurement, whether fused or rejected.
     ///
-    /// Returns the square divided by the earlier mean. A mean below its expected value of 1 counts as 1.
+    /// Returns the square divided by the mean of earlier squares. A mean below its expected value of 1 counts as 1.
     pub fn relative(&mut self, nis: f64) -> f64 {
         let usual = if self.seen >= FEW { self.nis.max(1.0) } else { 1.0 };
         self.seen = (self.seen + 1).min(MEMORY);
@@ -113,7 +114,8 @@ impl NoiseLevel {
         self.nis < UNUSUAL
     }
 
-    /// Records that a measurement of this scalar was not fused, so that no difference of innovations spans it.
+    /// Records that a measurement of this scalar was not fused. Then the next innovation is not compared with the one
+    /// before it.
     pub fn skip(&mut self, scalar: usize) {
         if let Some(last) = self.last.get_mut(scalar) {
             *last = None;
@@ -127,9 +129,9 @@ impl NoiseLevel {
 
     /// Returns the variance factor, at most 1, for a head's ranges whose beams meet the wall squarely.
     ///
-    /// The factor is the learnt share of the declared variance: the larger of its mean over many measurements and its
-    /// mean over the last few. The factor is 1 until there are measurements of a whole turn. It is large if the wall
-    /// differs from its design in roughness or shape. `None` for a head without measurements.
+    /// It is the learnt share of the declared variance: the larger of its mean over many measurements and its mean over
+    /// the last few. It is large if the wall differs from its design in roughness or shape. It is 1 until a whole turn
+    /// has been measured. `None` for a head without measurements.
     pub fn smoothness(&self) -> Option<f64> {
         let is_known = self.seen >= TURN;
         (self.seen > 0)
@@ -178,7 +180,7 @@ mod tests {
         near(level(2000, alternating(0.01), true).smoothness().unwrap(), 0.15);
     }
 
-    /// If the wall differs from its design, neighbouring ranges have about equal errors, so their differences show
+    /// If the wall differs from its design, neighbouring ranges have about equal errors. So their differences show
     /// nothing.
     #[test]
     fn wall_that_differs_from_its_design_is_not_smooth() {

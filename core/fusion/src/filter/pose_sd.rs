@@ -9,8 +9,7 @@ use crate::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Largest standard deviations at which samples are georeferenced: of the position in the cross-section, m, and of yaw,
-/// radians.
+/// Largest standard deviations at which samples are georeferenced: position in the cross-section, m, and yaw, radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
 /// Largest standard deviation of the chainage at which samples are georeferenced, m, both absolute and relative to the
@@ -54,7 +53,7 @@ impl PoseSd {
         [along_m, place_m, tilt_rad, yaw_rad].iter().all(|sd| *sd >= 0.0)
     }
 
-    /// Returns the covariance relative to an independent estimate with the same uncertainty.
+    /// Returns the covariance of this estimate relative to an independent estimate with the same uncertainty.
     pub fn independent(&self) -> Relative {
         let variance = |sd: f64| 2.0 * sd * sd;
         let [along, tilt, yaw] = [self.along_m, self.tilt_rad, self.yaw_rad].map(variance);

@@ -65,10 +65,9 @@ impl PoseWindow {
 mod tests {
     use super::*;
 
-    /// Three readings with residuals of 1, 2 and 3 m are fitted by a parameter.
+    /// A parameter is fitted to three readings with residuals of 1, 2 and 3 m.
     ///
-    /// In the first case, the pose does not change the ranges. In the second case, pose and parameter change the ranges
-    /// in the same way.
+    /// `alone`: the pose does not change the ranges. `like_it`: pose and parameter change the ranges in the same way.
     #[test]
     fn residuals_explained_by_a_pose_error_are_removed() {
         let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };
@@ -82,8 +81,8 @@ mod tests {
         let freed = |spell: &PoseWindow, line: &Line| spell.freed(line, &spell.factor().unwrap());
         let alone = freed(&spell(1.0), &line([0.0; POSE]));
         assert!((alone[0] - 3.0).abs() < 1e-12 && (alone[1] - 6.0).abs() < 1e-12, "{alone:?}");
-        // The three readings give an information of 3 / m^2 on the pose, and the prior of 0.3 m gives 11.1 / m^2. The
-        // pose explains the share 3 / 14.1 of the residuals' sums. The parameter explains the rest.
+        // The three readings give an information of 3 / m^2 on the pose, and the prior of 0.3 m gives 11.1 / m^2. So
+        // the pose explains the share 3 / 14.1 of the residuals' sums, and the parameter explains the rest.
         let like_it = freed(&spell(1.0), &line([3.0, 0.0, 0.0, 0.0, 0.0]));
         let left = 1.0 - 3.0 / (3.0 + 1.0 / 0.09);
         assert!(

@@ -10,9 +10,9 @@ use headrace_geometry::math;
 
 /// Maximum share of a return's range variance that is assumed to come from bumps of the wall.
 const MOST_BUMPS: f64 = 0.9;
-/// Maximum number of passes over the same bumps that is counted.
+/// Largest number of passes over the same bumps that is counted.
 ///
-/// Sonar returns from repeated bumps must keep some weight, because on gyros alone the estimate would drift.
+/// Returns from repeated bumps must keep some weight, because the estimate would drift on gyros alone.
 const MOST_PASSES: f64 = 10.0;
 
 /// Counts how often the heads have passed over the bumps that they see now.
@@ -34,17 +34,17 @@ impl RepeatedBumps {
 
     /// Returns how often the heads have seen a bump on average, including the present pass; at least 1.
     ///
-    /// In each turn, a bump is seen once. Averaged over the bumps, the number of passes is the number of turns plus one
-    /// half.
+    /// A turn sees each bump once. In the middle of the present turn, half of the bumps have been seen once more. So
+    /// the mean number of passes is the number of turns plus one half.
     fn passes(&self, settings: &Settings) -> f64 {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }
 
     /// Counts a return, and returns the variance with which to fuse it, m^2.
     ///
-    /// `declared_m2` is the variance of a single return, and `bumps` is the share of this variance that comes from
-    /// bumps. Together, all returns from one bump weigh as much as their mean. So the variance of each return is such
-    /// that it adds only the weight that is new.
+    /// `declared_m2` is the variance of a single return, and `bumps` is the share of it that comes from bumps. All
+    /// returns from one bump together weigh as much as their mean. So each return gets a variance with which it adds
+    /// only the weight that is new.
     pub(super) fn noise_m2(
         &mut self,
         range_m: f64,

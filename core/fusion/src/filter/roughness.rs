@@ -10,22 +10,20 @@ use super::settings::Settings;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// `MEMORY` is the maximum number of bumps in the running mean. The declared roughness weighs as much as `DECLARED`
-/// bumps.
+/// Maximum number of bumps in the running mean (`MEMORY`), and weight of the declared roughness, in bumps (`DECLARED`).
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
-/// The square of a sum of two residuals is clipped at this multiple of the sum's variance, because one outlier is no
-/// bump.
+/// Multiple of its variance at which the square of a sum of two residuals is clipped. One outlier is no bump.
 const MOST: f64 = 9.0;
-/// Maximum variance of the bumps, as a factor of the declared variance. It corresponds to bumps with an sd of 6 cm at
-/// the default settings.
+/// Maximum variance of the bumps, as a factor of the declared variance. With the default settings, the bumps then have
+/// an sd of 6 cm.
 const ROUGHEST: f64 = 4.0;
-/// Smallest assumed speed along the wall, m/s, because even a nearly stationary vehicle drifts sideways at about this
-/// speed.
+/// Smallest assumed speed along the wall, m/s. Even a nearly stationary vehicle drifts sideways at about this speed.
 const STILL_MPS: f64 = 0.05;
 /// Number of echosounders whose last pings are kept.
 const ECHOSOUNDERS: usize = 8;
-/// Two echosounders face opposite walls if the cosine of the angle between their range gradients is below this.
+/// Two echosounders face opposite walls if the cosine of the angle between their range gradients is below this. The
+/// gradient is the change of a range with the vehicle's position.
 const FACING: f64 = -0.95;
 /// Maximum time between two opposite pings whose ranges are added, s.
 const AT_ONCE_S: f64 = 0.25;
@@ -64,8 +62,8 @@ impl Default for Roughness {
 impl Roughness {
     /// Processes a ping that has corrected the estimate.
     ///
-    /// `bump` is the share of a bump that the ping stands for: one divided by the number of pings that see the same
-    /// bump. `scale_m2` is the variance that the unknown scale of ranges causes in a sum of two ranges.
+    /// `bump` is one divided by the number of pings that see the same bump. `scale_m2` is the variance that the unknown
+    /// scale of ranges causes in a sum of two ranges.
     pub(super) fn note(&mut self, look: Look, bump: f64, scale_m2: f64, settings: &Settings) {
         let faces = |other: &&Look| {
             other.by_place.dot(&look.by_place) < FACING
@@ -76,8 +74,8 @@ impl Roughness {
             let noise_m2 = look.white_m2 + other.white_m2 + scale_m2;
             let sum_m = look.left_m + other.left_m;
             let most_m2 = MOST * (noise_m2 + 2.0 * self.variance_m2(settings).max(declared_m2));
-            // The sum contains the bumps of both echosounders. So the bumps of one echosounder have half of the
-            // variance.
+            // The sum contains the bumps of both echosounders, so its variance is twice that of one echosounder's
+            // bumps.
             let found_m2 = ((sum_m * sum_m).min(most_m2) - noise_m2) / 2.0;
             let share = bump / 2.0;
             self.seen = (self.seen + share).min(MEMORY);
@@ -97,8 +95,8 @@ impl Roughness {
 
     /// Returns how many pings of this echosounder see the same bump at this speed, at least 1.
     ///
-    /// Together these pings give no more information on the position than a single ping. For the first ping of an
-    /// echosounder, returns 1.
+    /// Together, these pings tell no more about the position than a single ping. Returns 1 for an echosounder's first
+    /// ping.
     pub(super) fn looks_at_a_bump(&self, source: usize, at: MonoNs, speed_mps: f64, bump_m: f64) -> f64 {
         let before = self.looks.iter().flatten().find(|look| look.source == source);
         before.map_or(1.0, |before| looks(at.since(before.at), speed_mps, bump_m))
@@ -156,8 +154,8 @@ mod tests {
         }
     }
 
-    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two echosounders that
-    /// face the same way.
+    /// Nothing is learnt while the scale of ranges is unknown. Nothing is learnt either from a single echosounder, or
+    /// from two that face the same way.
     ///
     /// The learnt roughness is at most twice the declared one.
     #[test]
@@ -179,8 +177,8 @@ mod tests {
         let looks = |apart_s: f64, speed_mps: f64| looks(DurNs::from_secs_f64(apart_s), speed_mps, 0.1);
         assert!((looks(0.1, 0.2) - 5.0).abs() < 1e-9);
         assert!((looks(0.1, -0.2) - 5.0).abs() < 1e-9 && (looks(-0.1, 0.2) - 5.0).abs() < 1e-9);
-        // A nearly stationary vehicle still sways. If pings are farther apart than a bump, or simultaneous, each of
-        // them counts as one look.
+        // A nearly stationary vehicle still sways. Each ping counts as one look if the pings are farther apart than a
+        // bump or simultaneous.
         assert!((looks(0.1, 0.0) - 20.0).abs() < 1e-9);
         assert_eq!((looks(1.0, 0.2), looks(0.0, 0.2)), (1.0, 1.0));
     }

@@ -3,11 +3,11 @@
 //! Each setting is a parameter that is fitted to the residuals. Within a pose window of a few seconds, the vehicle's
 //! pose explains as much of the residuals as it can, and the parameters explain the rest. The sums of pose windows are
 //! added up over blocks of distance. Blocks are nearly independent of each other, so their scatter gives the
-//! uncertainty of a parameter. For a head's tilt, each pose window is a block. Summary: `docs/why/navigation.md`,
+//! uncertainty of a parameter. For a head's tilt, each pose window is its own block. Summary: `docs/why/navigation.md`,
 //! "Settings in doubt".
 //!
-//! A residual is r = x b, with x the error of the setting and b as follows. t is the derivative of the range by
-//! rotation, p its derivative by position, and A the sonar's lever arm.
+//! A residual is r = x b. x is the error of the setting, and b depends on the setting as listed below. t is the
+//! derivative of the range by rotation, p its derivative by position, and A the sonar's lever arm.
 //!
 //! - speed of sound, or a wider wall: b is the expected range
 //! - head turned about its axis a: b = (t - A x p) . a
@@ -33,32 +33,32 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Length of a pose window. A filter keeps its position for about this time although ranges are wrong.
+/// Length of a pose window. The filter keeps its position for about this time, even if ranges are wrong.
 const SPELL: DurNs = DurNs(5_000_000_000);
-/// Minimum distance between two pose windows that count for the tilt of a head, m. Bumps of the wall are about as long.
+/// Minimum distance between two pose windows that count for a head's tilt, m. It is about the length of a bump.
 const MOVES_ON_M: f64 = 0.2;
-/// A block of pose windows lasts at least `BLOCK` and covers at least `BLOCK_M`. It is dropped if it has not covered
-/// this distance after `LONGEST`.
+/// Least duration and length of a block of pose windows. A block that has not covered `BLOCK_M` after `LONGEST` is
+/// dropped.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
 /// Minimum number of readings in a block of pose windows.
 const FEWEST_READINGS: u32 = 100;
-/// Smallest setting errors that are reported: `LEAST_SCALE` as a share of the range, `LEAST_ANGLE_RAD` as an angle.
+/// Smallest setting errors that are reported: `LEAST_SCALE` as a share of the range, and `LEAST_ANGLE_RAD`.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
-/// A mount counts as verified if the standard deviations of the head's pitch and yaw are at most this, radians.
+/// Largest standard deviation of a head's pitch and yaw at which its mount counts as verified, radians.
 ///
-/// Then an error of `LEAST_ANGLE_RAD`, the smallest that is reported, is at least two standard deviations from zero.
+/// Then the smallest error that is reported, `LEAST_ANGLE_RAD`, is at least two standard deviations from zero.
 const VERIFIED_RAD: f64 = LEAST_ANGLE_RAD / 2.0;
-/// A range loses weight if its residual exceeds `FAR_M`, and is ignored if its residual exceeds `BEYOND_M`.
+/// Residual beyond which a range loses weight (`FAR_M`), and beyond which it is ignored (`BEYOND_M`).
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
-/// Maximum number of pairs of a sonar and an alternative mount for it.
+/// Maximum number of pairs of a sonar and an alternative mount.
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
-/// An echosounder counts as wrongly configured if its mean square residual is above this, m^2.
+/// Mean square residual above which an echosounder counts as wrongly configured, m^2.
 ///
-/// Such an echosounder pulls the estimate away and makes correct heads look turned.
+/// Such an echosounder pulls the estimate away from the truth, which makes correct heads look turned.
 const ASTRAY_M2: f64 = 0.04;
 
 /// A setting that is likely wrong.
@@ -66,15 +66,15 @@ const ASTRAY_M2: f64 = 0.04;
 pub enum Setting {
     /// Ranges are too long by this share.
     ///
-    /// Either the speed of sound is set too high by this share, or the wall is wider than in the design by it.
+    /// Either the configured speed of sound is too high by this share, or the wall is wider than its design by it.
     RangeScale(f64),
-    /// A head is rotated about its axis relative to its configured mount, by this angle in radians.
+    /// A head is rotated about its axis, relative to its configured mount, by this angle, radians.
     ///
-    /// The angle is to be added to the configured roll.
+    /// Adding the angle to the configured roll corrects the setting.
     HeadTurned(f64),
-    /// A head is pitched on its mount by this angle, radians, which is to be added to the configured pitch.
+    /// A head is pitched on its mount by this angle, radians. Adding it to the configured pitch corrects the setting.
     HeadPitched(f64),
-    /// A head is yawed on its mount by this angle, radians, which is to be added to the configured yaw.
+    /// A head is yawed on its mount by this angle, radians. Adding it to the configured yaw corrects the setting.
     HeadYawed(f64),
     /// A sensor faces the direction opposite to that of its configured mount.
     WrongWayRound,
@@ -87,7 +87,7 @@ pub enum Setting {
 pub struct SettingDoubt {
     /// The setting that is likely wrong.
     pub setting: Setting,
-    /// Number of the source to which the setting belongs, if it belongs to one source.
+    /// Number of the source to which the setting belongs. `None` for a setting of all sources.
     pub source: Option<u16>,
     /// Distance of the setting from its configured value, in standard deviations.
     pub sure_sd: f64,
@@ -125,8 +125,8 @@ impl Setting {
         }
     }
 
-    /// Whether the setting is the direction of a head's axis. If it is wrong, the head's samples are displaced along
-    /// the tunnel.
+    /// Whether the setting is the direction of a head's axis. If this direction is wrong, the head's samples are
+    /// displaced along the tunnel.
     pub fn is_of_pointing(self) -> bool {
         match self {
             Self::HeadPitched(_) | Self::HeadYawed(_) | Self::WrongWayRound | Self::Swapped(_) => true,
@@ -144,7 +144,7 @@ impl Setting {
 }
 
 impl SettingDoubt {
-    /// Whether this doubt and another one concern the same setting, with equal or different values.
+    /// Whether two doubts concern the same setting. Its values may differ.
     pub fn is_of_same(&self, other: &Self) -> bool {
         self.source == other.source
             && self.setting.as_str() == other.setting.as_str()
@@ -172,8 +172,8 @@ struct Look {
     sd_m: f64,
 }
 
-/// A range as used in the fits: derivatives with respect to the vehicle's pose and to a rotation of the head, expected
-/// value, residual and weight.
+/// A range as used in the fits: its derivatives with respect to the vehicle's pose and to a rotation of the head, its
+/// expected value, residual and weight.
 struct Seen {
     by_pose: [f64; POSE],
     own_turn: Vec3<Tunnel>,
@@ -203,13 +203,13 @@ pub struct SettingChecks {
     turned: [Fit; FOLLOWED],
     tilted: [[TiltFit; 2]; FOLLOWED],
     alternatives: Vec<Alternative>,
-    /// For each checked source, the number of its readings (`heard`), and the observed share of the declared variance,
-    /// at most 1.
+    /// For each checked source: number of readings (`heard`), and observed share of the declared variance, at most 1
+    /// (`levels`).
     heard: [u32; FOLLOWED],
     levels: [f64; FOLLOWED],
-    /// Smallest standard deviation so far of each head's pitch and yaw on its mount, radians; infinite at first.
+    /// Smallest standard deviations so far of each head's pitch and yaw on its mount, radians; infinite at first.
     ///
-    /// Mounts do not change during a dive. `None` for sources that are no heads.
+    /// The smallest ones count, because mounts do not change during a dive. `None` for a source that is not a head.
     mounts: [Option<[f64; 2]>; FOLLOWED],
     /// Chainage of the vehicle, m.
     here_m: f64,
@@ -244,8 +244,8 @@ impl Default for SettingChecks {
 impl SettingChecks {
     /// Returns the setting that explains the residuals best, among those that are certainly wrong.
     ///
-    /// Inputs: the estimated scale of all ranges and its standard deviation. The residuals no longer contain the
-    /// effect of this estimated scale.
+    /// `share` is the estimated scale error of all ranges, and `sd` its standard deviation. The residuals no longer
+    /// contain the effect of this scale error.
     pub fn doubt(&self, [share, sd]: [f64; 2]) -> Option<SettingDoubt> {
         let sure_sd = share.abs() / sd.max(f64::MIN_POSITIVE);
         let is_scaled = self.scale.is_settled() && share.abs() >= LEAST_SCALE && sure_sd >= SURE;
@@ -263,9 +263,9 @@ impl SettingChecks {
 
     /// Returns the relative covariance that mount errors cause between samples of two heads.
     ///
-    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. The ranges of a
-    /// swinging vehicle do not reduce this covariance, because each head is compared with heads whose mounts are just
-    /// as uncertain.
+    /// `declared_rad` is the declared standard deviation of a head's pitch and yaw on its mount. Ranges do not reduce
+    /// this covariance, even if the vehicle swings, because each head is compared with heads whose mounts are just as
+    /// uncertain.
     pub fn mount_error(&self, declared_rad: f64) -> Relative {
         let is_compared = self.compared_heads().next().is_some();
         let variance = if is_compared { 2.0 * declared_rad * declared_rad } else { 0.0 };
@@ -324,8 +324,8 @@ impl SettingChecks {
         let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
         let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
-        // A known scale error must not turn a range into an outlier. So the smaller of two residuals counts: with and
-        // without this scale error.
+        // The residual is taken with and without the known scale error, and the smaller one counts. So a scale error
+        // does not turn a range into an outlier.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
@@ -429,7 +429,7 @@ impl SettingChecks {
         self.doubt = self.likeliest();
     }
 
-    /// Computes how certain the ranges make each head's pitch and yaw on its mount.
+    /// Updates the standard deviations of each head's pitch and yaw on its mount.
     fn note_mounts(&mut self) {
         for ((head, fits), level) in self.mounts.iter_mut().zip(&self.tilted).zip(self.levels) {
             for (least_rad, fit) in head.iter_mut().flatten().zip(fits) {

@@ -22,21 +22,21 @@ pub struct GaussMarkov {
 impl GaussMarkov {
     /// Creates the process of a bias that has a constant part and a drifting part.
     ///
-    /// The variance of the process is the sum of both parts' variances. The process drifts as fast as the drifting
-    /// part.
+    /// The variance of the process is the sum of both parts' variances. The process drifts as fast as the drifting part
+    /// alone.
     pub fn of_bias(bias: &BiasSpec) -> Self {
         let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance per second that the driving white noise adds to this process, if it has a single lag.
+    /// Variance per second that the driving white noise adds to this process, if the process has a single lag.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }
 
-    /// Standard deviation of the driving rate of a smooth process with standard deviation `reach`.
+    /// Standard deviation of the rate that drives a smooth process with the standard deviation `reach`.
     ///
-    /// A smooth process is two equal lags in series.
+    /// A smooth process is white noise that passes two equal lags in series.
     pub fn drive(&self) -> f64 {
         core::f64::consts::SQRT_2 * self.reach / self.time_s
     }
@@ -77,13 +77,13 @@ pub struct Settings {
     pub heading_sd_rad: f64,
     /// Deviation of a compass, radians.
     pub heading: GaussMarkov,
-    /// Noise of a measured attitude about horizontal axes if there are gyro and accelerometer data, radians.
+    /// Noise of a measured attitude about horizontal axes, radians, if there are both gyro and accelerometer data.
     pub tilt_sd_rad: f64,
-    /// Noise of a measured attitude about horizontal axes without gyro or accelerometer data, radians.
+    /// Noise of a measured attitude about horizontal axes, radians, if gyro or accelerometer data are missing.
     pub attitude_sd_rad: f64,
     /// Noise of an echosounder's range, m, wall roughness included.
     pub echo_sd_m: f64,
-    /// Length of a bump along the wall, m: within it, an echosounder sees the same bump.
+    /// Length of a bump along the wall, m. Within this length, an echosounder sees the same bump.
     pub bump_m: f64,
     /// Distance along the tunnel within which heads see the same bumps again, m.
     pub seen_again_m: f64,
@@ -97,8 +97,8 @@ pub struct Settings {
     pub return_sd_m: f64,
     /// Full width of a head's beam, radians. The nearest part of the wall within the beam echoes first.
     pub return_beam_rad: f64,
-    /// Minimum angle between two used returns of a head, radians. Returns at smaller angles see the same roughness of
-    /// the wall.
+    /// Minimum angle between two used returns of a head, radians. Returns at a smaller angle to each other see the same
+    /// roughness of the wall.
     pub return_step_rad: f64,
     /// Noise of a velocity log's velocity over ground, m/s.
     pub velocity_sd_mps: f64,
@@ -112,14 +112,14 @@ pub struct Settings {
     ///
     /// Readings are fused, and errors propagated, once per epoch. Epochs begin at whole multiples of this length.
     pub epoch: DurNs,
-    /// Whether noise levels of the sources are learnt. To compare the likelihoods of different settings, learning must
-    /// be off.
+    /// Whether noise levels of the sources are learnt. Likelihoods of different settings can be compared only without
+    /// learning.
     pub learns: bool,
     /// Share of a wall range's computed correction that is applied to the attitude and related errors.
     ///
-    /// With 0, ranges do not correct the attitude; 1 is the optimal estimate. Coverage depends on the attitude of one
-    /// pass relative to the next. Gyros measure this relative attitude more accurately than ranges do, because walls
-    /// differ in shape from the design. A smoother needs 1: [`crate::smooth::two_filters`].
+    /// With 0, ranges do not correct the attitude; with 1, the estimate is optimal. Coverage depends on the attitude of
+    /// one pass relative to the next. Gyros measure this relative attitude more accurately than ranges do, because
+    /// walls differ in shape from the design. A smoother needs 1: see [`crate::smooth::two_filters`].
     pub wall_share: f64,
 }
 
@@ -135,8 +135,8 @@ impl Default for Settings {
             tether_sd_m: 0.005,
             slack: GaussMarkov { reach: 0.06, time_s: 2.5 },
             scale_sd: 0.002,
-            // Not configurable, because a wheel's scale does not change within a dive. The small value only keeps the
-            // variance above zero.
+            // Not configurable, because a wheel's scale does not change within a dive. The value is small; it only
+            // keeps the variance above zero.
             scale_noise: 1e-9,
             depth_sd_m: 0.02,
             depth_offset_sd_m: 0.5,
@@ -146,8 +146,8 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Not configurable: bumps were 0.3 m apart in field dives, and two thirds of this count as a bump's length
-            // (docs/why/field.md).
+            // Not configurable. In field dives, bumps were 0.3 m apart; two thirds of this count as the length of a
+            // bump (docs/why/field.md).
             bump_m: 0.2,
             // Not configurable: about the distance that the vehicle travels during half a turn of a head.
             seen_again_m: 0.05,
@@ -168,7 +168,7 @@ impl Default for Settings {
     }
 }
 
-/// Gate that a chi-square value with one degree of freedom exceeds once in a thousand times.
+/// Value that a chi-square variable with one degree of freedom exceeds once in a thousand times.
 const GATE_999: f64 = 10.828;
 
 impl Settings {
@@ -184,8 +184,8 @@ impl Settings {
         }
     }
 
-    /// Declared noise variance of a kind of sensor, in the square of the measurement's unit. It is the reference for
-    /// innovation variances.
+    /// Declared noise variance of a kind of sensor, in the square of the measurement's unit. Innovation variances are
+    /// compared with it.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {
             SensorKind::Head => self.return_sd_m,

@@ -2,10 +2,10 @@
 //!
 //! The difference between counter and inertial motion contains the slack. It also contains the effect of the inertial
 //! unit's constant errors, which is a polynomial of second degree in time. So the third differences of counter minus
-//! inertial motion show the slack alone. At several lags, they are compared with those of the slack model. If the
-//! observed ones are larger, the slack is larger or faster than declared. A single third difference far above the usual
-//! size means that the counter or the inertial unit has failed. The comparison does not depend on the filter's use of
-//! cable readings: of the estimate, it uses only the heading. Summary: `docs/why/navigation.md`, "Slack".
+//! inertial motion show the slack alone. They are taken at several lags and compared with those of the slack model. If
+//! the observed ones are larger, the slack is larger or faster than declared. A single third difference far above the
+//! usual size means that the counter or the inertial unit has failed. The comparison does not depend on the filter's
+//! use of cable readings, because it uses only the heading of the estimate. Summary: `docs/why/navigation.md`, "Slack".
 //!
 //! With u the counter minus the inertial track, and c(x T) = (1 + x) e^-x the correlation of slack of time constant T:
 //!
@@ -29,51 +29,48 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Time lags over which third differences are taken, s.
 const LAGS_S: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
-/// Capacity for differences between counter and inertial motion: ten a second over three of the longest lags.
+/// Capacity for differences between counter and inertial motion: ten per second for three times the longest lag.
 const ROOM: usize = 256;
 /// Maximum number of inertial samples in an epoch.
 const KNOTS: usize = 256;
 /// Averaging time for the mean squares of third differences, s.
 const MEMORY_S: f64 = 40.0;
-/// A third difference is clipped at this multiple of the rms, because rare large values come from faults and not from
-/// slack.
+/// Multiple of the rms at which a third difference is clipped. Rare large values come from faults, not from slack.
 const MOST_SDS: f64 = 3.0;
 /// Before noise is subtracted from a mean square, the noise is raised by this many sds of the mean square.
 ///
-/// A margin is needed because the mean comes from few independent differences.
+/// The margin is needed because few of the averaged differences are independent.
 const MARGIN_SDS: f64 = 1.5;
-/// Time constant with which the inertial velocity decays, s. The decay keeps the integrated motion bounded and hardly
-/// changes a third difference.
+/// Time constant with which the inertial velocity decays, s. The decay bounds the integrated motion, and hardly changes
+/// a third difference.
 const FORGETS_S: f64 = 1000.0;
 /// Time constant for levelling the attitude and aligning it with the estimate's heading, s.
 ///
-/// It may be long, because only changes within a lag of some seconds matter.
+/// It may be long, because only changes within a lag of a few seconds matter.
 const LEVELS_S: f64 = 100.0;
 /// Largest difference between the integrated and the estimated attitude, rad. Beyond it, the integration restarts.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Counter and inertial motion agree if the third difference is at most this multiple of its usual size.
+/// Multiple of its usual size up to which a third difference shows that counter and inertial motion agree.
 ///
-/// Agreement is judged once there are `FEW` third differences. Once there are `ENOUGH`, their usual size counts as
-/// known.
+/// Agreement is judged after `FEW` third differences. Their usual size counts as known after `ENOUGH`.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
 /// Until the first comparison, slack is assumed to be faster than declared by this factor.
 const AT_FIRST: f64 = 2.0;
-/// Third differences up to `AGREES_SDS` times this length always count as usual, m. A lever arm or a tilting vehicle
+/// Third differences up to `AGREES_SDS` times this always count as usual, m. A lever arm or the tilt of the vehicle
 /// causes such differences.
 const LEAST_M: f64 = 0.01;
 /// Possible delay between counter and inertial unit during a change of speed, s.
 const LATE_S: f64 = 0.1;
-/// If the rms third difference at a lag of 1 s exceeds this many counter steps, slack is assumed to keep the count
-/// changing.
+/// Rms third difference at a lag of 1 s, in counter steps, above which slack is assumed to keep the count changing.
 const LIVELY_STEPS: f64 = 4.0;
 /// Time between two comparisons of the averaged third differences with the slack model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
 /// Maximum time between two counter readings that are compared.
 const GAP: DurNs = DurNs(1_500_000_000);
-/// Slack has at least this time constant, s, and at most the standard deviation `MOST_REACH_M`, m. Faster changes are
-/// counter noise, and larger changes are a fault.
+/// Least time constant of slack, s, and largest standard deviation, m. Faster changes are counter noise, and larger
+/// changes are a fault.
 const LEAST_TIME_S: f64 = 0.15;
 pub(super) const MOST_REACH_M: f64 = 0.15;
 
@@ -138,9 +135,9 @@ impl SlackEstimate {
         self.knots.push((at, [self.way_m]));
     }
 
-    /// Integrates inertial data from the last position to `until`; `about` supplies heading and gyro bias.
+    /// Integrates inertial data from the last position to `until`. `about` supplies heading and gyro bias.
     ///
-    /// Without inertial data, nothing is compared.
+    /// Without inertial data, the comparison restarts.
     ///
     /// Allocates: never.
     pub(super) fn go_on(&mut self, felt: &InertialSample, until: MonoNs, about: &State, gravity_mps2: f64) {
@@ -167,8 +164,8 @@ impl SlackEstimate {
         let gain = up.x - self.speed_mps / FORGETS_S;
         self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
         self.speed_mps += gain * dt_s;
-        // On average, the specific force points up. So if the mean force leans, the attitude is wrong by the lean,
-        // which is removed slowly.
+        // On average, the specific force points up. If the mean force leans, the attitude is wrong by this lean, so the
+        // lean is removed slowly.
         let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
         let back = rotation(back.scaled(dt_s / LEVELS_S));
         self.attitude = Some(back * (middle * rotation(rate.scaled(dt_s / 2.0))));
@@ -216,7 +213,7 @@ impl SlackEstimate {
 
     /// Returns the third difference of counter minus inertial position, m.
     ///
-    /// The second value, m, belongs to the counter's distances in the three lags: the longest minus the shortest.
+    /// The second value, m, is the longest minus the shortest distance that the counter shows in one of the three lags.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
@@ -228,15 +225,15 @@ impl SlackEstimate {
 
     /// Adds a third difference to the averages.
     ///
-    /// Returns whether the difference has the usual size, or is explained by noise and late readings (`noise_m2`,
-    /// `late_m2`).
+    /// Returns whether the difference has the usual size. A larger difference also counts as usual if noise
+    /// (`noise_m2`) and late readings (`late_m2`) explain it.
     fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, [noise_m2, late_m2]: [f64; 2]) -> bool {
         let (Some(square_m2), Some(mean_m), Some(seen)) =
             (self.squares_m2.get_mut(lag), self.means_m.get_mut(lag), self.seen.get_mut(lag))
         else {
             return true;
         };
-        // With few third differences, their mean square may miss the noise. With enough of them, it includes the noise.
+        // The mean square of few third differences may miss the noise. The mean square of enough of them includes it.
         let seen_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 };
         let usual_m2 = seen_m2 + late_m2 + LEAST_M * LEAST_M;
         let off_m = third_m - *mean_m;
@@ -253,7 +250,7 @@ impl SlackEstimate {
 
     /// Returns the slack model with the longest time constant whose third differences are as large as observed.
     ///
-    /// The slack of this model is at least as large as declared.
+    /// Its slack is at least as large as declared.
     fn shown(&self, noises: Noises, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
         let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
@@ -264,8 +261,7 @@ impl SlackEstimate {
         let least_reach =
             seen_m2.iter().map(|seen| math::sqrt(seen.max(0.0) / 20.0)).fold(declared.reach, f64::max);
         let most_reach = MOST_REACH_M.max(declared.reach);
-        // A faster slack gets a larger standard deviation. Sinusoidal slack requires the larger value, because its
-        // spectrum has a peak.
+        // Faster slack gets a larger standard deviation. Sinusoidal slack needs it, because its spectrum has a peak.
         let model = |time_s: f64| {
             let reach = declared.reach * math::sqrt(math::sqrt(math::sqrt(declared.time_s / time_s)));
             GaussMarkov { reach: reach.max(least_reach).min(most_reach), time_s }
@@ -305,10 +301,10 @@ pub(super) struct Noises {
 }
 
 impl Noises {
-    /// Creates the noise from the counter's variance, m^2, and the variance of the gyro bias.
+    /// Creates the noise from the counter's variance, m^2, and the gyro bias.
     ///
     /// `known` is the variance of the bias, rad^2/s^2, and `wander` its random walk, rad^2/s^3. A constant bias error
-    /// does not count, because it only changes the mean third difference.
+    /// does not count, because it changes only the mean of third differences.
     pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {
         let renewed = 1.0 - math::exp(-MEMORY_S * wander / known.max(f64::MIN_POSITIVE));
         Self { counter_m2, rate_bias_rad2ps2: renewed * known }
@@ -391,7 +387,7 @@ mod tests {
 
     /// The fastest change of a sine is its amplitude times its angular frequency.
     ///
-    /// The test compares three standard deviations of the slack model's rate with this speed.
+    /// Three standard deviations of the slack model's rate must exceed it.
     #[test]
     fn estimated_slack_covers_slack_larger_and_faster_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {

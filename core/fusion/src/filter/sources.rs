@@ -14,15 +14,15 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 /// Limits at which a head's range counts as stuck.
 ///
 /// A range is stuck if at least `FEW_OF_ONE_RANGE` returns have it although the expected range varies by more than
-/// `VARIES_M`. The standard deviation of the expected ranges must be at most `SURE_M`. As few as three returns suffice,
-/// because a return that is dropped by mistake costs nothing.
+/// `VARIES_M`. The sd of the expected ranges must be at most `SURE_M`. Three returns suffice, because a return that is
+/// dropped by mistake costs nothing.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Minimum time between two attitude readings that are used. Errors of attitude readings stay correlated for longer
-/// than this, so more readings would add little.
+/// Minimum time between two used attitude readings. Errors of attitude readings stay correlated for longer than this,
+/// so more readings would add little.
 ///
-/// The same is true for the minimum times of cable, depth and velocity readings.
+/// The minimum times of cable, depth and velocity readings have the same reason.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 /// Minimum time between two used cable readings; see [`ATTITUDE_PERIOD`].
 pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
@@ -32,8 +32,8 @@ pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
 pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
 /// Number of velocity readings that share one error. Errors of the log's scale, mount and bottom track last for 10 s.
 ///
-/// If errors lasted for only 3 s, a log that shows a fifth too much would pull the estimate away
-/// (`docs/why/navigation.md`, "Seeded dives").
+/// If only 3 s are assumed, a log that shows a fifth too much pulls the estimate away (`docs/why/navigation.md`,
+/// "Seeded dives").
 pub const VELOCITY_LOOKS: f64 = 20.0;
 /// Weight of a new measurement of a head's turn rate in the running mean.
 const RATE_SHARE: f64 = 0.05;
@@ -54,8 +54,8 @@ pub struct Consistency {
     /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement.
     ///
     /// Each innovation adds two terms. The first term is the NIS, clipped at the gate, minus 1. The second term is
-    /// ln(variance of the innovation / usual variance). If a log is interpreted in two ways, the interpretation with
-    /// the lower value is more likely.
+    /// ln(variance of the innovation / usual variance). A log can be interpreted with different settings; those with
+    /// the lower value are more likely.
     pub surprise: f64,
 }
 
@@ -92,7 +92,7 @@ pub struct Source {
     pub noise_level: NoiseLevel,
     /// Resolution step of the sensor if it is a tether counter.
     pub count_step: CountStep,
-    /// Record that shows whether the ranges of a head follow the wall or stay constant.
+    /// Detector of a head that reports a constant range.
     pub one_range: ConstantRange,
 }
 
@@ -120,8 +120,8 @@ impl Source {
 
     /// Processes a head's range; returns whether the head reports the same range in every direction.
     ///
-    /// Inputs: the range minus the expected range, m, and the standard deviation of the expected range, m. While the
-    /// estimate is uncertain, returns `false`.
+    /// `residual_m` is the range minus the expected range, and `estimate_sd_m` the sd of the expected range, m. Returns
+    /// `false` while the estimate is uncertain.
     pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
         let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };
         if estimate_sd_m > SURE_M {
@@ -132,7 +132,7 @@ impl Source {
         self.is_stuck()
     }
 
-    /// Whether a head's last returns have the same range although the expected ranges vary.
+    /// Whether a head's latest returns have the same range although the expected ranges vary.
     fn is_stuck(&self) -> bool {
         self.one_range.is_stuck(FEW_OF_ONE_RANGE, VARIES_M)
     }
@@ -143,8 +143,7 @@ impl Source {
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since the last used reading of the source. If so, the present reading becomes the
-    /// last used one.
+    /// Whether `period` has passed since the source's last used reading. If so, the present reading counts as used.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {
@@ -156,8 +155,8 @@ impl Source {
 
 /// Whether the range of any other head follows the wall.
 ///
-/// If true, this head itself is the cause of its constant range. Otherwise an error of the estimate could be the cause,
-/// for instance in a round tunnel.
+/// Then the head itself is the cause of its constant range. Otherwise the cause may be an error of the estimate, for
+/// instance in a round tunnel.
 pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     let mut others = sources.iter().enumerate().filter(|(number, _)| *number != source);
     others.any(|(_, other)| {
@@ -167,10 +166,10 @@ pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     })
 }
 
-/// Returns the share of the declared variance that is used for ranges of all heads: the largest share that any head has
+/// Returns the share of the declared variance to use for the ranges of all heads: the largest share that a head has
 /// learnt.
 ///
-/// The largest is used, because if one head begins to see rocks, the other heads soon will.
+/// The largest is used because, once one head sees rocks, the other heads soon will.
 pub fn smoothness(sources: &[Option<Source>]) -> f64 {
     let heads = sources.iter().flatten().filter(|source| source.sensor.kind == SensorKind::Head);
     heads.filter_map(|head| head.noise_level.smoothness()).reduce(f64::max).unwrap_or(1.0)

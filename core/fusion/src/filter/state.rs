@@ -55,10 +55,9 @@ pub struct State {
     pub rate_bias_radps: Vec3<Body>,
     /// Slack of the cable, m; positive if the cable shows too much chainage.
     pub slack_m: f64,
-    /// Rate at which the slack grows, apart from its decay, m/s. The rate decays with the same time constant as the
-    /// slack.
+    /// Rate at which the slack grows, apart from its decay, m/s. It decays with the time constant of the slack.
     pub slack_rate_mps: f64,
-    /// Creep of the cable, m: the excess of the shown chainage that all scale errors and slips so far have caused.
+    /// Creep of the cable, m: the part of the shown chainage that all scale errors and slips so far have added.
     pub creep_m: f64,
     /// Local scale error of the cable, a ratio; positive if the cable shows too much distance.
     pub scale: f64,
@@ -134,7 +133,8 @@ impl State {
         errors
     }
 
-    /// Interpolates by `share` towards another estimate. The estimated sensor errors are those of the other estimate.
+    /// Interpolates pose and velocity by `share` towards another estimate. Sensor errors are those of the other
+    /// estimate.
     #[must_use]
     pub fn between(&self, other: &Self, share: f64) -> Self {
         let turn = rotation_vector(other.attitude * self.attitude.inverse());
@@ -146,7 +146,7 @@ impl State {
         }
     }
 
-    /// Returns the numbers of the state in the order of the error state, with the attitude as a quaternion.
+    /// Returns the numbers of the state in the order of the error state. The attitude is a quaternion.
     pub fn numbers(&self) -> [f64; STATE_NUMBERS] {
         let [px, py, pz] = self.position.0.into();
         let [vx, vy, vz] = self.velocity_mps.0.into();
@@ -163,7 +163,7 @@ impl State {
         ]
     }
 
-    /// Creates a state from its numbers with a quaternion; `None` if the quaternion is invalid.
+    /// Creates a state from the numbers that [`Self::numbers`] returns; `None` if the quaternion is invalid.
     pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
         let [
             px,
@@ -249,8 +249,8 @@ pub fn add_to(errors: &mut Errors, i: usize, amount: f64) {
 /// Returns the rotation that has this rotation vector, radians.
 pub fn rotation<To: Copy>(by: Vec3<To>) -> Rot<To, To> {
     let angle = by.norm();
-    // The factor of the rotation vector is sin(a / 2) / a. For a small angle a, the factor is computed as a series,
-    // because the quotient would lose digits.
+    // The factor of the rotation vector is sin(a / 2) / a. At a small angle a, the quotient would lose digits, so a
+    // series is used.
     let share = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { math::sin(angle / 2.0) / angle };
     let [x, y, z] = [by.x() * share, by.y() * share, by.z() * share];
     Rot::from_wxyz(math::cos(angle / 2.0), x, y, z).unwrap_or_else(Rot::identity)

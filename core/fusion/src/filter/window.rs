@@ -18,8 +18,8 @@ const MOST_FELT: usize = 1024;
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
 /// Samples whose times differ by at most this are merged into their mean.
 ///
-/// This merges the turn rate and the force of one sample, and the samples that arrive in one burst. The mean of a burst
-/// is valid for the whole time since the sample before the burst.
+/// So the turn rate and the force of one sample are merged, and so are samples that arrive in one burst. The mean of a
+/// burst is valid for the whole time since the sample before the burst.
 const SAME: DurNs = DurNs(500_000);
 
 /// A reading that waits in the window.
@@ -46,7 +46,8 @@ struct FeltAt {
 pub struct Window {
     waiting: Vec<Waiting>,
     felt: Vec<FeltAt>,
-    /// Time of the last implausible force, and the speed change that such forces cause if they are real, m/s.
+    /// Time of the last implausible force, and the speed change that such forces cause if they are real, m/s. It is not
+    /// yet added to the uncertainty.
     jolt: Option<(MonoNs, f64)>,
 }
 
@@ -83,8 +84,8 @@ impl Window {
             .is_some()
     }
 
-    /// Records a rejected specific force, m/s^2, and adds the speed change that it would cause since the previous
-    /// sample.
+    /// Records a rejected specific force, m/s^2. Adds the speed change that it causes, if it is real, since the
+    /// previous sample.
     pub fn take_jolt(&mut self, at: MonoNs, force_mps2: f64) {
         let before = self.felt.iter().rev().map(|felt| felt.at).find(|felt| *felt < at);
         let lasted = before.map_or(SPEAKS_FOR, |before| at.since(before).min(SPEAKS_FOR));
@@ -92,13 +93,13 @@ impl Window {
         self.jolt = Some((at, carried_mps + force_mps2 * lasted.as_secs_f64()));
     }
 
-    /// Returns and clears the speed change, m/s, that implausible forces until a time would cause.
+    /// Returns the speed change, m/s, by implausible forces until a time, and clears it. It assumes that they are real.
     pub fn jolted(&mut self, until: MonoNs) -> f64 {
         self.jolt.take_if(|(at, _)| *at <= until).map_or(0.0, |(_, speed_mps)| speed_mps)
     }
 
-    /// Returns the time of the last implausible force whose speed change, m/s, is not yet taken over, and this speed
-    /// change.
+    /// Returns the time of the last implausible force, and the speed change, m/s, that [`Self::jolted`] has not yet
+    /// returned.
     pub fn jolt(&self) -> Option<(MonoNs, f64)> {
         self.jolt
     }
@@ -116,8 +117,7 @@ impl Window {
         self.felt.get_mut(place)
     }
 
-    /// Returns the inertial data that are valid from `from` on, and the end of their validity, which is `until` at the
-    /// latest.
+    /// Returns the inertial data that are valid from `from` on, and the end of their validity, at the latest `until`.
     ///
     /// An inertial sample is the mean over the time before its timestamp.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (InertialSample, MonoNs) {
@@ -137,7 +137,7 @@ impl Window {
                 );
             }
         };
-        // A unit may send rates and forces alternately. So the nearest rate and the nearest force are used.
+        // A unit may send rates and forces alternately, so the nearest rate and the nearest force are used.
         let near = |pick: fn(&InertialSample) -> Option<Vec3<Body>>| {
             pick(&sample).or_else(|| {
                 let around = [Some(next + 1), next.checked_sub(1), next.checked_sub(2)];
@@ -151,7 +151,7 @@ impl Window {
         (felt, at.max(from + DurNs(1)).min(until))
     }
 
-    /// Removes and returns the earliest reading, if its time of validity is at or before `until`.
+    /// Removes and returns the reading with the earliest time of validity, if that is at or before `until`.
     pub fn pop(&mut self, until: MonoNs) -> Option<Waiting> {
         let first = self.waiting.first()?;
         let is_first = self.waiting.get(1).is_none_or(|next| first.at <= next.at);

@@ -9,21 +9,21 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// `MEAN_OVER` is the averaging window. `MEANS` equal successive means show rest; a floating vehicle has fewer equal
-/// means.
+/// Averaging window (`MEAN_OVER`), and number of equal successive means that show rest (`MEANS`). A floating vehicle
+/// has fewer equal means.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
 /// Number of mean turn rates at rest after which the gyro bias is known.
 const ENOUGH: u32 = 25;
-/// A vehicle on a stationary cable counts as floating if it has not been at rest for this time, s.
+/// Time after which a vehicle that moves on a stationary cable counts as floating, s.
 const FLOATS: u32 = 15;
 /// Time after the first estimate during which the pilot is asked to keep the vehicle still.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
 /// Number of remembered pauses of the cable. The cable is at rest once it has been still for `PAUSES_TO_REST` times the
-/// longest of these pauses.
+/// longest of them.
 ///
-/// The pauses matter if a winch operator winds the cable in half a metre at a time. The cable is then stationary
-/// between pulls while the vehicle moves on.
+/// Pauses matter if a winch operator winds the cable in half a metre at a time. Between pulls, the cable is then
+/// stationary while the vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
 /// Largest difference between two means at rest: `SAME_RATE` for turn rates, rad/s, `SAME_FORCE` for specific forces,
@@ -39,17 +39,17 @@ pub struct RestDetector {
     cable_m: Option<f64>,
     cable_still: bool,
     cable_at: MonoNs,
-    /// Time of the cable's last movement, and the lengths of the pauses before this movement, the latest pause last.
+    /// Time of the cable's last movement, and the lengths of the pauses before it, the latest last.
     cable_moved_at: Option<MonoNs>,
     pauses: [DurNs; PAUSES],
     /// Number of mean turn rates that were taken at rest.
     rested: u32,
     /// Time for which the cable has been stationary although the vehicle is not at rest, s.
     floated: u32,
-    /// Whether the vehicle floats: it moved for a long time while the cable was stationary, and has not been at rest
-    /// since.
+    /// Whether the vehicle floats. It has then moved for a long time while the cable was stationary, and has not been
+    /// at rest since.
     floats: bool,
-    /// Time of the filter's first estimate, from which on the pilot is asked to keep still.
+    /// Time of the filter's first estimate. The pilot is asked to keep still from then on.
     asks_from: Option<MonoNs>,
 }
 
@@ -124,7 +124,7 @@ impl RestDetector {
         (self.rate.alike, self.force.alike, self.floated) = (0, 0, 0);
     }
 
-    /// Records the length of the cable's pause, because the cable has moved again.
+    /// Records how long the cable has paused before its present movement.
     fn note_pause(&mut self, at: MonoNs) {
         if let Some(before) = self.cable_moved_at.replace(at) {
             self.pauses.rotate_left(1);
@@ -142,8 +142,8 @@ impl RestDetector {
         })
     }
 
-    /// Whether the vehicle is at rest: gyros and accelerometers have been steady for long, and the cable has been
-    /// stationary.
+    /// Whether the vehicle is at rest. Gyros and accelerometers have then been steady for `MEANS` windows, and the
+    /// cable has been stationary.
     pub fn is_still(&self) -> bool {
         self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still && self.cable_rests()
     }
@@ -155,15 +155,16 @@ impl RestDetector {
         Some(Vec3::new(x, y, z))
     }
 
-    /// Records the time of the first estimate, when the request to keep still begins. Later calls have no effect.
+    /// Records the time of the first estimate, from which on the pilot is asked to keep still. Later calls have no
+    /// effect.
     pub fn ask_from(&mut self, at: MonoNs) {
         self.asks_from.get_or_insert(at);
     }
 
     /// Returns how many more seconds the vehicle should stand still until the gyro bias is known.
     ///
-    /// 0 if the vehicle floats or its inertial unit is too noisy, because no stop would count as rest. Also 0 later in
-    /// a dive, when the gyro bias seldom makes passes uncertain.
+    /// 0 if the vehicle floats or its inertial unit is too noisy, because then no stop counts as rest. Also 0 once the
+    /// first minute is over, because the gyro bias seldom makes passes uncertain later in a dive.
     pub fn lacking_s(&self, now: MonoNs) -> u32 {
         let lacking = ENOUGH.saturating_sub(self.rested);
         let begins = self.asks_from.is_some_and(|from| (0..ASKS_FOR.0).contains(&now.since(from).0));
@@ -211,8 +212,8 @@ mod tests {
         );
     }
 
-    /// A cable that is wound in half a metre at a time pauses for longer than the averaging windows for rest. During
-    /// the pauses, the vehicle moves.
+    /// The cable is wound in half a metre at a time. It pauses for longer than the averaging windows for rest, while
+    /// the vehicle moves on.
     ///
     /// The vehicle is at rest once the cable has been stationary for twice the time between the last pulls.
     #[test]

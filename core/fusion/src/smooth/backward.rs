@@ -27,7 +27,7 @@ pub struct Backward {
     settings: Settings,
     now: Option<(u32, Estimate)>,
     later: Later,
-    /// The track so far, in reverse order: its pieces, and in the next two fields its points and relative covariances.
+    /// The track so far in reverse order: its pieces, its points, and its relative covariances.
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,

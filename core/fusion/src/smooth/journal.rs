@@ -1,4 +1,4 @@
-//! Bounded queue for the steps of the filter, which the recorder drains between ticks.
+//! Bounded queue for the steps of the filter. The recorder empties it between ticks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -49,8 +49,8 @@ impl Journal {
 
     /// Writes a step of the filter to the queue.
     ///
-    /// A step is dropped if it is not finite or if the queue is full. If a step is dropped, the track breaks: later
-    /// steps can no longer correct earlier ones.
+    /// A step is dropped if it is not finite or if the queue is full. The track then breaks, because later steps can no
+    /// longer correct earlier ones.
     ///
     /// Allocates: never.
     pub fn write(&mut self, step: &Step, unit_at: Vec3<Body>, gap: DurNs) {

@@ -1,7 +1,7 @@
 //! Smoothing over a whole dive: later measurements correct earlier estimates.
 //!
-//! The filter records each step as it runs ([`step`], [`journal`]). Afterwards [`backward`] processes the steps in
-//! reverse order and builds a [`track`]. A second replay takes its positions from this track. Derivation:
+//! The filter records each step as it runs ([`step`], [`journal`]). After the dive, [`backward`] processes the steps in
+//! reverse order and builds a [`track`]. A second replay takes its positions from the track. Derivation:
 //! `docs/why/navigation.md`, "Smoothing".
 
 pub mod backward;

@@ -1,7 +1,7 @@
 //! Relative error covariance between a smoothed epoch and the epoch of the previous head pass.
 //!
-//! The backward pass goes back in time, so it reaches the later epoch first. This later epoch waits until the backward
-//! pass reaches the epoch of the previous head pass, one pass gap earlier.
+//! The backward pass goes back in time, so it reaches the later of these two epochs first. The later epoch waits until
+//! the backward pass reaches the earlier one, which is one pass gap before it.
 
 use super::rts_step::Gain;
 use crate::filter::clones::{CLONES, MOVING, STEP};
@@ -10,8 +10,7 @@ use crate::filter::state::{ERRORS, Errors};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Value of the pass gap of an epoch without a related earlier head pass, because the cable has slipped since that
-/// pass.
+/// Marks the pass gap of an epoch without a related earlier head pass. The cable has slipped since that pass.
 pub const UNTIED: DurNs = DurNs(i64::MAX);
 /// Standard deviation of the relative chainage error of an epoch without a related earlier pass, m.
 const UNTIED_M: f64 = 1e3;
@@ -24,17 +23,17 @@ struct Moment {
     at: MonoNs,
     /// Time since the previous pass of the heads.
     gap: DurNs,
-    /// Rows of the epoch's covariance for the errors that move a sample.
+    /// Rows of the epoch's covariance, for the errors in [`MOVING`].
     own: [Errors; 3],
     /// Cross-covariances of the errors in `own` with all errors at the current epoch of the backward pass.
     with: [Errors; 3],
-    /// Time from the current epoch of the backward pass to this epoch, s. `relative` is the relative covariance of the
-    /// two epochs.
+    /// Time from the current epoch of the backward pass to this epoch, s (`age_s`), and relative covariance of the two
+    /// (`relative`).
     age_s: f64,
     relative: Relative,
 }
 
-/// Epochs that wait until the backward pass reaches their previous head pass, the latest first.
+/// Epochs that wait until the backward pass reaches their previous head pass. The latest epoch comes first.
 #[derive(Debug, Clone, Default)]
 pub struct Later {
     waiting: Vec<Moment>,
@@ -45,7 +44,7 @@ pub struct Later {
 pub type Answer = (usize, Relative);
 
 impl Later {
-    /// Whether an epoch at the time `at` is to be added. True for the first epoch, and for epochs at least [`STEP`]
+    /// Whether an epoch at the time `at` should be added. True for the first epoch, and for epochs at least [`STEP`]
     /// before the one added last.
     pub fn is_due(&self, at: MonoNs) -> bool {
         self.newest.is_none_or(|newest| newest.since(at).0 >= STEP.0)
@@ -53,7 +52,7 @@ impl Later {
 
     /// Adds an epoch that waits for the epoch one `gap` earlier.
     ///
-    /// If there is no room, removes the epoch that has waited longest and returns that epoch's relative covariance.
+    /// If there is no room, removes the epoch that has waited longest, and returns its relative covariance.
     pub fn note(
         &mut self,
         number: usize,
@@ -69,8 +68,8 @@ impl Later {
         first
     }
 
-    /// Moves the backward pass to an earlier epoch, and returns the relative covariances of the epochs that waited for
-    /// it.
+    /// Moves the backward pass to an earlier epoch. Passes the relative covariances of the epochs that have waited for
+    /// it to `answer`.
     pub fn back(
         &mut self,
         at: MonoNs,
@@ -93,7 +92,7 @@ impl Later {
         });
     }
 
-    /// Ends a piece of the track, and returns the relative covariances of all epochs that still wait.
+    /// Ends a piece of the track. Passes the relative covariances of all epochs that still wait to `answer`.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;
@@ -129,7 +128,7 @@ fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relat
 mod tests {
     use super::*;
 
-    /// Epochs arrive latest first. An epoch is due if it is at least [`STEP`] before the epoch added last.
+    /// Epochs arrive latest first. An epoch is due if it is at least [`STEP`] before the one added last.
     #[test]
     fn epoch_is_due_once_it_is_2_s_before_the_last_added_epoch() {
         let at = |s: u64| MonoNs(1_000_000_000 * s);

@@ -12,15 +12,15 @@ use crate::filter::factors::Factors;
 pub struct Gain<const N: usize> {
     /// Rows of C = P F^T (F P F^T + Q)^-1.
     rows: [[f64; N]; N],
-    /// Rows of I - C F. These rows map the part of the error that the end of the step does not determine.
+    /// Rows of I - C F. They map the part of the error that the end of the step does not determine.
     rest: [[f64; N]; N],
 }
 
 impl<const N: usize> Gain<N> {
     /// Creates the gain of a step.
     ///
-    /// Inputs: the covariance at the beginning of the step, the step's error transition, and the covariance predicted
-    /// for its end.
+    /// `before` is the covariance at the beginning of the step, `carry` its error transition, and `predicted` the
+    /// covariance predicted for its end.
     pub fn new(before: &Factors<N>, carry: impl Fn(&mut [f64; N]), predicted: &Factors<N>) -> Self {
         let unit: [[f64; N]; N] =
             core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));
@@ -49,9 +49,9 @@ impl<const N: usize> Gain<N> {
 
     /// Returns the smoothed covariance at the beginning of the step.
     ///
-    /// Inputs: the filter's covariance P at the beginning, and S + Q: the smoothed covariance at the end plus the
-    /// noise of the step. The result is `(I - C F) P (I - C F)^T + C (S + Q) C^T`, which equals P + C (S - F P F^T
-    /// - Q) C^T.
+    /// `before` is the filter's covariance P at the beginning. `end_and_noise` is S + Q, the smoothed covariance at the
+    /// end plus the noise of the step. The result is `(I - C F) P (I - C F)^T + C (S + Q) C^T`, which equals P + C (S -
+    /// F P F^T - Q) C^T.
     pub fn smoothed(&self, before: &Factors<N>, end_and_noise: &Factors<N>) -> Factors<N> {
         Factors::of_sum([(before, &self.rest), (end_and_noise, &self.rows)])
     }

@@ -14,7 +14,7 @@ const HEADER: usize = 6;
 /// Number of 64-bit words in the record of a step.
 pub const WORDS: usize = HEADER + 3 + 2 * STATE_NUMBERS + FACTOR_NUMBERS + LEG_NUMBERS;
 
-/// The record of a step. Words are integers, or floats as their bits. Words that a step does not need are zero.
+/// The record of a step. A word is an integer, or a float as its bits. Words that a step does not need are zero.
 pub type Words = [u64; WORDS];
 
 /// Change from one estimate to the next that is not caused by a measurement.
@@ -23,14 +23,14 @@ pub type Words = [u64; WORDS];
 pub enum Move {
     /// Propagation by the inertial motion of a leg.
     Leg(Leg),
-    /// Addition to the variances of errors, because the variances were too small.
+    /// Addition to the variances of errors that were too small.
     Widened(Errors),
     /// No change, because this is the last estimate of its piece of the track.
     End,
 }
 
-/// A step of the filter. It begins with the estimate after the measurements of an epoch, and ends before the next
-/// measurements.
+/// A step of the filter. It begins with the estimate after the measurements of an epoch, and ends before the
+/// measurements of the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Start time of the step.
@@ -86,7 +86,7 @@ impl Move {
         }
     }
 
-    /// Returns the covariance predicted for the end of the step, bit-identical to the filter's.
+    /// Returns the covariance predicted for the end of the step. It is bit-identical to the filter's.
     pub fn predict(&self, settings: &Settings, factors: &Factors<ERRORS>) -> Factors<ERRORS> {
         let mut predicted = *factors;
         if let Self::Leg(leg) = self {

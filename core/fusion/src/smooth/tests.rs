@@ -34,7 +34,7 @@ fn white(time: usize) -> [f64; N] {
     [place + if time == JUMP.0 { JUMP.1 } else { 1e-3 }, speed, bias]
 }
 
-/// Returns the measurement at a time. The kinds of measurement alternate: position plus bias, speed, position, none.
+/// Returns the measurement at a time. Its kind alternates: position plus bias, speed, position, none.
 fn measured(time: usize) -> Option<([f64; N], f64)> {
     let value = f64::from(u32::try_from((time * 37) % 11).unwrap()) / 4.0;
     match time % 4 {
@@ -51,7 +51,7 @@ struct Known {
     covariance: SMatrix<f64, ALL, ALL>,
 }
 
-/// Solves for all times at once: adds the information matrices of start, steps and measurements, and inverts the sum.
+/// Solves for all times at once. Adds the information matrices of start, steps and measurements, and inverts the sum.
 fn all_at_once() -> Known {
     let mut information = SMatrix::<f64, ALL, ALL>::zeros();
     let mut vector = SVector::<f64, ALL>::zeros();
@@ -129,7 +129,7 @@ fn forwards() -> Vec<Filtered> {
         .collect()
 }
 
-/// The smoother's means, covariances, and cross-covariances between any two times equal those of the batch solution.
+/// Means, covariances, and cross-covariances between any two times equal those of the batch solution.
 #[test]
 fn smoother_equals_batch_least_squares() {
     let known = all_at_once();
@@ -139,8 +139,7 @@ fn smoother_equals_batch_least_squares() {
     };
     let last = filtered.last().unwrap();
     let (mut mean, mut factors) = (last.mean, last.factors);
-    // For each later time: the columns of the cross-covariance between errors at that time and errors at the current
-    // time.
+    // For each later time, the columns of the cross-covariance between the errors at that time and at the current time.
     let unit = |m: usize| core::array::from_fn(|i| if i == m { 1.0 } else { 0.0 });
     let mut later = vec![(TIMES - 1, core::array::from_fn::<[f64; N], N, _>(|m| factors.along(&unit(m))))];
     for time in (0..TIMES - 1).rev() {
@@ -167,7 +166,7 @@ fn smoother_equals_batch_least_squares() {
     }
 }
 
-/// After a poor prior come a step and near-exact measurements, with and without process noise.
+/// A step and near-exact measurements follow a poor prior, with and without process noise.
 ///
 /// No variance becomes negative, and no variance grows.
 #[test]

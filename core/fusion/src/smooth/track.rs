@@ -25,7 +25,7 @@ pub(super) struct Point {
     sd: PoseSd,
 }
 
-/// A part of the track in which no estimate is missing.
+/// A part of the track without a missing estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piece {
     clock: u32,
@@ -52,7 +52,8 @@ impl Point {
 }
 
 impl Piece {
-    /// Begins a piece of a track in reverse order. The track has this many points and relative covariances so far.
+    /// Begins a piece of a track that is built in reverse order. `points` and `relatives` count what the track has so
+    /// far.
     pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
         Self {
             clock: placed.clock,
@@ -119,7 +120,7 @@ impl Track {
         };
         let piece = self.pieces.iter().rev().find(begun).ok_or(NoFix::Heading)?;
         let points = self.points_of(piece);
-        // A time after the last point is extrapolated from the last two points.
+        // After the last point, the pose is extrapolated from the last two points.
         let next = points.partition_point(|point| point.at <= at).min(points.len().saturating_sub(1));
         let (before, after) = (points.get(next.saturating_sub(1)), points.get(next));
         let (before, after) = before.zip(after).ok_or(NoFix::Heading)?;
@@ -162,7 +163,7 @@ impl Track {
     }
 }
 
-/// Interpolates between two poses by `share`; extrapolates if `share` is above 1.
+/// Interpolates between two poses by `share`, or extrapolates if `share` is above 1.
 fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let turn = rotation_vector(to.attitude * from.attitude.inverse());
     Pose {
@@ -182,7 +183,7 @@ pub struct TrackNavigation {
 stateful!(TrackNavigation { state: clock, received; slots: consistency; fixed: track; });
 
 impl TrackNavigation {
-    /// Creates navigation along a track; `consistency` holds the innovation statistics of the filter's sources.
+    /// Creates navigation along a track. `consistency` holds the innovation statistics of the filter's sources.
     pub fn new(track: Track, consistency: [Option<Consistency>; MAX_SOURCES]) -> Self {
         Self { track, consistency, clock: 0, received: MonoNs(0) }
     }
@@ -203,8 +204,7 @@ impl Navigation for TrackNavigation {
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        // After a clock reset, a ping may need a fix before a reading with the new time has arrived. Such a ping gets
-        // no fix.
+        // After a clock reset, a ping may need a fix before a reading with the new time has arrived. It gets none.
         if self.received.since(at) > CLOCK_JUMP {
             return Err(NoFix::Heading);
         }
@@ -232,10 +232,10 @@ mod tests {
         turn * Rot::identity()
     }
 
-    /// Point on a piece of the track, `t` seconds after the start of the piece. The speed along the tunnel is 0.5 m/s,
-    /// and the vehicle turns left by 0.2 rad/s.
+    /// Point on a piece of the track, `t` seconds after the piece begins. The vehicle moves along the tunnel at 0.5
+    /// m/s, and turns left at 0.2 rad/s.
     ///
-    /// The speed stored in the point grows by 0.1 m/s per second, to test its interpolation.
+    /// The speed stored in the point grows by 0.1 m/s per second instead, to test its interpolation.
     fn point(t: f64, from_x_m: f64) -> Point {
         let mut state = State::at_rest(Point3::new(from_x_m + 0.5 * t, 1.0, 2.0), turned(0.2 * t));
         state.velocity_mps = Vec3::new(0.4 + 0.1 * t, 0.0, 0.0);
@@ -245,7 +245,7 @@ mod tests {
     /// Track of three pieces. Two are on the first clock, from 0 s and from 10 s on. The third is on the clock after a
     /// reset, from 1 s on.
     ///
-    /// In the first piece, the relative covariance is known at 0 s and at 2 s.
+    /// For the first piece, the relative covariance is given at 0 s and at 2 s.
     fn track() -> Track {
         let drives =
             [(0, 0.0, vec![0.0, 1.0, 2.0]), (0, 100.0, vec![10.0, 11.0, 14.0]), (1, 200.0, vec![1.0, 2.0])];
@@ -281,7 +281,7 @@ mod tests {
             // In the first piece, the relative variance grows from 0.01 to 0.04 m^2.
             let variance_m2 = 0.01 + 0.015 * t.min(2.0);
             assert!((fix.relative.sd_m(Vec3::zero()) - math::sqrt(variance_m2)).abs() < 1e-9, "{t}");
-            // At the inertial unit's position, the errors of the two visits are independent.
+            // At the inertial unit, the errors of the two visits are independent and equally large.
             let revisit_m = fix.revisit.sd_m(fix.pose.attitude * unit_at());
             assert!((revisit_m - 0.1 * math::sqrt(2.0)).abs() < 1e-9, "{t}: {revisit_m}");
         }
@@ -309,8 +309,8 @@ mod tests {
         assert_eq!((none.pieces(), none.len(), none.is_empty()), (0, 0, true));
     }
 
-    /// A reading over 10 s older than the newest one means that the clock was set back. After it, fixes come from the
-    /// piece of the track on the new clock.
+    /// A reading over 10 s older than the newest one means that the clock was set back. Then fixes come from the piece
+    /// of the track on the new clock.
     #[test]
     fn track_navigation_uses_the_new_piece_after_a_clock_reset() {
         let mut navigation = TrackNavigation::new(track(), [None; MAX_SOURCES]);

@@ -1,8 +1,8 @@
 //! Navigation with two filters. The steps of the second filter are recorded for smoothing.
 //!
-//! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigation filter applies only a share of each
-//! wall correction and so discards some correlation on purpose. A backward pass over the navigation filter's steps
-//! would diverge. So a second filter gets the same readings, applies wall corrections in full and records its steps.
+//! A Rauch-Tung-Striebel smoother is valid only for optimal gains. The navigation filter applies only a share of each
+//! wall correction, and so discards some correlation on purpose. A backward pass over its steps would diverge. So a
+//! second filter gets the same readings, applies wall corrections in full, and records its steps.
 
 use super::journal::Journal;
 use crate::filter::FilterNavigation;
@@ -20,7 +20,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
 
-/// The navigation filter, and a second filter whose steps are recorded for smoothing.
+/// The navigation filter, and a second filter that records its steps for smoothing.
 ///
 /// Fixes and all other outputs are bit-identical to those of the navigation filter alone.
 pub struct TwoFilterNavigation {

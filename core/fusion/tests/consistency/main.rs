@@ -1,10 +1,9 @@
-//! Compares the filter's errors with its standard deviations, in seeded dives with varied motion, sensors, settings
-//! and faults.
+//! Compares the filter's errors with its standard deviations, in dives that are drawn from seeds. Motion, sensors,
+//! settings and faults vary.
 //!
 //!     cargo test --release -p headrace_fusion --test consistency two_thousand -- --ignored --nocapture
 //!
-//! `HEADRACE_DIVES=53..54` selects seeds. With `HEADRACE_TRACE=dive.csv`, the dive of the first selected seed is
-//! written as CSV.
+//! `HEADRACE_DIVES=53..54` selects seeds. `HEADRACE_TRACE=dive.csv` writes the dive of the first selected seed as CSV.
 
 #![expect(
     clippy::unwrap_used,
@@ -20,9 +19,9 @@ use std::ops::Range;
 use tally::{Tally, share};
 use world::{Fault, Log, Motion, Recipe};
 
-/// Seeds of the dives in the test that always runs; the full set has ten times as many seeds.
+/// Seeds of the dives in the test that always runs. The full set has ten times as many.
 const FEW: Range<u64> = 0..200;
-/// Seeds of dives with a velocity log. From seed to seed, the log alternates between no fault and three faults.
+/// Seeds of dives with a velocity log. In turn, the log is sound or has one of three faults.
 const WITH_LOG: Range<u64> = 0..80;
 /// Seeds of dives with a hovering vehicle.
 const HOVERING: Range<u64> = 0..24;
@@ -43,7 +42,7 @@ fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     all
 }
 
-/// Whether a dive has no fault, correctly declared settings, slack of up to 6 cm, and counter steps of 4 mm or more.
+/// Whether a dive has no fault, correctly declared settings, slack of up to 6 cm, and counter steps of at least 4 mm.
 fn is_lively_and_stepped(recipe: &Recipe) -> bool {
     recipe.fault == Fault::None && recipe.is_declared && recipe.slack_m <= 0.06 && recipe.quantum_m >= 0.004
 }
@@ -112,7 +111,7 @@ fn navigation_errors_are_within_5_sd_or_reported() {
         all.iter().filter(|(recipe, tally)| recipe.is_declared == is_declared && tally.silent > 0).count()
     };
     assert_eq!(silent(true), 0, "dives with an unreported error of over 5 sd");
-    // Two dives have an unreported error: one with undeclared slack, and one with a wheel that sticks at 0.05 m/s. See
+    // Two dives have an unreported error. One has undeclared slack; in the other, a wheel sticks at 0.05 m/s. See
     // docs/why/navigation.md, "Seeded dives".
     assert!(silent(false) <= 2, "{}", silent(false));
     let within = |pick: &dyn Fn(&Recipe) -> bool| share(&of(&all, pick), |tally| [tally.within, tally.fixes]);
@@ -122,8 +121,7 @@ fn navigation_errors_are_within_5_sd_or_reported() {
     assert!(unsure <= 0.08, "{unsure}");
 }
 
-/// A velocity log that hangs, is wrong by a fifth or follows drifting silt may make the filter uncertain, but never
-/// wrong.
+/// The log hangs, is wrong by a fifth, or follows drifting silt. The filter may become uncertain, but never wrong.
 #[test]
 fn wrong_velocity_log_causes_no_unreported_error() {
     let all = dives(WITH_LOG, Recipe::with_log);
@@ -137,7 +135,7 @@ fn wrong_velocity_log_causes_no_unreported_error() {
     assert!(unsure < 0.15, "a sound log leaves too many epochs uncertain: {unsure}");
 }
 
-/// A count that stays constant for minutes usually means that the vehicle hovers, not that the wheel is stuck.
+/// If a count stays constant for minutes, the vehicle usually hovers; a stuck wheel is rare.
 #[test]
 fn hovering_vehicle_keeps_a_small_position_uncertainty() {
     let all = dives(HOVERING, Recipe::hovering);

@@ -11,7 +11,7 @@ use headrace_sensor::reading::Reading;
 
 use crate::world::{Dive, Recipe, VELOCITY_LOG, seconds, sensor};
 
-/// Settling times of the estimate, s. Absolute errors are checked after `SETTLED_S`, errors between passes after
+/// Settling times of the estimate, s. Absolute errors are checked after `SETTLED_S`, and errors between passes after
 /// `COMPARED_S`.
 const SETTLED_S: f64 = 10.0;
 const COMPARED_S: f64 = 20.0;
@@ -19,23 +19,24 @@ const COMPARED_S: f64 = 20.0;
 const PASS_S: f64 = 2.2;
 /// Errors of the estimate that exceed this many standard deviations must be reported.
 const FAR_SDS: f64 = 5.0;
-/// Limit for twice the standard deviation between head passes, m; above it, the loop reports a doubtful position.
+/// Largest value of twice the standard deviation between head passes, m. Above it, the loop reports a doubtful
+/// position.
 ///
-/// The limit is a fifth of a coverage target of 1 m.
+/// It is a fifth of a coverage target of 1 m.
 const DOUBTFUL_M: f64 = 0.2;
 
 /// Statistics of the filter's errors in a dive.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tally {
-    /// Numbers of epochs (`epochs`), of epochs with a fix (`fixes`), and of fixes within two standard deviations
-    /// (`within`).
+    /// Number of epochs (`epochs`), of epochs with a fix (`fixes`), and of fixes within two standard deviations of the
+    /// truth (`within`).
     pub(crate) epochs: u64,
     pub(crate) fixes: u64,
     pub(crate) within: u64,
     /// Number of epochs in which the position is doubtful or unknown.
     pub(crate) unsure: u64,
-    /// Number of epochs with an unreported error of over five standard deviations (`silent`), and the time of the first
-    /// such epoch, s.
+    /// Number of epochs with an unreported error of over five standard deviations (`silent`), and time of the first
+    /// one, s.
     pub(crate) silent: u64,
     pub(crate) first_silent_s: Option<f64>,
     /// Largest chainage errors, in standard deviations: absolute (`worst`), and between head passes (`worst_pass`).
@@ -60,7 +61,7 @@ pub(crate) fn run(recipe: Recipe, mut trace: Option<&mut String>) -> Tally {
     let dive = Dive::new(recipe);
     let mut nav = FilterNavigation::new(dive.profile.clone(), dive.site, recipe.settings());
     let (mut tally, mut last, mut errors) = (Tally::default(), None, VecDeque::new());
-    // As in the loop, repeated readings of a stuck inertial unit or velocity log are withheld from the filter.
+    // As in the loop, the filter does not get the repeated readings of a stuck inertial unit or velocity log.
     let mut stuck = [(StuckSensor::default(), false); VELOCITY_LOG + 1];
     for (valid, source, reading) in dive.events() {
         let (stuck, hangs) = &mut stuck[source];

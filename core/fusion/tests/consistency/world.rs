@@ -1,7 +1,6 @@
 //! Dives drawn from seeds: a true motion, and readings of sensors with known errors.
 //!
-//! This module shares no code with the simulator. With the filter, this module shares only the wall, the site and the
-//! units.
+//! This module shares no code with the simulator. With the filter, it shares only the wall, the site and the units.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -38,7 +37,7 @@ pub(crate) enum Motion {
     BackAndForth,
 }
 
-/// Fault of a dive: the sensor that hangs, sticks or is silent for a while.
+/// Fault of a dive: a sensor that hangs, sticks or is silent for a while.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,
@@ -183,8 +182,8 @@ impl Recipe {
         }
     }
 
-    /// Returns the dive parameters for a seed, with a velocity log. From seed to seed, the log alternates between no
-    /// fault and three faults.
+    /// Returns the dive parameters for a seed, with a velocity log. In turn, the log is sound or has one of three
+    /// faults.
     pub(crate) fn with_log(seed: u64) -> Self {
         Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
@@ -232,8 +231,8 @@ impl Recipe {
     }
 }
 
-/// Function that adds the readings of a source. Inputs: period and phase, s; number of the source; its reading at a
-/// time in s.
+/// Function that adds the readings of a source. Its inputs are period and phase, s; source number; and a function that
+/// returns the reading at a time, s.
 type Every<'a> = dyn FnMut(f64, f64, usize, &mut dyn FnMut(f64) -> Option<Reading>) + 'a;
 
 /// A sum of sine functions of time, each with amplitude, angular frequency and phase.
@@ -445,7 +444,7 @@ impl Dive {
         }
         let payout_m = self.chainage_m(t) + value(&self.slack, t);
         let (stuck_m, lost_m) = stuck.get();
-        // Once a stuck wheel is free again, it does not count the distance that it has missed.
+        // A stuck wheel that is free again does not count the distance that it has missed.
         let shown_m = if self.is_faulty(t, Fault::CableSticks) {
             stuck.set((stuck_m, payout_m - stuck_m));
             stuck_m

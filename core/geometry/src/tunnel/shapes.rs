@@ -29,9 +29,10 @@ pub fn circle(radius_m: f64) -> Result<Profile, ProfileError> {
     Profile::new([0.0, 0.0], &[Piece::Arc { centre, sweep_rad: TAU }], centre)
 }
 
-/// Vertical walls under an arc of radius `arch_radius_m` >= width / 2, as in Jorge et al. 2021, Fig. 2.
+/// A tunnel of vertical walls under an arc, as in Jorge et al. 2021, Fig. 2.
 ///
-/// `height_m` is the height of the crown. The reference point is at half height.
+/// The arc's radius `arch_radius_m` is at least half the width. `height_m` is the height of the crown. The reference
+/// point is at half height.
 ///
 /// Errors: dimensions that give no valid profile.
 pub fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Profile, ProfileError> {
@@ -48,9 +49,9 @@ pub fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Profile, 
     Profile::new([0.0, 0.0], &pieces, [0.0, height_m / 2.0])
 }
 
-/// A circle with its lower part cut off by a flat floor of width `base_m`.
+/// A circle whose lower part is cut off by a flat floor of width `base_m`.
 ///
-/// The reference point is the circle's centre, above the floor.
+/// The reference point is the circle's centre, which is above the floor.
 ///
 /// Errors: dimensions that give no valid profile.
 pub fn trimmed_circle(radius_m: f64, base_m: f64) -> Result<Profile, ProfileError> {

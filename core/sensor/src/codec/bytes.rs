@@ -1,6 +1,6 @@
 //! A byte string of bounded length without heap allocation.
 
-/// Up to `N` bytes. Unused bytes are zero, so that equal byte strings compare as equal.
+/// Up to `N` bytes. Unused bytes are zero, so that byte strings with equal contents compare as equal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Bytes<const N: usize> {
     bytes: [u8; N],
@@ -11,7 +11,7 @@ pub struct Bytes<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("storing {len} bytes; at most {max} are allowed")]
 pub struct TooLong {
-    /// Number of bytes that the contents would need.
+    /// Number of bytes that were to be stored.
     pub len: usize,
     /// Capacity of the byte string, bytes.
     pub max: usize,
@@ -35,7 +35,7 @@ impl<const N: usize> Bytes<N> {
 
     /// Appends `bytes`.
     ///
-    /// Errors: the bytes do not fit. In this case nothing is appended.
+    /// Errors: the bytes do not fit; then nothing is appended.
     pub fn extend(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
         let len = self.len + bytes.len();
         let free = self.bytes.get_mut(self.len..len).ok_or(TooLong { len, max: N })?;

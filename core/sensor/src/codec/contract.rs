@@ -1,4 +1,4 @@
-//! The contract of all codecs, as a macro that generates tests of one codec.
+//! The contract of all codecs, as a macro that generates the tests of one codec.
 //!
 //! Enable the feature `contract` in a plugin's dev-dependencies and call [`codec_contract!`](crate::codec_contract)
 //! once per codec.
@@ -12,9 +12,8 @@ const SEED: u64 = 881;
 
 /// Proptest configuration of the contract's tests, which draw the same values on every run.
 ///
-/// Garbage sometimes passes a weak checksum by chance, and the test then fails although the codec is correct. With a
-/// fixed seed, such a failure occurs on every run or never, and is reproducible without a regression file. Set
-/// `PROPTEST_RNG_SEED` to try other values.
+/// Garbage may pass a weak checksum by chance, and then the test fails although the codec is correct. With a fixed
+/// seed, such a failure occurs on every run or never. Set `PROPTEST_RNG_SEED` to try other values.
 pub fn config() -> Config {
     let from_environment = Config::default();
     let rng_seed = match from_environment.rng_seed {
@@ -24,8 +23,8 @@ pub fn config() -> Config {
     Config { rng_seed, failure_persistence: None, ..from_environment }
 }
 
-/// Decodes `bytes`, pushed into the codec in pieces of the given lengths, without a flush. The last piece contains
-/// the remaining bytes.
+/// Decodes `bytes`, pushed into the codec in pieces of the given lengths, without a flush. The last piece contains the
+/// bytes that remain.
 pub fn decode_pieces<C: Codec>(codec: &mut C, bytes: &[u8], pieces: &[usize]) -> Vec<C::Value> {
     let mut values = Vec::new();
     let mut rest = bytes;
@@ -40,14 +39,14 @@ pub fn decode_pieces<C: Codec>(codec: &mut C, bytes: &[u8], pieces: &[usize]) ->
     values
 }
 
-/// Decodes `bytes`, pushed into the codec in one piece, and then flushes the codec.
+/// Decodes `bytes`, pushed into the codec in one piece, and flushes the codec.
 pub fn decode_all<C: Codec>(codec: &mut C, bytes: &[u8]) -> Vec<C::Value> {
     let mut values = decode_pieces(codec, bytes, &[]);
     codec.flush(&mut |value| values.push(value));
     values
 }
 
-/// Decodes garbage followed by a good frame; that frame's value must be the last one decoded.
+/// Decodes garbage followed by a good frame. A correct codec decodes that frame's value last.
 pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8]) -> Vec<C::Value> {
     let mut values = Vec::new();
     codec.push(garbage, &mut |value| values.push(value));
@@ -66,7 +65,7 @@ fn is_one_frame<C: Codec>(codec: &mut C, bytes: &[u8]) -> bool {
     values.len() == 1 && counts.bad_frames == 0 && counts.skipped_bytes == 0
 }
 
-/// Sets the two bytes from index `at` on so that `bytes` decodes as one frame. Returns `false` if no values do this.
+/// Sets two bytes, from index `at` on, so that `bytes` decodes as one frame. Returns `false` if no values do this.
 fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) -> bool {
     let Some(before) = bytes.get(at..at + 2).map(<[u8]>::to_vec) else { return false };
     if bytes.len() > MOST_MATCHED {
@@ -82,9 +81,9 @@ fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) ->
     false
 }
 
-/// Positions in a frame to corrupt, each with the mask that is XORed into the byte; the same on every run.
+/// Positions in a frame to corrupt, each with the mask to XOR into the byte. They are the same on every run.
 ///
-/// The mask 1 turns a digit into another digit in most cases.
+/// Every second mask is 1, which turns most digits into other digits.
 fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     const TURNS: [u8; 6] = [0x5B, 0x80, 0x24, 0xFF, 0x11, 0xC2];
     (0..12_usize).map(move |k| {
@@ -92,7 +91,8 @@ fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     })
 }
 
-/// Longest frame for which all values of two bytes are tried, because this takes long. Longer frames have no checksum.
+/// Longest frame for which all values of two bytes are tried, because this takes long. Frames that are longer have no
+/// checksum.
 const MOST_MATCHED: usize = 100;
 
 /// Returns corrupted frames that decode as good frames by chance.
@@ -113,7 +113,7 @@ pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<V
     wrong.collect()
 }
 
-/// Returns truncated frames that decode as one frame together with the first bytes of the next good frame.
+/// Returns truncated frames. Each of them decodes as one frame together with the first bytes of the next good frame.
 pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let len = frame.len();
     let cut = (2..len).rev().step_by(len.div_ceil(6)).filter_map(|keep| {
@@ -130,11 +130,11 @@ pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> V
 /// - `encode` is a function from `&Value` to its bytes.
 /// - `frames` are one or more good frames as the device sends them.
 ///
-/// On a byte stream, only the protocol's framing distinguishes a frame from garbage. If the last bytes of the
-/// garbage and the first bytes of the frame form a valid frame, every decoder loses the real frame. The macro's
-/// garbage is random, so the protocol determines the probability of such a match. All values come from one fixed
-/// seed (see [`contract::config`](crate::codec::contract::config)). A chance match therefore appears only after a
-/// test or strategy has changed, and then on every run.
+/// On a byte stream, only the protocol's framing distinguishes a frame from garbage. If the last bytes of garbage and
+/// the first bytes of a frame form a valid frame, every decoder loses the real frame. The tests draw random garbage, so
+/// the protocol determines how likely this is. All values come from one fixed seed (see
+/// [`contract::config`](crate::codec::contract::config)). So such a match appears only after a test or strategy has
+/// changed, and then on every run.
 #[macro_export]
 macro_rules! codec_contract {
     ($module:ident, codec: $codec:expr, values: $values:expr, encode: $encode:expr, frames: $frames:expr $(,)?) => {
@@ -224,7 +224,7 @@ macro_rules! codec_contract {
                 }
             }
 
-            /// A corrupted frame with a matching checksum decodes to a value, and no later frame is lost.
+            /// A corrupted frame with a matching checksum decodes to a value, but hides no frame after it.
             #[test]
             fn corrupted_frame_with_matching_checksum_hides_no_other_frame() {
                 let mut tried = 0;

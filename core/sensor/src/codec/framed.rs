@@ -1,4 +1,4 @@
-//! Search for frames in received bytes, shared by all codecs. The bytes of a failed candidate are searched again.
+//! Search for frames in received bytes, shared by all codecs. If a candidate fails, its bytes are searched again.
 
 use super::interface::{Codec, CodecCounts};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -8,7 +8,7 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 pub enum Verdict {
     /// No frame begins at this byte.
     NotAStart,
-    /// A frame may begin here; deciding this needs at least this many bytes in total.
+    /// A frame may begin here. At least this many bytes in total are needed to decide.
     Need(usize),
     /// A complete frame of this many bytes begins here.
     Frame(usize),
@@ -17,7 +17,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict on a frame candidate of `len` bytes; `is_good` checks the candidate once it is complete.
+    /// Returns the verdict on a frame candidate of `len` bytes. `is_good` checks the candidate once it is complete.
     pub fn on(front: &[u8], len: usize, is_good: impl FnOnce(&[u8]) -> bool) -> Self {
         match front.get(..len) {
             None => Self::Need(len),
@@ -35,20 +35,19 @@ pub trait Framing: Copy {
     /// Whether the transport delivers whole messages; see [`Codec::WHOLE_MESSAGES`].
     const WHOLE_MESSAGES: bool = false;
 
-    /// Returns the verdict on a frame at the start of `front`, which has at least one byte. The verdict depends on
-    /// `front` alone.
+    /// Returns the verdict on a frame at the start of `front`, which has at least one byte. It depends only on `front`.
     fn judge(&self, front: &[u8]) -> Verdict;
 
     /// Returns the value of a frame accepted by [`Framing::judge`]; `None` if the frame carries nothing useful.
     fn read(&self, frame: &[u8]) -> Option<Self::Value>;
 }
 
-/// Codec of a [`Framing`]: keeps an incomplete frame between pushes and finds frames in arbitrary input.
+/// Codec of a [`Framing`]. It keeps an incomplete frame between pushes, and finds frames in arbitrary input.
 ///
 /// `N` is the maximum frame length; a candidate that needs more bytes is bad. On a byte stream, scanning resumes at the
-/// second byte of a failed candidate, so that a real frame inside the candidate is found. A byte that starts no frame
-/// is skipped, and does not count as a bad frame. If a whole message has a byte outside its frames, all bytes from
-/// there to the message's end count as one bad frame. Apparent frames among these bytes are ignored.
+/// second byte of a failed candidate, so that a real frame inside it is found. A byte that starts no frame is skipped,
+/// and does not count as a bad frame. If a whole message has a byte outside its frames, all bytes from there to the
+/// message's end count as one bad frame, and apparent frames among them are ignored.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]
@@ -81,7 +80,7 @@ impl<F, const N: usize> Framed<F, N> {
     }
 }
 
-/// Saves the codec's incomplete frame and its counters.
+/// Saves and restores the codec's incomplete frame and its counters.
 impl<F, const N: usize> Stateful for Framed<F, N> {
     fn save(&self, to: &mut Saver) {
         to.value(&(self.astray, self.counts));
@@ -103,7 +102,7 @@ impl<F, const N: usize> Stateful for Framed<F, N> {
 impl<F: Framing, const N: usize> Framed<F, N> {
     /// Like [`Codec::push`], but passes the bytes of each frame to `take`.
     ///
-    /// The second argument of `take` is the number of bytes from the frame's start to the last received byte.
+    /// The second argument of `take` counts the bytes from the frame's start to the last received byte.
     pub fn push_frames(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[u8], usize)) {
         while !bytes.is_empty() && !self.astray {
             let (now, later) = bytes.split_at(bytes.len().min(N - self.len));
@@ -123,12 +122,12 @@ impl<F: Framing, const N: usize> Framed<F, N> {
         self.astray = false;
     }
 
-    /// Handles a silence of the device before the bytes `next` are pushed. Drops held bytes only if they are provably
-    /// no frame.
+    /// Handles a silence of the device that ends with the bytes `next`, which are not pushed yet. Drops held bytes only
+    /// if they are provably no frame.
     ///
     /// The proof is a whole frame inside the held bytes or at the start of `next`. Without it, the held bytes are kept
     /// for any time, because a frame on a slow line looks the same as a false start. Frames go to `take` as in
-    /// [`Framed::push_frames`]. In message mode, the message ends with the silence.
+    /// [`Framed::push_frames`]. If the transport delivers whole messages, the message ends with the silence.
     pub fn settle_frames(&mut self, next: &[u8], mut take: impl FnMut(&[u8], usize)) {
         if F::WHOLE_MESSAGES || self.is_whole_frame(next) {
             return self.flush_frames(take);
@@ -255,7 +254,7 @@ pub(super) mod tests {
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut behind = Vec::new();
         codec.push_frames(&[0, 0xA5, 5, 0xA5], |_, back| behind.push(back));
-        // The codec holds a false start marker and the first byte of a frame, and the next push exceeds the buffer.
+        // The codec holds a false start marker and the first byte of a frame. The next push exceeds its buffer.
         codec.push_frames(&[1, 7, 0x5A, 0, 0, 0xA5, 0, 0x5A, 0], |_, back| behind.push(back));
         assert_eq!(behind, [10, 4]);
     }

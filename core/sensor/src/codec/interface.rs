@@ -2,13 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Counters of a codec. Every pushed byte belongs to a good frame, counts in `skipped_bytes`, or is still held.
+/// Counters of a codec. Each pushed byte belongs to a good frame, counts as skipped, or is still held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CodecCounts {
     /// Number of complete, valid frames.
     pub good_frames: u64,
-    /// Number of frame candidates that begin with a start marker, but have a wrong checksum, terminator, length or
-    /// value.
+    /// Number of frame candidates with a start marker, but a wrong checksum, terminator, length or value.
     pub bad_frames: u64,
     /// Number of bytes that belong to no good frame.
     pub skipped_bytes: u64,
@@ -16,7 +15,7 @@ pub struct CodecCounts {
 
 /// Converts bytes to values and back, without I/O.
 ///
-/// The module `contract` checks every implementation against this contract:
+/// The module `contract` tests that every codec keeps this contract:
 /// - No input panics.
 /// - The same bytes split anywhere give the same values.
 /// - A good frame after garbage is found.
@@ -26,7 +25,7 @@ pub trait Codec {
     /// Value of one frame, in the protocol's units.
     type Value: Clone + PartialEq + core::fmt::Debug;
 
-    /// Maximum frame length; also the maximum number of bytes held between two pushes.
+    /// Maximum length of a frame, and maximum number of bytes held between two pushes.
     const MAX_FRAME_BYTES: usize;
 
     /// Whether the transport delivers whole messages (CAN frames, HID reports, I2C transactions).
@@ -48,6 +47,6 @@ pub trait Codec {
     /// Counters of frames and bytes so far.
     fn counts(&self) -> CodecCounts;
 
-    /// Number of bytes held because they may begin an incomplete frame.
+    /// Number of held bytes. They may begin a frame that is still incomplete.
     fn held_bytes(&self) -> usize;
 }

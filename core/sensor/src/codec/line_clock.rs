@@ -7,14 +7,14 @@ use super::interface::Codec as _;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of packets tracked by a [`LineClock`]. It suffices for 1 kB from a port that delivers 32 bytes at a time.
+/// Number of packets that a [`LineClock`] tracks: enough for 1 kB from a port that delivers 32 bytes at a time.
 const MAX_PARTS: usize = 32;
 
 /// Stamps each frame of a byte stream with the receive time of the packet that contained its first byte.
 ///
-/// A frame may begin in one packet and end in a much later packet. If the bytes of an incomplete frame come from more
-/// than `MAX_PARTS` packets, the packets just before the newest one are merged. If the incomplete frame was a false
-/// start, a real frame that begins in a merged packet is stamped too early.
+/// A frame may begin in one packet and end in a much later one. If the bytes of an incomplete frame come from more than
+/// `MAX_PARTS` packets, the packets just before the newest one are merged. If that incomplete frame then proves to be a
+/// false start, a real frame that begins in a merged packet is stamped too early.
 ///
 /// Allocates: never.
 #[derive(Debug, Clone)]
@@ -35,15 +35,15 @@ struct Part {
 stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
 
 impl LineClock {
-    /// Creates a clock; `silence` is the longest usual gap within a frame.
+    /// Creates a clock. `silence` is the longest usual gap within a frame.
     ///
-    /// After a longer gap between two packets, the clock checks for a false start of a frame that delays real frames
+    /// After a longer gap between two packets, the clock checks whether a false start of a frame holds back real frames
     /// ([`Framed::settle_frames`]).
     pub fn new(silence: DurNs) -> Self {
         Self { silence, last: MonoNs(0), parts: [Part::default(); MAX_PARTS], len: 0 }
     }
 
-    /// Pushes a packet's bytes into `codec`; `take` receives each complete frame with its receive time.
+    /// Pushes a packet's bytes into `codec`. `take` receives each complete frame with its receive time.
     pub fn push<F: Framing, const N: usize>(
         &mut self,
         codec: &mut Framed<F, N>,
@@ -86,7 +86,7 @@ impl LineClock {
         self.parts().iter().rev().find(holds).map_or(self.last, |part| part.received)
     }
 
-    /// Drops the records of packets that contain none of the last `held` bytes of the input.
+    /// Drops the records of packets that contain none of the input's last `held` bytes.
     fn keep(&mut self, held: usize) {
         let mut after = 0;
         let needed = self.parts().iter().rev().take_while(|part| {

@@ -1,8 +1,7 @@
-//! Codecs between a device's bytes and its values, without I/O, and the contract that every codec is tested
-//! against.
+//! Codecs, which convert between a device's bytes and its values, and the contract against which each codec is tested.
 //!
-//! A codec is a pure state machine. It takes bytes in pieces of any size and emits values. It reads no clock, does
-//! no I/O, and holds at most one frame of bytes. Ports are a separate layer.
+//! A codec is a pure state machine without I/O. It takes bytes in pieces of any size and emits values. It reads no
+//! clock, and holds at most one frame of bytes. Ports are a separate layer.
 
 mod bytes;
 #[cfg(feature = "contract")]

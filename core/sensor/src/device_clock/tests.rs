@@ -1,4 +1,4 @@
-//! Tests with simulated clocks of known drift, whose stamps have non-negative delays.
+//! Tests with simulated clocks of known drift. Their stamps have non-negative delays.
 
 use proptest::prelude::*;
 
@@ -21,7 +21,7 @@ impl Random {
     }
 }
 
-/// A simulated device that sends its clock's time every `period_ns`; the clock has a rate error of `ppm`.
+/// A simulated device that sends its clock's time every `period_ns`. The clock has a rate error of `ppm`.
 struct Device {
     bits: u32,
     tick: i64,
@@ -44,7 +44,7 @@ impl Device {
         self.first_ticks.wrapping_add(elapsed) & mask
     }
 
-    /// Sends stamps from `from_s` to `to_s`; returns the last device time, in which wraps are undone.
+    /// Sends stamps from `from_s` to `to_s`. Returns the device time of the last one, without wraps.
     #[expect(clippy::cast_possible_truncation, reason = "positive and below 2^63")]
     fn send(&self, clock: &mut DeviceClock, random: &mut Random, from_s: f64, to_s: f64) -> DurNs {
         let mut at = from_s * 1e9;
@@ -91,8 +91,7 @@ fn clock_drift_error_agrees_with_its_standard_deviation() {
         assert_eq!((report.restarts, report.jumps), (0, 0), "seed {seed}");
         let error = (drift.ppm - ppm) / drift.sd_ppm;
         assert!(error.abs() < 5.0, "seed {seed}: {drift:?} of {ppm}");
-        // The drift's standard deviation must be small: a few ppm after a minute or two, and a fraction of a ppm
-        // later.
+        // The drift's standard deviation must be small: at most 300 ppm divided by the duration in seconds.
         assert!(drift.sd_ppm < 300.0 / seconds, "seed {seed}, {seconds} s: {drift:?}");
         within_two += u32::from(error.abs() < 2.0);
         squares += error * error;
@@ -116,7 +115,8 @@ fn device_clock_ticks_over_10_h_are_unwrapped_exactly() {
     let drift = report.drift.unwrap();
     println!("ten hours: {drift:?}");
     assert!((drift.ppm - 20.0).abs() < 0.01 && drift.sd_ppm < 0.01, "{drift:?}");
-    // The estimated offset is the minimum delay of 300 us. Queues of 5 ms disturb it by less than 50 us.
+    // The estimated earliest receive time includes the minimum delay of 300 us. Queues of 5 ms disturb it by less than
+    // 50 us.
     let earliest = clock.earliest(total).unwrap();
     let least = MonoNs(5 * S + 35_999_900_000_000 + 300_000);
     let off = earliest.since(least).0.abs();
@@ -147,8 +147,7 @@ fn clock_restart_begins_an_epoch_but_keeps_the_drift() {
     let mut random = Random(4);
     device.send(&mut clock, &mut random, 0.0, 900.0);
     let before = clock.report();
-    // The device is off for eight seconds. Then the ticks of its clock restart from zero, 908 s after the first
-    // start.
+    // The device is off for eight seconds. Then its ticks restart from zero, 908 s after the first start.
     let mut last = DurNs::ZERO;
     for i in 0..300_u64 {
         last = clock.take(i * 100, MonoNs((5 + 908) * S + i * S / 100));
@@ -161,7 +160,7 @@ fn clock_restart_begins_an_epoch_but_keeps_the_drift() {
 
 #[test]
 fn clock_restart_that_looks_like_a_delay_is_recognised() {
-    // The clock shows 4.9 s at 4.9 s. After a restart, the clock shows 6 s at 13 s. So it is 7 s behind, but its time
+    // At 4.9 s, the clock shows 4.9 s. After a restart, it shows 6 s at 13 s. So it is 7 s behind, although its time
     // has never gone back.
     let mut clock = DeviceClock::new(32, DurNs(1000));
     let mut take = |device_ms: u64, ours_ms: u64| clock.take(device_ms * 1000, MonoNs(ours_ms * 1_000_000));
@@ -178,8 +177,8 @@ fn clock_restart_that_looks_like_a_delay_is_recognised() {
 
 #[test]
 fn clock_jump_ahead_by_1_h_begins_an_epoch() {
-    // To a clock that wraps every 71.6 minutes, a jump ahead by an hour looks like a jump back by 11.6 minutes. It
-    // therefore counts as a restart.
+    // The second clock wraps every 71.6 minutes. For it, a jump ahead by an hour looks like a jump back by 11.6
+    // minutes, so it counts as a restart.
     for (device, epochs) in [(xsens(30.0), (0, 1)), (sbg(30.0), (1, 0))] {
         let mut clock = device.clock();
         let mut random = Random(5);
@@ -202,7 +201,7 @@ fn burst_of_stamps_after_silence_counts_as_neither_restart_nor_drift() {
     let mut clock = device.clock();
     let mut random = Random(6);
     device.send(&mut clock, &mut random, 0.0, 200.0);
-    // All stamps from a period of four seconds arrive at once, at its end.
+    // The stamps of four seconds all arrive at once, at the end of this time.
     for i in 0..200_u32 {
         let at_s = 200.0 + f64::from(i) * 0.02;
         clock.take(device.ticks(at_s * 1e9), MonoNs(5 * S + 204 * S));
@@ -230,7 +229,7 @@ fn burst_of_stamps_at_start_counts_as_neither_restart_nor_drift() {
 
 #[test]
 fn wrong_clock_tick_length_shows_as_restarts_or_jumps() {
-    // If ticks of 100 us are configured as 1 us, the clock looks slow; in the reverse case it looks fast.
+    // If the real ticks are 100 us but 1 us is configured, the clock looks slow. In the reverse case, it looks fast.
     for (real, taken) in [(100_000, 1000), (1000, 100_000)] {
         let device = Device { tick: real, ..xsens(0.0) };
         let mut clock = DeviceClock::new(32, DurNs(taken));

@@ -1,28 +1,28 @@
 //! Splits a device's byte stream into frames.
 //!
-//! Thus each log message contains one frame, stamped with the receive time of its first byte.
+//! Each log message then contains one frame, stamped with the receive time of its first byte.
 
 use std::collections::VecDeque;
 
 use crate::codec::{Codec as _, CodecCounts, Framed, Framing};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Splits a byte stream that arrives in arbitrary parts into frames, and also passes on the bytes between frames.
+/// Splits a byte stream that arrives in arbitrary parts into frames. The bytes between frames are passed on too.
 ///
-/// No byte is dropped or reordered: the concatenated pieces equal the input. The frames are the same however the stream
-/// is split and whenever its parts arrive. Each frame has the receive time of the part that contains its first byte.
-/// The frame's last byte may arrive much later, for instance through a bridge that sends blocks.
+/// No byte is dropped or reordered: the concatenated pieces equal the input. The frames do not depend on how the stream
+/// is split and when its parts arrive. A frame has the receive time of the part that contains its first byte. Its last
+/// byte may arrive much later, for instance through a bridge that sends blocks.
 #[derive(Debug, Clone)]
 pub struct Cutter<F, const N: usize> {
     codec: Framed<F, N>,
     silence: DurNs,
-    /// Receive time of the last received bytes.
+    /// Receive time of the latest bytes.
     last: MonoNs,
-    /// Whether the silence since the last received bytes has been handled.
+    /// Whether the silence since the latest bytes has been handled.
     settled: bool,
     /// Bytes that have not been passed on yet.
     pending: Vec<u8>,
-    /// Receive time and byte count of each part of the pending bytes, oldest first.
+    /// Receive time and byte count of each received part of the pending bytes, oldest first.
     parts: VecDeque<(MonoNs, usize)>,
 }
 
@@ -38,9 +38,9 @@ pub struct Piece<'a> {
 }
 
 impl<F: Framing, const N: usize> Cutter<F, N> {
-    /// Creates a cutter; `silence` is the longest usual gap within a frame.
+    /// Creates a cutter. `silence` is the longest usual gap within a frame.
     ///
-    /// After a longer gap, the cutter checks for a false start of a frame that delays real frames
+    /// After a longer gap, the cutter checks whether a false start of a frame holds back real frames
     /// ([`Framed::settle_frames`]).
     pub fn new(framing: F, silence: DurNs) -> Self {
         let (pending, parts) = (Vec::with_capacity(2 * N), VecDeque::new());
@@ -66,23 +66,22 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Gives up an incomplete frame, and passes on all pending bytes, because the line was closed.
+    /// Handles the closing of the line. Gives up an incomplete frame, and passes on all pending bytes.
     pub fn flush(&mut self, take: &mut dyn FnMut(Piece<'_>)) {
         let mut found = Vec::new();
         self.codec.flush_frames(|frame, behind| found.push((behind, frame.len())));
         self.hand_on(&found, take);
     }
 
-    /// Returns the time at which to push an empty slice. After this push, an incomplete frame no longer holds back
-    /// other frames.
+    /// Returns the time at which to push an empty slice. Then an incomplete frame no longer holds back other frames.
     ///
     /// `None` if no bytes are pending, or if the silence has been handled.
     pub fn settles(&self) -> Option<MonoNs> {
         (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }
 
-    /// Whether these bytes alone contain a complete frame of this device; `one_of_its` tells whether a frame is the
-    /// device's.
+    /// Whether these bytes alone contain a complete frame of this device. `one_of_its` returns whether a frame is one
+    /// of the device's.
     pub fn accepts(&self, bytes: &[u8], one_of_its: impl Fn(&[u8]) -> bool) -> bool {
         let (mut codec, mut found) = (Framed::<F, N>::new(*self.codec.framing()), false);
         codec.push_frames(bytes, |frame, _| found |= one_of_its(frame));
@@ -95,9 +94,10 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.codec.counts()
     }
 
-    /// Passes on all pending bytes except those held by the codec.
+    /// Passes on all pending bytes except those that the codec holds.
     ///
-    /// For each frame, `found` contains the number of bytes from its start to the end of the input, and its length.
+    /// For each frame, `found` contains the number of bytes from the frame's start to the end of the input, and the
+    /// frame's length.
     fn hand_on(&mut self, found: &[(usize, usize)], take: &mut dyn FnMut(Piece<'_>)) {
         let total = self.pending.len();
         let mut handed = 0;
@@ -210,7 +210,7 @@ mod tests {
         let expected: Pieces = vec![(1, vec![0xA5, 1, 9, 0x5A], true), (67, vec![0xA5, 1, 8, 0x5A], true)];
         let mut cutter = cutter();
         assert_eq!(pushed(&mut cutter, &parts), expected);
-        // A pending start of a frame does not wake the driver again and again.
+        // A pending start of a frame wakes the driver only once.
         assert!(pushed(&mut cutter, &[(133 + 52, &[])]).is_empty());
         assert_eq!(cutter.settles(), None);
     }
@@ -231,8 +231,8 @@ mod tests {
     }
 
     proptest! {
-        /// For any split of the input, the cutter passes on all bytes in order, and times never decrease. The
-        /// frames equal those that the codec alone finds.
+        /// However the input is split, the cutter passes on all bytes in order, and times never decrease. The frames
+        /// equal those that the codec alone finds.
         #[test]
         fn pieces_concatenate_to_the_input_for_any_split_of_the_byte_stream(
             bytes in proptest::collection::vec(prop_oneof![Just(0xA5u8), Just(0x5A), 0u8..7], 0..200),

@@ -5,7 +5,7 @@ use super::interface::{DeviceHealth, Driver, Wire};
 use crate::codec::Framing;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Driver that only listens to a device's byte stream, and delivers the whole stream frame by frame.
+/// Driver that only listens to a device's byte stream. It delivers the whole stream, frame by frame.
 pub struct Listener<F, const N: usize> {
     cutter: Cutter<F, N>,
     silence_timeout: DurNs,
@@ -56,7 +56,7 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
 /// Function that returns the fault of a message; `None` for a good message of the device.
 pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
 
-/// Driver that only listens to a device's whole messages, and delivers each message.
+/// Driver that only listens to a device on a carrier of whole messages. It delivers every message.
 pub struct MessageListener {
     judge: Judge,
     silence_timeout: DurNs,
@@ -67,7 +67,7 @@ pub struct MessageListener {
 impl MessageListener {
     /// Creates a listener.
     ///
-    /// `judge` finds faulty messages and messages of other devices. `silence_timeout` is the longest gap between
+    /// `judge` recognises faulty messages and messages of other devices. `silence_timeout` is the longest gap between
     /// messages of a healthy device.
     pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
         Self { judge, silence_timeout, good_frames: 0, complaint: None }

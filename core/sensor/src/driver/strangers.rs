@@ -3,7 +3,7 @@
 /// Maximum number of senders that are listed by name.
 const NAMED: usize = 4;
 
-/// Names of the ignored senders, and the number of their messages; uses bounded memory for any input.
+/// Names of the ignored senders, and number of their messages. The memory is bounded for any input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct IgnoredSenders {
     messages: u64,
@@ -12,7 +12,7 @@ pub struct IgnoredSenders {
 }
 
 impl IgnoredSenders {
-    /// Counts messages of one sender; returns true if the call adds a name to the list.
+    /// Counts messages of one sender. Returns true if its name is new and has been added to the list.
     pub fn note(&mut self, messages: u64, who: &str) -> bool {
         self.messages = self.messages.saturating_add(messages);
         if self.who.iter().any(|known| known == who) {
@@ -31,8 +31,7 @@ impl IgnoredSenders {
         self.messages
     }
 
-    /// Describes the ignored senders; `None` if there are none. The text depends on the names, not on the number of
-    /// messages.
+    /// Describes the ignored senders; `None` if there are none. The text depends only on their names.
     pub fn words(&self) -> Option<String> {
         let more = if self.more { " and others" } else { "" };
         (!self.who.is_empty()).then(|| format!("ignored: {}{more}", self.who.join(", ")))

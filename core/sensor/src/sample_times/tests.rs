@@ -3,7 +3,7 @@ use headrace_geometry::frames::Vec3;
 
 const PERIOD: DurNs = DurNs(2_500_000);
 const TICK: DurNs = DurNs(100_000);
-/// Number of samples after which a device is known to send its stamp before the readings of a sample.
+/// Number of samples after which a device is known to send each sample's stamp before its readings.
 const FIRST: i64 = 30;
 
 fn force() -> Reading {
@@ -14,8 +14,7 @@ fn rate() -> Reading {
     Reading::AngularRate(Vec3::zero())
 }
 
-/// Returns the true and the corrected times of samples. The samples are taken every 2.5 ms and arrive with these
-/// delays.
+/// Returns the true and the corrected times of samples that are taken every 2.5 ms and arrive with these delays.
 fn times(delays_ns: &[i64], ticks_of: impl Fn(i64) -> i64) -> Vec<(MonoNs, MonoNs)> {
     let mut times = SampleTimes::new(32, TICK);
     let of = |(k, delay_ns): (i64, &i64)| {
@@ -47,7 +46,7 @@ fn worst_ns(times: &[(MonoNs, MonoNs)]) -> i64 {
 
 #[test]
 fn samples_of_a_burst_are_separated() {
-    // Of every forty samples, the first arrives 25 ms late, and the next nine arrive at the same time as the first.
+    // The first of every forty samples arrives 25 ms late, together with the nine samples after it.
     let burst = |k: i64| if k % 40 < 10 { (10 - k % 40) * PERIOD.0 } else { 0 };
     let delays: Vec<i64> = (20..20_020).map(burst).collect();
     let off = worst_ns(&times(&delays, in_step));
@@ -89,8 +88,8 @@ fn clock_stop_changes_at_most_60_sample_times() {
     assert!(again.iter().all(|(made, at)| made == at));
 }
 
-/// Returns the corrected times of samples taken every 10 ms, whose stamp arrives before or after their turn rate and
-/// force.
+/// Returns the corrected times of samples taken every 10 ms. The stamp of a sample arrives before or after its turn
+/// rate and force.
 fn stamped(times: &mut SampleTimes, count: u64, is_first: bool) -> Vec<MonoNs> {
     let mut got = Vec::new();
     for k in 0..count {

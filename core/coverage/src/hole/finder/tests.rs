@@ -27,11 +27,10 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Diameter of the largest hole, from all places where the distance to the samples may be largest, without any code of
-/// the search under test.
+/// Diameter of the largest hole by brute force, without any code of the search under test.
 ///
-/// These places are the circumcentres of three samples (or of their images), and points on the section's two ends that
-/// are equidistant from two samples.
+/// The distance to the samples is largest at the circumcentre of three samples (or of their images), or at a point on
+/// one of the section's two ends that is equidistant from two samples. All of these places are tried.
 fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
     let images: Vec<(f64, f64)> =
         samples.iter().flat_map(|s| [-perimeter_m, 0.0, perimeter_m].map(|turn| (s.0, s.1 + turn))).collect();
@@ -99,11 +98,10 @@ proptest! {
         }
     }
 
-    /// The exact diameter D lies within the bounds found by a search with a tolerance. The bounds are at most
-    /// the tolerance apart.
+    /// A search with a tolerance finds bounds that enclose the exact diameter D, and are at most the tolerance apart.
     ///
-    /// A verdict from these bounds equals the verdict from the exact D, or is undecided if the target T lies between
-    /// the bounds.
+    /// The verdict from these bounds equals the verdict from the exact D. It is undecided if the target T lies between
+    /// them.
     #[test]
     fn bounds_of_a_search_with_tolerance_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -122,7 +120,7 @@ proptest! {
         }
     }
 
-    /// The bounds also hold for packed samples, because they include the displacement that packing causes.
+    /// For packed samples, the bounds also include the displacement by packing.
     #[test]
     fn bounds_with_packed_samples_contain_the_exact_diameter(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -140,13 +138,13 @@ proptest! {
         prop_assert!(width_m > 0.0 && width_m < 1e-4, "{:?}", hole);
     }
 
-    /// The bounds also hold if a cell is so full that samples were thinned.
+    /// The bounds also hold for a cell that is so full that its samples were thinned.
     #[test]
     fn bounds_with_thinned_samples_contain_the_exact_diameter(
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
-        // Everywhere else, samples are closer together than the gap in the crowded cell, so the largest hole
+        // The crowded cell has a gap. Everywhere else, samples are closer together than this gap, so the largest hole
         // is in that cell.
         let fence = (-6..=14).flat_map(|i| (0..180).map(move |k| (f64::from(i) * 0.05, f64::from(k) * 0.05)));
         samples.extend(fence.filter(|s| !(4.0..4.4).contains(&s.1)));
@@ -194,7 +192,7 @@ proptest! {
     }
 
     /// The diameter D depends neither on the order of the samples, nor on the seam of the unrolled wall, nor on the
-    /// origin of the chainage.
+    /// chainage's origin.
     #[test]
     fn hole_is_independent_of_sample_order_seam_and_chainage_origin(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
@@ -248,11 +246,11 @@ fn hole_of_samples_with_nanometre_and_metre_spacings_is_correct() {
     let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];
     let hole = largest(PERIMETER_M, &samples, 0.0, 0.25);
     let expected = brute_force(PERIMETER_M, &few, 0.0, 0.25);
-    // The expected value treats samples a nanometre apart as one sample.
+    // Samples a nanometre apart count as one sample in the expected value.
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel, the diameter D is the same to within the floating-point precision at that chainage.
+/// Far along the tunnel, D is the same except for the floating-point precision of the chainage there.
 #[test]
 fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =
@@ -279,7 +277,7 @@ fn hole_is_the_same_at_7_km_and_at_1000_km() {
 
 /// The reference values are for `ceran` at 0.197 m/s, with heads in phase shift at the circle's centre.
 ///
-/// The samples are positions only, without steps.
+/// The samples have positions only, and no steps.
 #[test]
 fn largest_holes_of_ideal_helices_match_reference_values() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();

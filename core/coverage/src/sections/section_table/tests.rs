@@ -8,7 +8,7 @@ use headrace_geometry::tunnel::shapes;
 
 const SECTION_M: f64 = 0.25;
 
-/// Sections of a stretch from a metre before the portal to 10 m, for a target of 0.5 m.
+/// Sections from a metre before the portal to 10 m, for a target of 0.5 m.
 fn sections() -> Sections {
     Sections::new(SECTION_M, Target::new(0.5), -1.0, 10.0)
 }
@@ -40,9 +40,8 @@ fn each_section_counts_once_in_the_metres_of_its_latest_verdict() {
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
 }
 
-/// A section with pings has the error of its own passes.
-///
-/// A section without pings has the largest error of the sections within half the target.
+/// A section with pings has the error of its own passes. A section without pings has the largest error of the sections
+/// within half the target of it.
 #[test]
 fn section_without_pings_has_the_largest_position_error_of_nearby_sections() {
     let error_of = |placed_in: i64, asked: i64| {
@@ -60,7 +59,7 @@ fn section_without_pings_has_the_largest_position_error_of_nearby_sections() {
         }
     };
     let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
-    // Section 20 spans 5 to 5.25 m. The stretch within 0.25 m of this section spans 4.75 to 5.5 m.
+    // Section 20 spans 5 to 5.25 m. With 0.25 m, half the target, on either side, this becomes 4.75 to 5.5 m.
     for (beside, expected) in [(18, 0.0), (19, 0.03), (21, 0.03), (22, 0.03), (23, 0.0)] {
         assert!(near(error_of(beside, 20), expected), "{beside}: {}", error_of(beside, 20));
     }
@@ -124,11 +123,10 @@ fn verdict_is_cannot_say_if_the_hole_bounds_straddle_the_target() {
     assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
 }
 
-/// Judges a section of a pipe after two visits. Each visit leaves a square mesh of samples; `meshes_m` are the mesh
-/// widths.
+/// Judges a section of a pipe after two visits. Each leaves a square mesh of samples, with the widths `meshes_m`.
 ///
 /// With `is_related`, both visits belong to one navigation segment. Returns the verdict, the hole's diameter, m, and
-/// the first visit that counts.
+/// the number of the first visit that counts.
 fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
@@ -144,7 +142,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
             errors: [PassError::default(); 2],
         };
         let around = math::round_to_i64(perimeter_m / mesh_m);
-        // The centre of the section lies half way between two rows of samples.
+        // The centre of the section is midway between two rows of samples.
         let rows = math::floor_to_i64(2.0 / mesh_m);
         for (i, k) in (-rows..rows).flat_map(|i| (0..around).map(move |k| (i, k))) {
             let (x_m, arc_m) = (5.125 + mesh_m * (i as f64 + 0.5), perimeter_m / around as f64 * k as f64);
@@ -174,9 +172,10 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     (section.verdict, section.hole.unwrap().diameter_m, section.visits.first())
 }
 
-/// Judges a section of a pipe with a square hole. `may_be_wall` describes a missing sample in the middle of the hole.
+/// Judges a section of a pipe with a square hole. `may_be_wall` belongs to a missing sample in the middle of the hole;
+/// `None` means that there is none.
 ///
-/// The section is judged again at the end of the dive, when the list of missing samples is empty.
+/// The section is judged again at the end of the dive, when missing samples are no longer listed.
 fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>) {
     let profile = shapes::circle(3.0).unwrap();
     let layout = StoreLayout {
@@ -228,7 +227,7 @@ fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>
     (section.verdict, section.unsure())
 }
 
-/// The target is 0.5 m. A sample in the middle would fill a hole of 0.7 m, but not a hole of 2 m.
+/// For a target of 0.5 m, a sample in the middle would fill a hole of 0.7 m, but not one of 2 m.
 #[test]
 fn section_neither_passes_nor_fails_if_doubtful_returns_would_fill_its_hole() {
     let undecided = (Verdict::CannotSay, Some(Unsure::DoubtfulReturns));
@@ -239,7 +238,7 @@ fn section_neither_passes_nor_fails_if_doubtful_returns_would_fill_its_hole() {
     assert_eq!(with_hole(2.0, Some(true)), (Verdict::Fail, None), "the rest of the hole is too large");
 }
 
-/// A mesh leaves holes as wide as its diagonal: 0.28 m for a mesh width of 0.2 m, 0.48 m for 0.34 m.
+/// A mesh leaves holes as wide as its diagonal: 0.28 m for a width of 0.2 m, and 0.48 m for 0.34 m.
 ///
 /// The target is 0.5 m.
 #[test]

@@ -13,7 +13,7 @@ fn sample(x_m: f64, arc_m: f64) -> WallSample {
     WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }
 }
 
-/// Creates samples of several heads, each in single steps from point to point.
+/// Creates samples at these places for several heads in turn. Each head goes from place to place in single steps.
 ///
 /// The first sample of each head has no step.
 fn steps(places: &[(f64, f64)], heads: usize) -> Vec<WallSample> {
@@ -37,7 +37,7 @@ fn store(samples: &[WallSample]) -> SampleStore {
     store
 }
 
-/// Opens so many other bricks that all bricks of the first 40 m are packed.
+/// Opens other bricks until all bricks of the first 40 m are packed.
 fn pack_the_first_40_m(store: &mut SampleStore) {
     for k in 0..100 {
         store.insert(sample(210.0 - 1.2 * f64::from(k), 0.0)).unwrap();
@@ -56,7 +56,7 @@ fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
 
 /// Distances in chainage from a point to every place where a step crosses the point's arc length.
 ///
-/// The chainage of a crossing is interpolated along its step.
+/// The chainage of a crossing is interpolated along the step.
 fn crossings(samples: &[WallSample], (x_m, arc_m): (f64, f64)) -> Vec<f64> {
     let mut found = Vec::new();
     for end in samples {
@@ -82,7 +82,7 @@ fn places(most: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
 }
 
 proptest! {
-    /// The reference for the nearest pass is brute force over every step.
+    /// The reference for the nearest pass is a brute-force search over every step.
     #[test]
     fn nearest_pass_agrees_with_brute_force(
         places in places(60),
@@ -99,9 +99,9 @@ proptest! {
         }
     }
 
-    /// Passes in packed bricks are found to the accuracy of packing.
+    /// Passes in packed bricks are found as accurately as samples are packed.
     ///
-    /// Steps are as short as those of real heads, so interpolation along a step doesn't amplify the error.
+    /// Steps are as short as those of real heads. So interpolation along a step does not amplify the error.
     #[test]
     fn nearest_pass_among_packed_samples_has_the_accuracy_of_packing(
         starts in proptest::collection::vec((0.0f64..12.0, 0.0f64..PERIMETER_M, -0.06f64..0.06), 1..8),
@@ -115,7 +115,7 @@ proptest! {
                 samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), arc_m, head, step_m, visit: 0 });
             }
         }
-        // At the end of a step, an error of micrometres may select another pass.
+        // If the point is at the end of a step, an error of micrometres may select another pass.
         prop_assume!(samples.iter().all(|s| (s.arc_m - place.1).abs() > 1e-4));
         prop_assume!(starts.iter().all(|(_, _, around_m)| around_m.abs() > 0.01));
         let expected = crossings(&samples, place).into_iter().filter(|d| *d <= 9.0).min_by(f64::total_cmp);
@@ -133,7 +133,7 @@ proptest! {
         }
     }
 
-    /// Each sample stays within the stated displacement while it is packed and opened repeatedly.
+    /// Each sample stays within the stated displacement, even if it is packed and opened repeatedly.
     #[test]
     fn packed_samples_stay_within_the_stated_displacement(places in places(200), heads in 1_usize..8, reversed: bool) {
         let mut samples = steps(&places, heads);
@@ -216,7 +216,7 @@ fn samples_outside_the_extent_or_above_the_capacity_are_refused() {
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
 
-/// Refused samples are reported, and stored samples remain.
+/// Samples that do not fit are reported, and stored samples remain.
 #[test]
 fn full_store_keeps_all_stored_samples() {
     let mut store = SampleStore::new(StoreLayout { capacity: 3_000, ..LAYOUT });
@@ -234,7 +234,7 @@ fn full_store_keeps_all_stored_samples() {
     assert_eq!(seen, stored);
 }
 
-/// Four heads at 50 pings per second spend an hour on one spot, with centimetre jitter.
+/// For an hour, four heads at 50 pings per second see the same spot, with jitter of a centimetre.
 #[test]
 fn memory_stops_growing_while_the_vehicle_is_stationary() {
     let mut store = SampleStore::new(LAYOUT);
@@ -262,13 +262,13 @@ fn memory_stops_growing_while_the_vehicle_is_stationary() {
     assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
 }
 
-/// A full cell drops a step only if a nearby step has the same direction, because the direction distinguishes
-/// passes.
+/// The direction of a step distinguishes passes. So a full cell drops a step only if a nearby step has the same
+/// direction.
 #[test]
 fn step_is_dropped_only_near_a_step_in_the_same_direction() {
     let mut store = SampleStore::new(LAYOUT);
     let mut goes = |around_m: f64, k: u32| {
-        // The test samples are spread over a decimetre of one cell, a millimetre apart.
+        // The samples lie within a decimetre of one cell, a millimetre apart.
         let off_m = 0.001 * f64::from(k % 100);
         let before = store.usage().thinned;
         store.insert(WallSample { step_m: Some([0.002, around_m]), ..sample(100.1, 3.05 + off_m) }).unwrap();
@@ -280,7 +280,7 @@ fn step_is_dropped_only_near_a_step_in_the_same_direction() {
     assert!(goes(0.05, 17));
 }
 
-/// Memory and error do not grow while the vehicle drives back and forth over one stretch.
+/// While the vehicle drives back and forth over one stretch, memory and error do not grow.
 #[test]
 fn memory_does_not_grow_over_a_hundred_passes_back_and_forth() {
     let mut store = SampleStore::new(LAYOUT);
@@ -288,7 +288,7 @@ fn memory_does_not_grow_over_a_hundred_passes_back_and_forth() {
     for round in 0..100 {
         for k in 0..500 {
             let k = if round % 2 == 0 { k } else { 499 - k };
-            // The vehicle drives 150 m back and forth, so that the first bricks are packed and opened each time.
+            // The vehicle drives 150 m back and forth, so the first bricks are packed and opened each time.
             let x_m = 0.3 * f64::from(k);
             store.nearest_pass_m(at(x_m, 1.0), 12.0);
             let arc_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
@@ -329,7 +329,7 @@ fn packing_keeps_the_visit_number_of_each_sample() {
     assert_eq!(visits(&store), before);
 }
 
-/// One stretch may hold as many samples as fit into all open bricks.
+/// One stretch may contain as many samples as there is room for in all open bricks.
 #[test]
 fn packed_stretch_that_fills_all_open_bricks_can_be_read() {
     let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
@@ -343,12 +343,12 @@ fn packed_stretch_that_fills_all_open_bricks_can_be_read() {
         store.bricks.iter().take(30).all(|brick| brick.slot == 0),
         "the bricks must be packed for the distant sample"
     );
-    // The step from 2.2 to 2.3 m crosses the arc length at its centre.
+    // The step from 2.2 to 2.3 m of arc length crosses the point's arc length at the step's centre.
     let distance = store.nearest_pass_m(at(1.5, 2.25), 5.0).unwrap();
     assert!((distance - 0.475).abs() < 3e-5, "{distance}");
 }
 
-/// Packed samples of a turning head take four bytes each, whether they are in single steps or not.
+/// Packed samples of a turning head take four bytes each, with or without single steps.
 #[test]
 fn packed_samples_of_a_sweep_take_one_word_each() {
     for is_stepped in [true, false] {
@@ -373,7 +373,7 @@ fn sample_store_cell_edge_is_half_the_target_within_limits() {
     }
 }
 
-/// A pass is found at its place, at whatever chainage the wall begins.
+/// A pass is found at its chainage, whatever the first chainage of the wall.
 #[test]
 fn pass_is_found_at_its_chainage_wherever_the_wall_begins() {
     for from_m in [-1.0, 0.0, 6000.0] {
@@ -391,7 +391,7 @@ fn pass_is_found_at_its_chainage_wherever_the_wall_begins() {
     }
 }
 
-/// The end of the wall belongs to the last row.
+/// The last chainage of the wall belongs to the last row.
 #[test]
 fn sample_at_the_end_of_the_wall_is_found() {
     let layout = StoreLayout { from_m: 0.0, to_m: 10.0, cell_m: 0.25, ..LAYOUT };

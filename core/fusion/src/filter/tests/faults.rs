@@ -15,7 +15,8 @@ const RANGES: [usize; 6] = [3, 4, 5, 6, 7, 8];
 /// Time at which each simulated sensor fault begins.
 const FAULT_S: f64 = 20.0;
 
-/// Replaces the readings of some sensors, for `for_s` seconds from the start of the fault.
+/// Replaces the readings of these sources by those that `with` returns, for `for_s` seconds from the start of the
+/// fault.
 fn say_otherwise(
     events: &mut [Event],
     sources: &[usize],
@@ -41,8 +42,8 @@ fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     say_otherwise(events, &[source], for_s, |reading, _| last(reading));
 }
 
-/// Checks the filter before the fault and from `wrong_until_s` on. Between these times, the filter is not checked,
-/// because the fault looks like real motion.
+/// Checks the filter before the fault begins, and again from `wrong_until_s` on. In between, the fault looks like real
+/// motion, so the filter is not checked.
 fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
     let mut nav = rig.navigation();
     let parts = [0.0, FAULT_S, wrong_until_s, f64::INFINITY];
@@ -64,8 +65,8 @@ fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
 
 #[test]
 fn fix_is_withheld_during_long_sensor_silence_and_returns_afterwards() {
-    /// A test of silent sensors: name, trajectory, silent sources, duration in s, and whether a fix is missing at the
-    /// end.
+    /// A test of silent sensors: name, trajectory, silent sources, duration of the silence in s, and whether the fix is
+    /// missing at its end.
     type Silence = (&'static str, Way, &'static [usize], f64, bool);
     let near_wall: Way = |t| Pose {
         position: Point3::new(3.0 + 0.1 * t, 5.2, 3.0),
@@ -102,7 +103,7 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
     let rig = Rig::new(rest, 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, FAULT_S));
-    // Until a second after the fault begins, the reordering window still contains earlier readings.
+    // For a second after the fault begins, the reordering window still contains readings from before it.
     let last = at(FAULT_S + 1.0);
     Rig::hear(&mut nav, &Event { received: last, valid: last, source: OTHER, reading: rig.rate(0.0) });
     let mut before = nav.running().unwrap().factors;
@@ -168,8 +169,8 @@ fn saturated_inertial_samples_are_rejected() {
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &events);
             assert!(nav.consistency(IMU).unwrap().dropped > 0);
-            // The speed change by a rejected force is unknown. While the speed is too uncertain for this reason, there
-            // is no fix.
+            // The speed change by a rejected force is unknown, so the speed becomes uncertain. There is no fix until
+            // the speed is certain again.
             let lacking = if is_rate { 0 } else { math::round_to_i64(10.0 * for_s) + 5 };
             assert!(i64::from(tally.lacking) <= lacking, "{magnitude} for {for_s} s: {tally:?}");
         }
@@ -232,8 +233,7 @@ fn jumping_sensor_is_rejected() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // The chainage is unknown while counter and estimate differ by metres. This state lasts until a second after
-        // the jump.
+        // The chainage is unknown while counter and estimate differ by metres, until a second after the jump.
         let lacking = if source == TETHER { 45 } else { 0 };
         assert!(
             tally.lacking <= lacking && consistency.gated >= 6,
@@ -279,8 +279,8 @@ fn ranged(reading: &Reading, share: f64) -> Reading {
 
 #[test]
 fn filter_recovers_from_plausible_wrong_inertial_readings_within_60_s() {
-    // The cause may be a knock or a faulty unit; the unit alone does not show which. The fix is wrong until the other
-    // sensors have corrected it.
+    // Either a knock or a faulty unit causes such readings, and the unit alone does not show which. The fix is wrong
+    // until the other sensors have corrected it.
     let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
     let rates = [(5.0, 0.02), (5.0, 0.2), (1.0, 1.0), (0.1, 5.0), (0.01, 20.0)].map(|jump| (jump, true));
     let jumps = forces.into_iter().chain(rates).flat_map(|jump| (1..=6).map(move |seed| (jump, seed)));
@@ -300,8 +300,8 @@ fn filter_recovers_from_plausible_wrong_inertial_readings_within_60_s() {
 
 #[test]
 fn filter_recovers_from_a_frozen_sensor() {
-    // The filter recognises a frozen depth sensor or a frozen head at once by the other sensors. An echosounder moves
-    // the position by centimetres before its range becomes too improbable.
+    // The other sensors show at once that a depth sensor or head is frozen. A frozen echosounder moves the position by
+    // centimetres before its range becomes too improbable.
     let frozen = [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 60.0)];
     for (source, wrong_s) in frozen {
         for seed in 1..=6 {
@@ -313,7 +313,7 @@ fn filter_recovers_from_a_frozen_sensor() {
     }
 }
 
-/// A head reports the echo of its own frame, or its last echo, while it keeps turning.
+/// A head reports the range of its own frame, or of its last echo, while it keeps turning.
 ///
 /// In each turn of the head, this constant range agrees with the wall for a while.
 #[test]
@@ -381,9 +381,9 @@ fn length_m(reading: &Reading) -> f64 {
     length.length_m
 }
 
-/// The counter sticks permanently while the vehicle moves on. After some time, the filter reports an unknown chainage.
+/// The counter sticks permanently while the vehicle moves on. Later, the filter reports that the chainage is unknown.
 ///
-/// Gyros and accelerometers show the same readings in steady motion as at rest. Even so, the filter does not take the
+/// In steady motion, gyros and accelerometers show the same readings as at rest. Even so, the filter does not take the
 /// steady motion for rest.
 #[test]
 fn permanently_stuck_counter_leads_to_no_fix() {
@@ -398,7 +398,7 @@ fn permanently_stuck_counter_leads_to_no_fix() {
     }
 }
 
-/// The vehicle reverses within one sample of the inertial unit. The measured force is implausible, but real.
+/// The vehicle reverses within one sample of the inertial unit, so the measured force is implausible but real.
 #[test]
 fn fix_returns_after_a_jolt_beyond_the_plausible_force() {
     let jolted: Way = |t| Pose {

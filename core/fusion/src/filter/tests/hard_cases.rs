@@ -1,7 +1,6 @@
 //! Tests of the filter at extremes of dive duration, reading order, attitude and noise scale.
 //!
-//! Each test ends with a fix or without one. The error of a fix is within the limit; without a fix, its missing part is
-//! reported.
+//! A test ends either with a fix, whose error is within the limit, or with the name of the missing part of the fix.
 
 use super::super::factors::Factors;
 use super::super::inertial::{InertialSample, Leg};
@@ -19,7 +18,7 @@ use headrace_support::hard_cases::{found, found_at};
 
 const HOUR: DurNs = DurNs(3_600_000_000_000);
 
-/// Returns estimate and covariance a second after the time of the last reading, when the reordering window is empty.
+/// Returns estimate and covariance a second after the last reading, when the reordering window is empty.
 fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
     let mut nav = rig.navigation();
     let last = events.iter().map(|event| event.valid).max().unwrap();
@@ -116,8 +115,8 @@ fn propagation_over_any_duration_keeps_the_covariance_valid() {
             }
             assert!(state.is_sound() && factors.is_sound(), "{dt_s} s: {state:?}");
             for i in 0..ERRORS {
-                // Without measurements, the variances of pose errors never shrink. Only some sensor errors decay, so
-                // their variances may shrink.
+                // Without measurements, the variances of pose errors never shrink. The variances of some sensor errors
+                // shrink, because these errors decay.
                 let least = if i < 9 { 1e-4 * (1.0 - 1e-12) } else { 0.0 };
                 assert!(factors.variance(i) > least, "{dt_s} s, error {i}: {}", factors.variance(i));
             }
@@ -134,8 +133,8 @@ fn repeated_inertial_sample_counts_once() {
     let rig = Rig::new(cruise, 1);
     let events = rig.events(0.0, 20.0);
     let right = outcome(&rig, &events);
-    // The second copy of a sample has the same two times as the first, or both a nanosecond later, or only a later
-    // receive time.
+    // The second copy of a sample has the same receive time and time of validity as the first. Or both times are a
+    // nanosecond later, or only the receive time is later.
     for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
         let mut again = events.clone();
         let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));
@@ -178,8 +177,8 @@ fn readings_give_the_same_result_in_any_arrival_order() {
     let rig = Rig::new(cruise, 2);
     let events = rig.events(0.0, 30.0);
     let right = outcome(&rig, &events);
-    // Each source has its own delay within the reordering window, so readings arrive in another order than they were
-    // taken.
+    // Each source has its own delay within the reordering window, so readings arrive in another order than that of
+    // their times of validity.
     for shift in 1..4 {
         let mut mixed = events.clone();
         for event in mixed.iter_mut().filter(|event| seconds(event.valid) > 2.0) {
@@ -234,7 +233,7 @@ fn errors_stay_within_limits_at_any_attitude() {
             let rig = Rig::new(way, seed);
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
-            // If no echosounder faces up or down, the first estimates have no height and give no fix.
+            // If no echosounder faces up or down, the height is missing at first, so there is no fix.
             assert!(tally.lacking <= 2, "{name}: {tally:?}");
         }
     }
@@ -300,8 +299,8 @@ fn fix_at_a_past_time_has_the_position_of_that_time() {
 #[test]
 fn fix_survives_stopped_and_jumping_clocks() {
     let rig = Rig::new(rest, 2);
-    // In the first case, the clock repeatedly stands still for a second. In the second case, it repeatedly runs
-    // backwards for a tenth of a second.
+    // The clock repeatedly stands still for a second (`back` is false), or repeatedly runs backwards for a tenth of a
+    // second (`back` is true).
     for (stamp, back) in [(1_000_000_000_u64, false), (100_000_000, true)] {
         let mut events = rig.events(0.0, 40.0);
         for event in &mut events {
@@ -332,7 +331,8 @@ fn fix_survives_stopped_and_jumping_clocks() {
     for event in &events {
         Rig::hear(&mut nav, event);
     }
-    // The jump ahead by an hour looks like a silence and causes a restart. The jump back causes a second restart.
+    // The jump ahead by an hour looks like a silence and causes a restart. The jump back to the right time causes
+    // another.
     assert_eq!(nav.restarts(), 2);
     assert_eq!(nav.consistency(source).unwrap().dropped, 1);
     assert!(nav.fix(at(60.0)).is_ok());
@@ -344,10 +344,9 @@ fn cruise_at<const KM: u32>(t: f64) -> Pose {
     Pose { position: Point3::new(at.x() + 1e3 * f64::from(KM), at.y(), at.z()), attitude }
 }
 
-/// The standard deviation of the relative error between passes is the same at any chainage.
+/// The standard deviation of the error between passes is the same at any chainage.
 ///
-/// The chainage itself becomes less certain with distance because of the cable's scale, by 2 km at a distance of 1,000
-/// km.
+/// The chainage itself becomes less certain with distance, because the cable's scale is uncertain: by 2 km at 1,000 km.
 #[test]
 fn chainage_sd_between_passes_is_the_same_at_any_chainage() {
     let ways: [(f64, Way); 3] = [(3e3, cruise_at::<3>), (7e3, cruise_at::<7>), (1e6, cruise_at::<1000>)];
@@ -394,8 +393,7 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// The advice to stand still ends once the gyro bias is known, within the time that the advice first stated. The advice
-/// does not return.
+/// The advice to stand still ends once the gyro bias is known, no later than first stated. It does not return.
 #[test]
 fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
@@ -416,7 +414,7 @@ fn stand_still_advice_ends_once_the_bias_is_known() {
     assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
 }
 
-/// Returns the largest relative increase, after the tenth minute, of the sd between head passes, sampled once per
+/// Returns the largest relative increase of the sd between head passes after the tenth minute. It is sampled once per
 /// round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };

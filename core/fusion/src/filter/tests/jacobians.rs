@@ -1,8 +1,8 @@
 //! Verification that measurement rows and transition are the derivatives of their models.
 //!
-//! The reference is central differences of the nonlinear functions, through `State::correct` and `State::go_on`.
-//! States are drawn at random. Attitudes cover the whole sphere, sensors are anywhere on the vehicle, and biases
-//! and offsets have either sign.
+//! The reference is central differences of the nonlinear functions, through `State::correct` and `State::go_on`. States
+//! are drawn at random: attitudes cover the whole sphere, sensors are anywhere on the vehicle, and biases and offsets
+//! have either sign.
 
 use crate::filter::inertial::{InertialSample, Leg, Transition};
 use crate::filter::measure::{self, Beam, ScalarUpdate};
@@ -19,12 +19,11 @@ const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
 /// Step of the central differences.
 ///
-/// The truncation error is about the square of the step: 1e-8 for numbers near one. The relative rounding error is
-/// about 1e-12: the rounding of a double divided by the step. Values reach some hundreds of metres, so the rounding
-/// error is 1e-10.
+/// The truncation error is about the square of the step: 1e-8 for numbers near one. The relative rounding error is that
+/// of a double divided by the step, about 1e-12. Values reach some hundreds of metres, so the rounding error is 1e-10.
 const STEP: f64 = 1e-4;
-/// Tolerance that covers truncation and rounding error with a margin. A wrong sign or a missing term causes an error
-/// of at least 0.01.
+/// Tolerance that covers truncation and rounding with a margin. A wrong sign or a missing term causes an error of at
+/// least 0.01.
 const TOLERANCE: f64 = 1e-6;
 
 /// Knuth's MMIX random number generator. The upper half of its state gives a number from 0 to 1.
@@ -128,8 +127,8 @@ fn check_row(
 fn beam_row_on_flat_walls_equals_finite_differences() {
     let profile = shapes::rectangle(7.0, 8.0).unwrap();
     let mut draws = Draws::new(1);
-    // The half angles of an echosounder's beam, of a head's cone, and of a cone so wide that the nearest part of the
-    // wall echoes.
+    // Half angles, radians: of an echosounder's beam, of a head's cone, and of a cone so wide that the nearest part of
+    // the wall echoes.
     for first_rad in [0.0, 0.012, 0.4] {
         let checked =
             (0..STATES).filter(|_| check_beam(&mut draws, &profile, first_rad, |_| TOLERANCE)).count();
@@ -137,12 +136,12 @@ fn beam_row_on_flat_walls_equals_finite_differences() {
     }
 }
 
-/// The expected range of a cone equals the length of its shortest ray. The uncertainty extends to the shortest ray of
-/// the wider cone.
+/// The expected range of a cone equals the length of its shortest ray. The uncertainty of the range reaches down to the
+/// shortest ray of the wider cone.
 #[test]
 fn expected_range_of_a_cone_equals_its_shortest_ray() {
-    // The rays lie on rings around the axis. The shortest of their ranges is too long, relatively, by at most the
-    // square of half the ray spacing of 5e-3 rad.
+    // The rays lie on rings around the axis, spaced by 5e-3 rad. The shortest ray is longer than the true shortest
+    // range, by a share of at most the square of half this spacing.
     const RINGS: u32 = 200;
     let profile = shapes::rectangle(60.0, 60.0).unwrap();
     let mut draws = Draws::new(11);
@@ -174,12 +173,12 @@ fn expected_range_of_a_cone_equals_its_shortest_ray() {
     }
 }
 
-/// Without a cone, the measurement row of a beam on a round wall is exact. With a cone, the row's error is bounded as
-/// follows.
+/// Without a cone, the measurement row of a beam on a round wall is exact. With a cone, its error has the following
+/// bound.
 ///
 /// The row assumes the tangent plane where the beam's axis meets the wall. This point moves by at most 1 m / cosine per
 /// metre, or by `range` / cosine per radian. The tangent plane then turns by 1 / radius per metre. The row neglects
-/// this turn of the plane, whose effect on the range is range x sin(first) / cos^2 per radian.
+/// this turn of the plane, which changes the range by range x sin(first) / cos^2 per radian.
 #[test]
 fn beam_row_on_round_walls_equals_finite_differences() {
     const RADIUS_M: f64 = 4.0;
@@ -198,7 +197,7 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
     let state = draws.state();
     let along = draws.mounted() * Vec3::new(1.0, 0.0, 0.0);
     let beam = Beam { offset: draws.vector(0.5), along, first_rad, unsure_rad: 0.0 };
-    // With a measured range of zero, the residual is the negative of the expected range.
+    // The measured range is zero, so the residual is the negative of the expected range.
     let Some(row) = measure::range(&state, profile, &beam, 0.0, 0.1) else { return false };
     let origin = state.position + state.attitude * beam.offset;
     let looks = state.attitude * along;
@@ -231,10 +230,11 @@ fn height_and_chainage_rows_equal_finite_differences() {
     }
 }
 
-/// The measurement rows of an attitude are exact if measured and estimated attitude agree, as in a converged filter.
+/// The measurement rows of an attitude are exact if the measured attitude equals the estimate, as in a converged
+/// filter.
 ///
-/// If the two attitudes differ by an angle, the rows are wrong by half of this angle. So the test's measured attitude,
-/// deviation included, is within 1e-7 rad of the estimate.
+/// If they differ by an angle, the rows are wrong by half of it. So the test's measured attitude, deviation included,
+/// is within 1e-7 rad of the estimate.
 #[test]
 fn attitude_rows_equal_finite_differences() {
     let mut draws = Draws::new(4);
@@ -249,8 +249,7 @@ fn attitude_rows_equal_finite_differences() {
     }
 }
 
-/// A measured attitude that is turned by exactly the compass deviation about the tunnel's z axis has a residual of
-/// zero.
+/// If the measured attitude is turned about the tunnel's z axis by exactly the compass deviation, the residual is zero.
 #[test]
 fn attitude_with_known_compass_deviation_has_no_residual() {
     let mut draws = Draws::new(5);
@@ -263,7 +262,7 @@ fn attitude_with_known_compass_deviation_has_no_residual() {
     }
 }
 
-/// The turn rate is an input of the model, so the measurement row does not depend on the gyro bias.
+/// The model gets the turn rate as an input, so the measurement row does not depend on the gyro bias.
 #[test]
 fn velocity_and_rest_rows_equal_finite_differences() {
     let mut draws = Draws::new(6);
@@ -300,10 +299,10 @@ fn velocity_on_a_lever_arm_equals_finite_differences_of_position() {
     }
 }
 
-/// The reference predicts a measurement made 0.07 s before the estimate, from the position at the time of the
+/// The reference predicts a measurement made 0.07 s before the estimate, from the position at the time of that
 /// measurement.
 ///
-/// The prediction is exact for constant velocity.
+/// The prediction is exact if the velocity is constant.
 #[test]
 fn row_of_an_earlier_measurement_equals_finite_differences() {
     const LATER_S: f64 = 0.07;
@@ -334,8 +333,8 @@ fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
 /// The difference from the true rotation affects only the bias terms, by up to a quarter of the angle turned in a
 /// sample (0.01 rad). The largest bias terms are 0.1 s of turning and 0.05 s^2 of force, so the error is up to 0.1 x
 /// 0.0025. In most blocks, a wrong factor or a missing term causes a larger error. The exception is the displacement
-/// that a gyro bias causes by tilting the force: 10 m/s^2 x 0.1^3 / 6. So each block of the matrix is compared relative
-/// to its own size.
+/// that a gyro bias causes by tilting the force: it is only 10 m/s^2 x 0.1^3 / 6. So each block of the matrix is
+/// compared relative to its own size.
 #[test]
 fn transition_matrix_equals_finite_differences_of_the_model() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
@@ -345,7 +344,7 @@ fn transition_matrix_equals_finite_differences_of_the_model() {
     for round in 0..STATES {
         let start = draws.state();
         let (rate, force) = (draws.vector(0.6), draws.vector(3.0) + Vec3::new(0.0, 0.0, 9.0));
-        // In some rounds, gyro or accelerometer data are missing for a part of the epoch or for all of it.
+        // In some rounds, gyro or accelerometer data are missing for part of the epoch or for all of it.
         let blind = |k: u64, part: u64| round % 4 == part && k >= round % 3 * 4;
         let felt: Vec<_> = (0..10)
             .map(|k| InertialSample {

@@ -16,7 +16,7 @@ fn steps(reader: &JournalReader) -> Vec<Placed> {
     core::iter::from_fn(|| reader.next()).map(|words| Placed::of_words(&words).unwrap()).collect()
 }
 
-/// Groups the steps by piece of the track; returns piece number and clock number with each group.
+/// Groups the steps by piece of the track. Returns each group with the numbers of its piece and of its clock.
 fn pieces(steps: &[Placed]) -> Vec<((u32, u32), &[Placed])> {
     steps.chunk_by(|a, b| a.piece == b.piece).map(|piece| ((piece[0].piece, piece[0].clock), piece)).collect()
 }
@@ -41,8 +41,7 @@ fn dive_without_an_estimate_records_no_smoothing_steps() {
     assert_eq!(steps(&reader).len(), 0);
 }
 
-/// If the clock is set back by more than 10 s, a piece of the track ends exactly once, even if no later reading
-/// follows.
+/// A clock reset by more than 10 s ends the piece of the track exactly once, even if no later reading follows.
 #[test]
 fn filter_steps_before_a_clock_reset_are_recorded_completely() {
     let rig = Rig::new(cruise, 5);

@@ -11,7 +11,7 @@ use crate::filter::state::{
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Returns the transition of a leg with these inertial data, and the covariance that the leg's noise adds to zero.
+/// Returns the transition of a leg with these inertial data, and the covariance of the leg's noise alone.
 fn leg(settings: &Settings, dt_s: f64, felt: InertialSample) -> (Transition, Factors<ERRORS>) {
     let mut state = Draws::new(1).state();
     let mut leg = Leg::default().with_noise([1.0; 2], settings.slack);
@@ -30,10 +30,10 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
     assert!((is - should).abs() <= share * should.abs() + 1e-18, "{what}: {is}, not {should}");
 }
 
-/// The slack process is two lags in series, s' = -s / T + r, r' = -r / T + w. The process is integrated in steps of
-/// 1e-5 T.
+/// The slack process is two lags in series, s' = -s / T + r, r' = -r / T + w. The test integrates it by Euler's method
+/// in steps of 1e-5 T.
 ///
-/// Euler's method has an error of the order of the step.
+/// The method's error is of the order of the step.
 #[test]
 fn slack_noise_equals_numerical_integration_of_the_slack_process() {
     let settings = Settings { slack: GaussMarkov { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
@@ -51,7 +51,7 @@ fn slack_noise_equals_numerical_integration_of_the_slack_process() {
                 rr - 2.0 * rr * step + density * dt_s,
             );
         }
-        // If fewer steps are integrated, the error of the first steps matters more.
+        // With fewer steps, the error of the first steps matters more.
         let share = 1e-4 + 3.0 * step / lags;
         near("slack", factors.variance(SLACK), ss, share);
         near("both", factors.covariance(SLACK, SLACK_RATE), sr, share);
@@ -59,7 +59,7 @@ fn slack_noise_equals_numerical_integration_of_the_slack_process() {
     }
 }
 
-/// In the steady state, the slack has its declared variance. After x time constants, its autocorrelation is (1 + x)
+/// In the steady state, the slack has its declared variance. Its autocorrelation after x time constants is (1 + x)
 /// e^-x.
 #[test]
 fn slack_variance_converges_to_the_declared_value() {
@@ -92,10 +92,9 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
 
 /// The reference is 4000 random epochs of ten samples with white force and white turn rate, by `State::go_on`.
 ///
-/// A variance from n draws has a relative standard deviation of sqrt(2 / n) = 2.2 %, so the limit of 9 % is four
-/// standard deviations. Turn rate noise also tilts the force, but the process noise of an epoch neglects this tilt. So
-/// the simulated unit is level and only tilts about x, and the test compares its x axis, on which gravity has no
-/// first-order effect.
+/// A variance from n draws has a relative standard deviation of sqrt(2 / n) = 2.2 %, so the limit of 9 % is four of
+/// them. Noise of the turn rate also tilts the force, which the process noise of an epoch neglects. So the simulated
+/// unit is level and tilts only about x. The test compares its x axis, on which gravity has no first-order effect.
 #[test]
 fn white_process_noise_covariance_equals_monte_carlo() {
     const DRAWS: u32 = 4000;
@@ -130,7 +129,7 @@ fn white_process_noise_covariance_equals_monte_carlo() {
     }
 }
 
-/// While gyro and accelerometer data are missing, the noise configured for missing data applies.
+/// While inertial data are missing, the noise that is configured for missing data applies.
 #[test]
 fn noise_for_missing_inertial_data_equals_the_configured_values() {
     let settings = Settings { blind_rate_noise: 0.03, blind_force_noise: 0.5, ..Settings::default() };
@@ -142,9 +141,9 @@ fn noise_for_missing_inertial_data_equals_the_configured_values() {
     }
 }
 
-/// A decaying error keeps its variance, because the noise of each epoch makes up for the decay.
+/// The noise of each epoch makes up for the decay of an error, so the error keeps its variance.
 ///
-/// A random walk grows with time.
+/// The variance of a random walk grows with time.
 #[test]
 fn decaying_errors_keep_their_standard_deviation() {
     let settings = Settings::default();

@@ -1,8 +1,8 @@
 //! Comparison of factored covariances with 100-digit values, which `tests/oracles/fusion.py` computed with mpmath.
 //!
-//! The inputs in `fusion.csv` are doubles that count as exact, so each tolerance bounds the rounding of the computation
-//! only. An element P_ij of a covariance P is compared relative to sqrt(P_ii P_jj), which is the scale of the two
-//! errors.
+//! The inputs in `fusion.csv` are doubles that count as exact, so a tolerance bounds only the rounding of the
+//! computation. An element P_ij of a covariance P is compared relative to sqrt(P_ii P_jj), the scale of the errors i
+//! and j.
 
 use super::super::factors::{Factors, Gain};
 use headrace_geometry::math;
@@ -58,7 +58,7 @@ impl<const N: usize> Covariance<N> for Factors<N> {
     }
 }
 
-/// The full covariance, updated by the Joseph form if `JOSEPH`, and otherwise by the textbook form.
+/// The full covariance. Updates have the Joseph form if `JOSEPH` is true, and otherwise the textbook form.
 #[derive(Clone, Copy)]
 struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
 
@@ -124,7 +124,7 @@ impl<const N: usize, const JOSEPH: bool> Covariance<N> for Whole<N, JOSEPH> {
     }
 }
 
-/// Largest error of a covariance, relative to the scale of its errors.
+/// Largest differences between a computed covariance and its 100-digit value, relative to the scale of the errors.
 #[derive(Debug, Default, Clone, Copy)]
 struct Worst {
     covariance: f64,
@@ -135,7 +135,7 @@ struct Worst {
     is_sign_lost: bool,
 }
 
-/// NaN counts as the largest possible error.
+/// Raises `worst` to the difference `off`. NaN counts as the largest difference.
 fn note(worst: &mut f64, off: f64) {
     *worst = if off.is_nan() { f64::INFINITY } else { worst.max(off) };
 }
@@ -173,8 +173,8 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
             "scale" => p.scale(fields[3].parse().unwrap(), numbers[1]),
             "gain" => {
                 note(&mut worst.gain, (gain.variance / numbers[0] - 1.0).abs());
-                // The gain is compared relative to its largest element, because all elements act on the estimate
-                // together.
+                // The gain is compared relative to its largest element, because all elements together change the
+                // estimate.
                 let size = numbers[1..].iter().fold(0.0, |size: f64, k| size.max(k.abs()));
                 for (k, right) in gain.k.iter().zip(&numbers[1..]) {
                     note(&mut worst.gain, (k - right).abs() / size);
@@ -220,11 +220,11 @@ fn all(case: &str, n: usize) -> [Worst; 3] {
     if n == 4 { of::<4>(case) } else { of::<6>(case) }
 }
 
-/// Name of each oracle case, number of errors, and tolerance of the factored form: about ten times the error of this
-/// form.
+/// Name of each oracle case, number of errors, and tolerance of the factored form.
 ///
-/// The rounding error is some units in the last place, times the ratio of the largest to the smallest standard
-/// deviation over all directions. This ratio is 1e12 after ten hours.
+/// The tolerance is about ten times the error of this form. Its rounding error is a few units in the last place, times
+/// the ratio of the largest to the smallest standard deviation over all directions. After ten hours, this ratio is
+/// 1e12.
 const CASES: [(&str, usize, f64); 13] = [
     ("mild", 4, 1e-14),
     ("mild", 6, 1e-14),
@@ -240,7 +240,7 @@ const CASES: [(&str, usize, f64); 13] = [
     ("swinging", 4, 1e-9),
     ("swinging", 6, 1e-5),
 ];
-/// The full covariance form fails if its error exceeds this multiple of the factored form's tolerance.
+/// A full covariance form counts as failed if its error exceeds this multiple of the factored form's tolerance.
 const FAILS: f64 = 30.0;
 
 #[test]
@@ -266,7 +266,7 @@ fn full_covariance_form_fails_where_the_factored_form_is_accurate() {
             assert!(fails(plain), "{case} {n}: {plain:?}");
             assert!(fails(joseph), "{case} {n}: {joseph:?}");
         }
-        // In an easy case, both full covariance forms are also accurate.
+        // Both full covariance forms are also accurate in an easy case.
         if case == "mild" {
             assert!(plain.covariance.max(joseph.covariance) < 1e-13, "{plain:?} {joseph:?}");
         }

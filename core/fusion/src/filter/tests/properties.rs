@@ -95,7 +95,7 @@ proptest! {
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// The echoes come from a known position. A fit that starts about half a metre away from this position ends at it.
+    /// The echoes come from a known position. A fit that starts about half a metre away ends at this position.
     ///
     /// With arbitrary ranges, the fit still ends inside the tunnel.
     #[test]
@@ -126,7 +126,8 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// If a sensor sends too often, its used readings are at least one period apart. No other reading is skipped.
+    /// If a sensor sends too often, its used readings are at least one period apart. Every skipped reading is less than
+    /// a period after a used one.
     #[test]
     fn readings_of_a_source_are_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
@@ -224,10 +225,10 @@ fn whole(transition: &Transition) -> Square {
     }))
 }
 
-/// An augmented filter as in textbooks: errors of clones are appended to the present errors and are not corrected.
+/// An augmented filter as in textbooks. Errors of clones are appended to the present errors, and are not corrected.
 struct Augmented {
     now: Square,
-    /// Covariance of the errors at the time of each clone, and their cross-covariance with the present errors.
+    /// For each clone, the covariance of the errors at its time, and their cross-covariance with the present errors.
     clones: Vec<(Square, Square)>,
 }
 
@@ -250,8 +251,8 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the change in chainage error, at `arm`, until now. The change is that since the clone
-    /// `back` places before the newest one.
+    /// Standard deviation of the change in chainage error, at `arm`, since the clone `back` places before the newest
+    /// one.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];
@@ -267,8 +268,7 @@ impl Augmented {
 
 #[test]
 fn relative_covariance_from_clones_equals_an_augmented_filter() {
-    // The first case has several propagation legs between clones. The second case has enough clones to fill the ring
-    // buffer.
+    // The first case has eight propagation legs between clones. The second has enough clones to fill the ring buffer.
     for (legs, leg_s, times) in [(8, 0.25, 12), (1, 2.0, 70)] {
         let settings = Settings::default();
         let rig = Rig::new(super::rig::cruise, 5);

@@ -21,7 +21,8 @@ fn moving(axis: usize, speed_mps: f64) -> Eskf {
     eskf
 }
 
-/// The difference of two normal errors with an sd of 0.02 m/s each exceeds 0.11 m/s once in ten thousand times.
+/// The difference of two normal errors with an sd of 0.02 m/s each exceeds 0.11 m/s once in ten thousand times. The
+/// test values lie on either side of this.
 #[test]
 fn zero_velocity_update_is_skipped_for_motion_in_any_direction() {
     let turn = Vec3::new(2e-3, -4e-3, 6e-3);

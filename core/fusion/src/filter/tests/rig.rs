@@ -47,7 +47,7 @@ pub(super) struct Rig {
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) way: Way,
-    /// Ratio of the sensors' noise to the noise in the settings.
+    /// Noise of the simulated sensors as a multiple of the noise in the settings.
     pub(super) noise: f64,
     /// Time between samples of the inertial unit, s.
     pub(super) imu_s: f64,
@@ -95,7 +95,7 @@ pub(super) fn rest(_: f64) -> Pose {
 
 impl Rig {
     pub(super) fn new(way: Way, seed: u64) -> Self {
-        // The settings suit beams so narrow that they equal rays, and a cable whose slack changes slowly.
+        // With these settings, beams are so narrow that they equal rays, and the cable's slack changes slowly.
         let slack = GaussMarkov { reach: 0.06, time_s: 10.0 };
         let settings = Settings { slack, return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() };
         let site = Site { axis_yaw_rad: 0.7, ..Site::default() };
@@ -179,10 +179,10 @@ impl Rig {
         tally
     }
 
-    /// Checks that all numbers are finite and variances are not negative. If there is a fix, also checks that errors
-    /// are within `MOST_SDS`.
+    /// Checks that all numbers are finite and no variance is negative. If there is a fix, its errors must be within
+    /// `MOST_SDS`.
     ///
-    /// The checks run once per epoch, because the estimate does not change within an epoch.
+    /// The checks run once per epoch, because the estimate does not change in between.
     pub(super) fn check(&self, nav: &FilterNavigation, now: MonoNs, tally: &mut Tally) {
         let Some(running) = nav.running() else {
             assert!(nav.fix(now).is_err());
@@ -228,8 +228,8 @@ impl Rig {
         for (k, axis) in axes.iter().enumerate() {
             let mut h = [0.0; ERRORS];
             (h[POSITION + k], h[VELOCITY + k]) = (1.0, since_s);
-            // A small rotation about an axis moves the body's origin by the cross product of the axis and the lever
-            // arm.
+            // A small rotation about an axis moves the body's origin. The displacement is the cross product of axis and
+            // lever arm.
             for (j, other) in axes.iter().enumerate() {
                 h[ATTITUDE + j] = other.cross(&arm).dot(axis);
             }

@@ -8,8 +8,8 @@ use crate::relative::Relative;
 use headrace_geometry::math;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// Returns the filter's doubt about settings after a dive of four minutes. All echoes are multiplied by `echoes`, and
-/// `change` changes each head's returns.
+/// Returns the filter's doubt about settings after a dive of four minutes. `echoes` multiplies all echosounder ranges,
+/// and `change` changes each return of a head.
 fn doubted(echoes: f64, change: impl Fn(usize, SonarReturn) -> SonarReturn) -> Option<SettingDoubt> {
     let rig = Rig::new(cruise, 3);
     let mut nav: FilterNavigation = rig.navigation();
@@ -83,7 +83,7 @@ fn slow_swing_verifies_mounts_and_reveals_a_yawed_head() {
             None => assert!(yaw_rad == 0.0, "{yaw_rad} is not reported"),
             Some(SettingDoubt { setting: Setting::HeadYawed(by_rad), source, .. }) => {
                 assert_eq!(source.map(usize::from), Some(HEADS));
-                // With two heads, an error of the vehicle's heading may explain up to half of a head's yaw.
+                // With two heads, the filter may take up to half of a head's yaw for an error of the vehicle's heading.
                 assert!((0.5..1.2).contains(&(by_rad / yaw_rad)), "{by_rad} instead of {yaw_rad}");
             }
             other => panic!("{yaw_rad}: {other:?}"),
@@ -101,7 +101,7 @@ fn mounts_stay_unverified_without_a_swing() {
     assert!(!is_unverified(&|source| source < HEADS), "no head");
 }
 
-/// The difference between two heads has twice the variance of one head, in pitch and in yaw.
+/// The mount error between two heads has twice the variance of a single head's, in pitch and in yaw.
 #[test]
 fn declared_mount_error_widens_the_error_between_passes_of_several_heads() {
     let adds_deg = |rig: &Rig, declared_deg: f64, is_heard: &dyn Fn(usize) -> bool| {

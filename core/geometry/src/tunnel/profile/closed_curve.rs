@@ -8,9 +8,9 @@ use crate::math::{self, TAU};
 
 /// Distance below which two points count as equal, m.
 pub(super) const SAME_POINT_M: f64 = 1e-9;
-/// A polygon with more elements than this gets a table of its extent in many directions, so that bounds need no search.
+/// Number of elements beyond which a polygon gets a table of its extent by direction. The table makes bounds fast.
 const MANY: usize = 256;
-/// Number of equidistant wall points that [`Profile::places`] returns.
+/// Number of wall points at equal spacing that [`Profile::places`] returns.
 const PLACES: u32 = 64;
 
 /// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
@@ -18,7 +18,7 @@ const PLACES: u32 = 64;
 pub struct Profile {
     pub(super) elements: Vec<Element>,
     pub(super) tree: Tree,
-    /// Table of the profile's extent by direction, present only for many elements.
+    /// Table of the profile's extent by direction, only for polygons of many elements.
     support: Option<Support>,
     pub(super) perimeter_m: f64,
     pub(super) reference: Yz,
@@ -29,7 +29,7 @@ pub struct Profile {
 /// Intersection of a ray with the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallHit {
-    /// Ray parameter; the distance in metres if the direction is a unit vector.
+    /// Ray parameter. It is the distance in metres if the direction is a unit vector.
     pub range_m: f64,
     /// Arc length of the intersection, m.
     pub arc_m: f64,
@@ -55,18 +55,19 @@ pub enum ProfileError {
         /// Index of the vertex, counted from zero.
         vertex: usize,
     },
-    /// As seen from the reference point, the wall at this vertex is hidden or runs backwards.
+    /// As seen from the reference point, part of the wall at this vertex is hidden or runs backwards.
     #[error(
         "the profile isn't star-shaped about ({y}, {z}): it runs backwards or crosses itself at vertex {vertex}, counted from 0",
         y = .reference[0], z = .reference[1]
     )]
     NotStarShaped {
-        /// Index of the offending input piece; for a polygon, index of the point where the offending edge begins.
+        /// Index of the offending piece in the input. For a polygon, index of the point at which the offending edge
+        /// begins.
         vertex: usize,
         /// The reference point of the profile.
         reference: Yz,
     },
-    /// All of the polygon lies on one side of y = 0.
+    /// All points of the polygon are on one side of y = 0.
     #[error("all points are on one side of y = 0; the profile needs points on both sides")]
     BesideMiddle,
     /// The curve does not wind about its reference point exactly once.
@@ -83,7 +84,7 @@ pub enum ProfileError {
 }
 
 impl ProfileError {
-    /// Returns the offending vertex, by its index in the input.
+    /// Returns the index of the offending vertex in the input; `None` if the error concerns no single vertex.
     pub fn vertex(&self) -> Option<usize> {
         match self {
             Self::NotFinite { vertex } | Self::NotStarShaped { vertex, .. } => Some(*vertex),
@@ -95,10 +96,10 @@ impl ProfileError {
 impl Profile {
     /// Creates a closed curve from the floor's centre `start` through `pieces` and back to `start`.
     ///
-    /// Pieces run counter-clockwise with y to the right and z up. All of the wall must be visible from `reference`.
+    /// Pieces run counter-clockwise if y is drawn to the right and z up. All of the wall must be visible from
+    /// `reference`.
     ///
-    /// Errors: see [`ProfileError`].
-    /// Allocates: startup only.
+    /// Errors: see [`ProfileError`]. Allocates: startup only.
     pub fn new(start: Yz, pieces: &[Piece], reference: Yz) -> Result<Self, ProfileError> {
         let (mut elements, mut pieces_of) = (Vec::new(), Vec::new());
         let mut at = start;
@@ -163,10 +164,11 @@ impl Profile {
         self.hit(self.reference, direction).is_some_and(|hit| hit.range_m >= 1.0)
     }
 
-    /// Returns the first exit of the ray from `origin` along `direction` (any non-zero length).
+    /// Returns the point at which the ray from `origin` first leaves the profile. `direction` may have any length above
+    /// zero.
     ///
-    /// From inside there is always an exit: if rounding lets a ray slip between two elements, their common vertex is
-    /// used. From outside the result is `None`.
+    /// From inside, there is always such a point. If rounding lets a ray slip between two elements, their common vertex
+    /// is used. From outside, the result is `None`.
     pub fn cast(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         if !self.contains(origin) {
             return None;
@@ -183,7 +185,7 @@ impl Profile {
 
     /// Returns the arc length of the wall in the direction of `point`, as seen from the reference point.
     ///
-    /// The spacing of samples uses this arc length even if the wall differs from the design. The result is zero for the
+    /// The spacing of samples uses this arc length even where the wall differs from the design. It is zero for the
     /// reference point itself.
     pub fn arc_of(&self, point: Yz) -> f64 {
         let direction = sub(point, self.reference);
@@ -197,7 +199,7 @@ impl Profile {
         self.elements.get(index).map_or(self.reference, |element| element.point_at(arc - element.arc_m))
     }
 
-    /// Returns 64 equidistant points around the wall for frequent approximate checks.
+    /// Returns 64 wall points at equal spacing, for frequent approximate checks.
     ///
     /// The first point is the floor's centre.
     pub fn places(&self) -> &[Yz] {
@@ -217,7 +219,7 @@ impl Profile {
     /// Clock position of a place on the wall, hours from 0 to 12, as in [`clock`](Self::clock).
     pub fn hour(&self, arc_m: f64) -> f64 {
         let place = sub(self.point_at(arc_m), self.reference);
-        // Head angle: 0 is down, and angles grow to the left.
+        // Angle as of a head: 0 is down, and angles grow to the left.
         let angle = math::wrap(math::atan2(place[0], -place[1]), TAU);
         math::wrap(angle / TAU * 12.0 + 6.0, 12.0)
     }
@@ -234,18 +236,17 @@ impl Profile {
         }
     }
 
-    /// Returns the largest distance of the wall from a line through `origin`, m.
+    /// Returns the largest distance of the wall from a line through `origin`, m, on either side.
     ///
-    /// The line is perpendicular to the unit vector `direction`. Wall on either side of the line is considered. For a
-    /// polygon of many points, the result may be too large, by up to 12 mm per metre of the longest edge of the points'
-    /// convex hull.
+    /// The line is perpendicular to the unit vector `direction`. For a polygon of many points, the result may be too
+    /// large. The excess is at most 12 mm per metre of the longest edge of the points' convex hull.
     pub fn farthest_along_m(&self, origin: Yz, direction: Yz) -> f64 {
         let farthest_m = |element: &Element| {
             let start_m = dot(sub(element.start, origin), direction).abs();
             let Shape::Arc { centre, radius_m, middle, cos_half, .. } = element.shape else { return start_m };
             let (centre_m, towards) = (dot(sub(centre, origin), direction), dot(middle, direction));
-            // The wall of an arc is farthest from the line where the arc's tangent is parallel to the line. There is
-            // one such point on each side.
+            // An arc is farthest from the line where its tangent is parallel to the line. There is one such point on
+            // each side of the line.
             let ahead_m = if towards >= cos_half { (centre_m + radius_m).abs() } else { 0.0 };
             let astern_m = if -towards >= cos_half { (centre_m - radius_m).abs() } else { 0.0 };
             start_m.max(ahead_m).max(astern_m)
@@ -280,8 +281,8 @@ impl Profile {
         let entry = |bounds: &Bounds| bounds.entry(origin, direction);
         self.tree.search(self.elements.len(), entry, |some| {
             for (index, element) in self.elements.iter().enumerate().take(some.end).skip(some.start) {
-                // If several elements are equally near, the first one along the wall wins, whatever the order of the
-                // search.
+                // If several elements are equally near, the first one along the wall is used. So the order of the
+                // search does not matter.
                 if let Some(t) = element.crossing(origin, direction)
                     && best.is_none_or(|nearest| (t, index) < nearest)
                 {
@@ -303,7 +304,7 @@ impl Profile {
         })
     }
 
-    /// Returns the vertex nearest to a ray that slipped between two elements.
+    /// Returns the vertex nearest to a ray that has slipped between two elements through rounding.
     fn nearest_vertex(&self, origin: Yz, direction: Yz) -> Option<(f64, usize)> {
         let length2 = dot(direction, direction);
         let ahead = |(index, element): (usize, &Element)| {
@@ -317,7 +318,7 @@ impl Profile {
     }
 }
 
-/// Checks that all of the wall is visible from the reference point. Each element is given with the index of its piece.
+/// Checks that all of the wall is visible from the reference point. Each element comes with the index of its piece.
 fn check_star_shaped<'a>(
     elements: impl Iterator<Item = (&'a Element, usize)>,
     reference: Yz,

@@ -3,25 +3,25 @@
 use super::plane::{Yz, cross, dot, norm, sub};
 use crate::math::{self, TAU};
 
-/// Angle by which a ray's hit may lie beyond an arc's end, rad, so that neighbouring elements leave no gap.
+/// Angle by which a hit may lie beyond an arc's end, rad. It leaves no gap between neighbouring elements.
 pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
 /// Margin beyond which a ray's hit is clearly inside or outside the angle of an arc.
 ///
-/// The margin is a difference of two cosines: that of the angle between the arc's middle and the hit, and that of the
-/// angle between the arc's middle and its end. It is far larger than `ARC_SLACK_RAD` plus rounding.
+/// It is a difference of two cosines, those of the angles from the arc's middle to the hit and to the arc's end. It is
+/// far larger than `ARC_SLACK_RAD` plus rounding.
 const CLEAR: f64 = 1e-9;
 
-/// An edge of the profile and a ray count as parallel if the sine of their angle is below this.
+/// Sine of the angle between a ray and an edge of the profile below which they count as parallel.
 const PARALLEL: f64 = 1e-6;
 
-/// One input piece of a profile, a line or an arc; pieces run counter-clockwise with y to the right and z up.
+/// One input piece of a profile. Pieces run counter-clockwise if y is drawn to the right and z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A straight line to the given point.
     LineTo(Yz),
     /// An arc about `centre` through the angle `sweep_rad` > 0.
     ///
-    /// The polar angle grows, so the arc bulges outwards.
+    /// The arc runs counter-clockwise, so it bulges outwards.
     Arc {
         /// Centre of the arc's circle.
         centre: Yz,
@@ -55,14 +55,13 @@ pub(super) enum Shape {
 }
 
 impl Element {
-    /// Returns the ray parameter at which the ray leaves the profile through this element.
+    /// Returns the ray parameter at which the ray leaves the profile through this element, if it does.
     pub(super) fn crossing(&self, origin: Yz, direction: Yz) -> Option<f64> {
         let (start, end) = (sub(self.start, origin), sub(self.end, origin));
         match self.shape {
             Shape::Line => {
-                // A ray leaves the profile if the element's start is on the ray's right and the end is on its left.
-                // Two elements that share a vertex use the same product for it, so that the ray hits exactly one of
-                // the two.
+                // A ray leaves the profile if the element's start is on its right and the element's end on its left.
+                // Two elements compute the same product for their common vertex, so the ray hits exactly one of them.
                 let (right, left) = (cross(direction, start), cross(direction, end));
                 if !(right <= 0.0 && left > 0.0) {
                     return None;
@@ -70,8 +69,8 @@ impl Element {
                 let (along, apart) = (sub(self.end, self.start), left - right);
                 let t = cross(start, along) / apart;
                 let length2 = dot(direction, direction);
-                // For a ray along the edge, both cross products are mere rounding errors. The exit point is then
-                // limited to the edge.
+                // For a ray along the edge, both cross products are mere rounding errors. Clamping then keeps the exit
+                // point on the edge.
                 let t = if apart * apart < PARALLEL * PARALLEL * length2 * dot(along, along) {
                     let ends = [dot(start, direction) / length2, dot(end, direction) / length2];
                     t.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
@@ -155,8 +154,8 @@ impl Element {
                 (angle > 0.0).then_some(angle)
             }
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
-                // At the polar angle theta, the arc runs forwards if (centre - reference) . e(theta) + radius > 0.
-                // The condition is checked at 256 steps.
+                // At the polar angle theta, the arc runs forwards if (centre - reference) . e(theta) + radius > 0. This
+                // is checked at 256 angles.
                 let shift = sub(centre, reference);
                 let steps = 256;
                 let mut angle = 0.0;

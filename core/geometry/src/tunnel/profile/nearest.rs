@@ -18,9 +18,9 @@ pub struct Nearest {
 }
 
 impl Profile {
-    /// Returns the point of the wall nearest to `point`, from inside or outside; exact for lines and arcs.
+    /// Returns the point of the wall nearest to `point`, from inside or outside. It is exact for lines and arcs.
     ///
-    /// Among equally near points, the result is the first in order of arc length.
+    /// If several points are equally near, the one on the first element in order of arc length is returned.
     ///
     /// Allocates: never.
     pub fn nearest(&self, point: Yz) -> Nearest {
@@ -73,8 +73,8 @@ mod tests {
     use super::*;
     use crate::tunnel::shapes;
 
-    /// Smallest distance from `point` to wall points that are 0.5 mm apart. It exceeds the distance to the wall by less
-    /// than 0.25 mm.
+    /// Smallest distance from `point` to wall points that are 0.5 mm apart. It is at most 0.25 mm longer than the
+    /// distance to the wall.
     fn by_places(profile: &Profile, point: Yz) -> f64 {
         let places = math::round_to_i64(profile.perimeter_m() / 5e-4);
         (0..places).map(|k| norm(sub(point, profile.point_at(k as f64 * 5e-4)))).fold(f64::INFINITY, f64::min)

@@ -5,12 +5,11 @@ use super::element::Piece;
 use super::plane::{Yz, cross, norm, sub};
 
 impl Profile {
-    /// Creates a polygon through `points`, in either sense of rotation.
+    /// Creates a polygon through `points`, in clockwise or counter-clockwise order.
     ///
     /// Arc length begins at the lowest crossing of y = 0. `reference` defaults to the polygon's centroid.
     ///
-    /// Errors: see [`ProfileError`], which gives a vertex as an index into `points`.
-    /// Allocates: startup only.
+    /// Errors: see [`ProfileError`]. Its vertices are indices into `points`. Allocates: startup only.
     pub fn polygon(points: &[Yz], reference: Option<Yz>) -> Result<Self, ProfileError> {
         if let Some(vertex) = points.iter().position(|p| !p.iter().all(|c| c.abs() <= 1000.0)) {
             return Err(ProfileError::NotFinite { vertex });
@@ -30,8 +29,8 @@ impl Profile {
         let pieces: Vec<Piece> = (1..=count).filter_map(vertex).map(|v| Piece::LineTo(v.point)).collect();
         Self::new(start, &pieces, reference.unwrap_or(centroid)).map_err(|error| match error {
             ProfileError::NotStarShaped { vertex: piece, reference } => {
-                // Each piece of the profile begins where the previous piece ends. The first piece begins within the
-                // edge that crosses y = 0.
+                // A piece begins where the piece before it ends. The first one begins within the edge that crosses y =
+                // 0, so it counts as that edge.
                 let index = vertex(piece).map_or(0, |begin| begin.index);
                 ProfileError::NotStarShaped { vertex: index, reference }
             }
@@ -47,7 +46,7 @@ struct Vertex {
     point: Yz,
 }
 
-/// Removes points that repeat their predecessor; the first point's predecessor is the last point.
+/// Removes points that repeat their predecessor. The predecessor of the first point is the last point.
 fn distinct(points: &[Yz]) -> Vec<Vertex> {
     let mut ring: Vec<Vertex> = Vec::with_capacity(points.len());
     for (index, point) in points.iter().copied().enumerate() {
@@ -89,7 +88,7 @@ fn area_and_centroid(ring: &[Vertex]) -> (f64, Yz) {
 
 /// Finds the lowest crossing of y = 0.
 ///
-/// Returns the index of the first point of the edge, and the crossing.
+/// Returns the crossing, and the index of the first point of the edge on which it lies.
 fn floor_centre(ring: &[Vertex]) -> Option<(usize, Yz)> {
     let crossing = |(index, (a, b)): (usize, (Yz, Yz))| {
         if (a[0] <= 0.0) == (b[0] <= 0.0) {

@@ -1,4 +1,4 @@
-//! Table that bounds the extent of a profile with many elements in any direction.
+//! Table of a profile's extent by direction. It gives bounds for a profile with many elements.
 
 use super::plane::{Yz, dot, norm};
 use crate::math::{self, TAU};
@@ -8,9 +8,9 @@ const DIRECTIONS: usize = 128;
 
 /// Extent of the profile's points in each direction of the table, m.
 ///
-/// For a direction between two directions of the table, the entries of both give an upper bound. The bound is too large
-/// by at most half the longest edge of the points' convex hull times tan(pi / [`DIRECTIONS`]) = 0.025. For a flat wall,
-/// this is 12 mm per metre.
+/// Between two directions of the table, both entries together give an upper bound. It is too large by at most half the
+/// longest edge of the points' convex hull times tan(pi / [`DIRECTIONS`]) = 0.025. For a flat wall, this is 12 mm per
+/// metre.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Support(Vec<(Yz, f64)>);
 

@@ -6,11 +6,11 @@
 use super::element::{Element, Shape};
 use super::plane::{Yz, norm};
 
-/// Number of elements in a leaf of the tree; these elements are neighbours along the wall.
+/// Number of elements in a leaf of the tree. They are neighbours along the wall.
 const LEAF: usize = 8;
-/// Profiles with at most this many elements have no tree, because searching all of them is as fast.
+/// Number of elements up to which a profile has no tree, because searching all of them is as fast.
 const FEW: usize = 24;
-/// Margin of the boxes around their elements, m, far larger than rounding errors and an arc's slack.
+/// Margin of the boxes around their elements, m. It is far larger than rounding errors and `ARC_SLACK_RAD`.
 const MARGIN_M: f64 = 1e-6;
 /// Depth of a tree over the largest supported number of elements.
 const DEPTH: usize = 40;
@@ -25,7 +25,7 @@ pub(super) struct Bounds {
 /// The bounding boxes of the tree.
 ///
 /// Node 1 contains all elements, and nodes 2 i and 2 i + 1 contain the halves of node i. `leaves` is the number of
-/// leaves. The tree is empty for few elements.
+/// leaves. A profile of few elements has an empty tree.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Tree {
     nodes: Vec<Bounds>,
@@ -35,7 +35,7 @@ pub(super) struct Tree {
 impl Bounds {
     const EMPTY: Self = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
 
-    /// The box of an arc contains the arc's whole circle, because this larger box is simpler to compute.
+    /// The box of an arc contains the whole circle, because that box is simpler to compute.
     fn of(element: &Element) -> Self {
         let Element { start, end, .. } = *element;
         let of = |place: fn(f64, f64) -> f64, off: f64| {
@@ -101,8 +101,8 @@ impl Tree {
 
     /// Visits ranges of element indices that may contain a better result than the best one found so far.
     ///
-    /// `bound` returns the minimum cost of any element in a box. `look` returns the best cost found so far. If several
-    /// elements have the lowest cost, all of them are visited.
+    /// `bound` returns the least cost that an element in a box may have. `look` visits a range and returns the lowest
+    /// cost so far. If several elements have the lowest cost, all of them are visited.
     pub(super) fn search(
         &self,
         count: usize,

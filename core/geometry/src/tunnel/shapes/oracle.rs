@@ -39,7 +39,7 @@ fn rays_that_start_1_mm_from_the_wall_agree_with_50_digit_values() {
     found("geometry.millimetre", range_m.max(arc_m), 1e-13);
 }
 
-/// If a ray meets the wall at 89.99 degrees to the normal, a position error across the wall causes an error along the
+/// A ray meets the wall at 89.99 degrees to the normal. Then a position error across the wall causes an error along the
 /// wall that is 5,730 times as large.
 #[test]
 fn rays_nearly_along_the_wall_agree_with_50_digit_values() {
@@ -58,7 +58,7 @@ fn rays_through_corners_and_an_ulp_beside_them_agree_with_50_digit_values() {
 
 /// In the formula for a tangent ray, the value under the root is 0 or a few ulps.
 ///
-/// An error of one ulp in this value is an error of sqrt(ulp) in the result.
+/// An error of one ulp in it is an error of sqrt(ulp) in the result.
 #[test]
 fn rays_tangent_to_the_vault_agree_with_50_digit_values() {
     let (range_m, arc_m, count) = worst("tangent");
@@ -66,10 +66,10 @@ fn rays_tangent_to_the_vault_agree_with_50_digit_values() {
     found_at("geometry.tangent", 1.0 / math::sqrt(f64::EPSILON), range_m.max(arc_m), 1e-7);
 }
 
-/// The profile is a rotated square with rounded corners, so its walls run into arcs tangentially.
+/// The profile is a rotated square with rounded corners, so each wall runs into an arc tangentially.
 ///
-/// Rounding puts a ray along a wall slightly inside or outside the arcs' circles. The value under the root can thus
-/// have either sign.
+/// Through rounding, a ray along a wall is slightly inside or outside the circle of the arc. So the value under the
+/// root has either sign.
 #[test]
 fn rays_along_walls_end_at_the_end_of_the_wall() {
     let (half, radius) = (2.0, 0.5);
@@ -109,8 +109,8 @@ fn rays_along_walls_end_at_the_end_of_the_wall() {
             let hit = profile
                 .cast_from_inside(origin, direction)
                 .unwrap_or_else(|| panic!("no wall at turn {turn}"));
-            // Through rounding, a ray along a straight wall may hit this wall before its end. Past the end, only the
-            // arc can be hit.
+            // Through rounding, a ray along a straight wall may hit the wall before its end, which is no error. Past
+            // the end, only the arc can be hit.
             let off = [hit.point[0] - end[0], hit.point[1] - end[1]];
             let beyond_m = off[0] * direction[0] + off[1] * direction[1];
             let across_m = off[0] * direction[1] - off[1] * direction[0];

@@ -23,7 +23,7 @@ fn all() -> Vec<(&'static str, Profile)> {
     ]
 }
 
-/// The expected values are derived from the figures of Jorge et al. 2021.
+/// The expected values are derived from the dimensions in Jorge et al. 2021.
 #[test]
 fn ceran_tunnel_has_the_dimensions_derived_from_the_paper() {
     let ceran = ceran().unwrap();
@@ -50,7 +50,7 @@ fn arc_length_grows_with_the_head_angle_from_the_floor_centre() {
     }
 }
 
-/// A dense polyline of the same curve is inscribed in the arcs, so ranges to it are slightly too short.
+/// A dense polyline through points of the profile is inscribed in its arcs, so ranges to it are slightly too short.
 #[test]
 fn ranges_agree_with_a_dense_polyline() {
     for (name, profile) in all() {
@@ -119,8 +119,8 @@ fn rays_that_start_1_mm_from_the_wall_end_on_the_wall() {
 
 /// A ray runs up along a wall, which continues tangentially as a half-circle.
 ///
-/// The ray touches the circle at its start. A few ulps beside the wall, the ray crosses the circle above its start.
-/// The crossing is sqrt((2 - y) (2 + y)) above the springing of the vault, computed without cancellation.
+/// The ray touches the circle at its start. A ray a few ulps inside the wall crosses the circle above its start, by
+/// sqrt((2 - y) (2 + y)). The test computes this height without cancellation.
 #[test]
 fn ray_tangent_to_the_vault_meets_it_at_the_springing() {
     let profile = arch(4.0, 4.0, 2.0).unwrap();

@@ -45,12 +45,12 @@ proptest! {
 }
 
 proptest! {
-    /// Distances never exceed the bounds from the table of extents, and the bounds' excess is limited by geometry.
+    /// Distances never exceed the bounds from the table of extents, and the bounds exceed the distances only a little.
     ///
     /// The direction of the farthest point differs from a direction of the table by at most half an angular step. The
-    /// tangents in two neighbouring directions touch two points, and meet beyond the edge between these points. Their
-    /// intersection is at most half the edge's length times tan(half a step) away from the edge. The longest edge of
-    /// the hull in this test is a chord that passes 1.8 m from the centre, with its ends at 2.2 m.
+    /// tangents in two neighbouring directions touch the hull at two points, and meet beyond the edge between them.
+    /// They meet at most half the edge's length times tan(half a step) away from the edge. The longest edge of the hull
+    /// in this test is a chord that passes 1.8 m from the centre, with its ends at 2.2 m.
     #[test]
     fn precomputed_distance_bounds_exceed_the_exact_values_by_a_limited_amount(
         radii in prop::collection::vec(prop_oneof![9 => 1.8..2.2_f64, 1 => Just(1.8)], 257..600),
@@ -58,7 +58,7 @@ proptest! {
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
     ) {
-        // A few points are much farther from the centre than all others, so the edges of the convex hull are long.
+        // With a level, one point in 32 is much farther from the centre than the others. Then the hull has long edges.
         let radii: Vec<f64> = match level {
             Some(of_32) => radii.iter().enumerate().map(|(k, r)| if k % 32 == of_32 { *r } else { 1.8 }).collect(),
             None => radii,
@@ -88,7 +88,7 @@ fn search_tree_returns_the_same_element_of_equally_near_ones_as_a_full_search() 
     assert_eq!(tree.nearest([0.0, 3.0]), plain(&tree).nearest([0.0, 3.0]));
 }
 
-/// A query visits few of the profile's 100,000 elements. The test counts the visits and measures no time.
+/// A query visits few of the profile's 100,000 elements. The test counts visits instead of measuring time.
 #[test]
 fn profile_query_visits_few_of_many_elements() {
     let radii: Vec<f64> = (0..100_000).map(|k| 2.0 + 0.01 * math::sin(f64::from(k) * 0.37)).collect();
@@ -116,7 +116,7 @@ fn profile_query_visits_few_of_many_elements() {
 
 #[test]
 fn error_of_a_rejected_polygon_names_the_input_point() {
-    // The left wall has a hook whose edges run backwards after the fourth point, in any numbering of the points.
+    // The left wall has a hook. Its edges run backwards after the fourth point, whichever point is the first.
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];
     let refused = |points: &[Yz]| match Profile::polygon(points, Some([0.0, 0.2])) {
         Err(ProfileError::NotStarShaped { vertex, .. }) => {
@@ -128,10 +128,10 @@ fn error_of_a_rejected_polygon_names_the_input_point() {
         let mut turned = hooked;
         turned.rotate_left(first);
         assert_eq!(refused(&turned), 2, "from {first}");
-        // With repeated points, the error still refers to the numbering of the input.
+        // If each point is repeated, the error still gives the index in the input.
         let repeated: Vec<Yz> = turned.iter().flat_map(|point| [*point, *point]).collect();
         assert_eq!(refused(&repeated), 2, "from {first}");
-        // In the reversed list of points, the offending edge begins at its other end.
+        // If the order of the points is reversed, the offending edge begins at its other end.
         turned.reverse();
         assert!([2, 3].contains(&refused(&turned)), "from {first}");
     }
