@@ -72,8 +72,8 @@ impl<'a> Document<'a> {
         self.is_short()?;
         let (table, broken) = DeTable::parse_recoverable(self.text);
         // Only the first syntax error of a line is reported, because it causes the others on this line.
-        let told = broken.iter().take(2 * MOST_ERRORS);
-        let mut broken: Vec<ConfigError> = told.map(|error| self.broken(error)).collect();
+        let reported = broken.iter().take(2 * MOST_ERRORS);
+        let mut broken: Vec<ConfigError> = reported.map(|error| self.broken(error)).collect();
         broken.dedup_by_key(|error| error.line);
         if let Some(errors) = ConfigErrors::of(broken) {
             return Err(errors);

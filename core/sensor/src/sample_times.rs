@@ -100,7 +100,7 @@ impl SampleTimes {
         };
         let Some(stamped) = &mut self.stamped else { return received };
         let last = self.last_reading.replace(received);
-        if let Some(last) = last.filter(|_| stamped.told == [false; KINDS]) {
+        if let Some(last) = last.filter(|_| stamped.seen == [false; KINDS]) {
             // Receive times within a burst are equal. They do not show whether the stamp came before the readings.
             let lead = match received.since(stamped.received).cmp(&stamped.received.since(last)) {
                 Ordering::Less => 1,
