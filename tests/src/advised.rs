@@ -42,7 +42,7 @@ impl PacketSource for Partly {
 /// Advice at each update of a dive, with the dive's report and digest.
 pub struct Advised {
     /// Advice at each update of the dive.
-    pub beats: Vec<AdviceEntry>,
+    pub entries: Vec<AdviceEntry>,
     /// Report of the dive.
     pub report: Report,
     /// Digest of the dive's results.
@@ -59,19 +59,19 @@ pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let dumb = dumb.map(|id| dive.sources().iter().position(|source| source.id == id).unwrap());
     let mut feed = Partly { simulation: Simulation::new(scene).unwrap_or_else(|why| panic!("{why}")), dumb };
-    let mut beats = Vec::new();
+    let mut entries = Vec::new();
     let mut note = |dive: &headrace_monitor::run::Loop| {
-        beats.extend_from_slice(&dive.view().advised().entries);
+        entries.extend_from_slice(&dive.view().advised().entries);
     };
     drive(&mut dive, &mut feed, Pace { tick, ..Pace::default() }, &mut note).unwrap();
     dive.finish(&mut |_, _| {});
-    Advised { beats, report: Report::of(&dive), digest: dive.view().digest() }
+    Advised { entries, report: Report::of(&dive), digest: dive.view().digest() }
 }
 
 impl Advised {
     /// Advice updates in the second half of the dive.
     pub fn settled(&self) -> &[AdviceEntry] {
-        &self.beats[self.beats.len() / 2..]
+        &self.entries[self.entries.len() / 2..]
     }
 
     /// Median of a value over the advice updates in the second half of the dive.

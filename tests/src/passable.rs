@@ -63,7 +63,7 @@ pub struct Outcome {
     /// Largest ratio of the true hole diameter D_true to the target T among the evaluated sections.
     pub true_share: f64,
     /// Advice updates in the evaluated part of the dive.
-    pub beats: Vec<AdviceEntry>,
+    pub entries: Vec<AdviceEntry>,
 }
 
 /// Advised speeds of a vehicle, and the largest speed at which its sections truly pass.
@@ -106,7 +106,7 @@ impl Outcome {
 
     /// Median of a value over all evaluated advice updates.
     pub fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
-        let mut all: Vec<f64> = self.beats.iter().map(of).collect();
+        let mut all: Vec<f64> = self.entries.iter().map(of).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     }
@@ -116,7 +116,7 @@ impl Outcome {
     ///
     /// A swaying vehicle temporarily gets lower advice, which a constant speed can't follow.
     pub fn advised_mps(&self) -> f64 {
-        let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
+        let mut all: Vec<f64> = self.entries.iter().map(|entry| entry.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }
@@ -128,8 +128,8 @@ impl Outcome {
             (pair[0].advice.v_max_mps - pair[1].advice.v_max_mps).abs() > 1e-6
                 || pair[0].advice.reason != pair[1].advice.reason
         };
-        let changes = self.beats.windows(2).filter(|pair| changed(pair)).count();
-        changes as f64 * 300.0 / self.beats.len().max(150) as f64
+        let changes = self.entries.windows(2).filter(|pair| changed(pair)).count();
+        changes as f64 * 300.0 / self.entries.len().max(150) as f64
     }
 }
 
@@ -183,13 +183,13 @@ impl Outing {
         let scene = self.scene(planned_mps, speed_mps, length_m);
         let from_m = self.start_m + settles_m;
         let to_m = from_m + self.judged_m();
-        let mut beats = Vec::new();
+        let mut entries = Vec::new();
         let judged = truth::dive_noting(&scene, &scene.vehicle, &mut |dive| {
             for notice in dive.view().notices() {
                 if let Notice::Advice(entry) = notice
                     && entry.chainage_m.is_some_and(|x_m| x_m >= from_m && x_m <= to_m)
                 {
-                    beats.push(entry);
+                    entries.push(entry);
                 }
             }
         });
@@ -210,7 +210,7 @@ impl Outing {
             falsely: falsely.count(),
             true_share: sections.iter().map(|section| section.true_hole_m).fold(0.0, f64::max)
                 / self.target_m,
-            beats,
+            entries,
         }
     }
 

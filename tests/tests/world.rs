@@ -95,7 +95,7 @@ fn every_sabotage_breaks_an_invariant() {
 #[test]
 fn blocked_terminal_does_not_change_results() {
     for seed in 0..20 {
-        let [taken, stood] = [false, true].map(|stands| World::new(seed).with_terminal(stands).live());
+        let [taken, stood] = [false, true].map(|is_open| World::new(seed).with_terminal(is_open).live());
         assert_eq!((taken.digest, &taken.consumed), (stood.digest, &stood.consumed), "seed {seed}");
         let bytes = |lived: &DiveResult| lived.left.iter().map(|file| file.bytes.len()).sum::<usize>();
         assert_eq!(bytes(&taken), bytes(&stood), "seed {seed}");

@@ -300,8 +300,9 @@ mod tests {
             let look = Rot::from_roll_pitch_yaw(0.0, 0.0, yaw) * Vec3::<Body>::new(1.0, 0.0, 0.0);
             looks.keep(MonoNs(0) + DurNs::from_secs_f64(seconds), look);
         };
-        (0..100).for_each(|beat| keep(0.2 * f64::from(beat), 0.1));
-        (0..=50).for_each(|beat| keep(80.0 + 0.2 * f64::from(beat), if beat == 50 { 0.01 } else { 0.0 }));
+        (0..100).for_each(|update| keep(0.2 * f64::from(update), 0.1));
+        (0..=50)
+            .for_each(|update| keep(80.0 + 0.2 * f64::from(update), if update == 50 { 0.01 } else { 0.0 }));
         let recent = looks.uninterrupted();
         assert!((recent.span_s() - 10.0).abs() < 1e-9, "{}", recent.span_s());
         let left_m = [3.0, 0.0];

@@ -139,10 +139,10 @@ mod tests {
     /// A minute of directions of a vehicle whose yaw is a sine with the amplitude `yaw_rad` and this period, s.
     fn looks(yaw_rad: f64, period_s: f64) -> Looks {
         let mut looks = Looks::default();
-        for beat in 0..320_u32 {
-            let yaw = yaw_rad * math::sin(TAU * 0.2 * f64::from(beat) / period_s);
+        for update in 0..320_u32 {
+            let yaw = yaw_rad * math::sin(TAU * 0.2 * f64::from(update) / period_s);
             let look = Rot::from_roll_pitch_yaw(0.0, 0.0, yaw) * Vec3::<Body>::new(1.0, 0.0, 0.0);
-            looks.keep(MonoNs(u64::from(beat) * 200_000_000), look);
+            looks.keep(MonoNs(u64::from(update) * 200_000_000), look);
         }
         looks
     }

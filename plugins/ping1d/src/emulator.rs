@@ -118,7 +118,7 @@ impl PingEmulator {
     }
 
     /// Encodes a ping as the message with this id.
-    fn telling(&mut self, about: u16, distance_mm: Option<u32>) -> Message {
+    fn distance_message(&mut self, about: u16, distance_mm: Option<u32>) -> Message {
         self.pings = self.pings.wrapping_add(1);
         let distance = Distance {
             distance_mm: distance_mm.unwrap_or(0),
@@ -200,7 +200,7 @@ impl Emulator<Sounding> for PingEmulator {
             }
         }
         let distance_mm = self.distance_mm(sounding.range_m);
-        let message = self.telling(about, distance_mm);
+        let message = self.distance_message(about, distance_mm);
         self.say(sounding.at, &message, line);
     }
 }

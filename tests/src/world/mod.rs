@@ -208,10 +208,10 @@ impl World {
         }
     }
 
-    /// The same world with a terminal that accepts nothing if `stands` is set, and otherwise everything.
+    /// The same world with a terminal that accepts nothing if `is_open` is set, and otherwise everything.
     #[must_use]
-    pub fn with_terminal(mut self, stands: bool) -> Self {
-        self.plan = self.plan.with_terminal(stands);
+    pub fn with_terminal(mut self, is_open: bool) -> Self {
+        self.plan = self.plan.with_terminal(is_open);
         self
     }
 

@@ -275,12 +275,12 @@ impl Plan {
         plan
     }
 
-    /// The same plan with a terminal that accepts nothing if `stands` is set, and otherwise everything.
+    /// The same plan with a terminal that accepts nothing if `is_open` is set, and otherwise everything.
     #[must_use]
-    pub fn with_terminal(mut self, stands: bool) -> Self {
+    pub fn with_terminal(mut self, is_open: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);
         let always = Window { what: MachineFault::TerminalStands, from: BEGIN, to: MonoNs(u64::MAX) };
-        self.machine.extend(stands.then_some(always));
+        self.machine.extend(is_open.then_some(always));
         self
     }
 

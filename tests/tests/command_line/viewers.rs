@@ -77,8 +77,8 @@ fn every_view_message_matches_its_schema_and_the_dive() {
     assert_eq!(names, all);
 
     let [duration_s] = numbers(&report["dive"], ["duration_s"]);
-    let beats = topics["vehicle"].len() as f64;
-    assert!((beats - 5.0 * duration_s).abs() < 3.0, "{beats} beats in {duration_s} s");
+    let updates = topics["vehicle"].len() as f64;
+    assert!((updates - 5.0 * duration_s).abs() < 3.0, "{updates} beats in {duration_s} s");
     for transforms in &topics["transforms"] {
         for transform in transforms["transforms"].as_array().unwrap() {
             let turn = numbers(&transform["rotation"], ["x", "y", "z", "w"]);

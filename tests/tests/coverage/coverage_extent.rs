@@ -295,8 +295,7 @@ fn stretch_without_a_position_fails_once_the_vehicle_has_left_it() {
 
 #[test]
 fn dive_without_a_position_reports_first_that_it_has_no_verdicts() {
-    for (sensor, lacking, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")]
-    {
+    for (sensor, no_fix, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")] {
         let folder = Folder::new();
         folder.write("vehicle.toml", SHORT);
         let silence = format!("[effects]\n{}", silence(&format!("\"{sensor}\""), "from_s = 0"));
@@ -310,10 +309,7 @@ fn dive_without_a_position_reports_first_that_it_has_no_verdicts() {
         assert_eq!(loud, format!("{wanted}; {sensor} sent nothing"), "{}", answer.stdout);
         let (code, report) = folder.replay("dive.mcap", &[]);
         let why = &report["not_inspected"];
-        assert_eq!(
-            (code, &why["reason"], &why["missing"]),
-            (Some(1), &"no_position".into(), &lacking.into())
-        );
+        assert_eq!((code, &why["reason"], &why["missing"]), (Some(1), &"no_position".into(), &no_fix.into()));
         assert_eq!(why["silent_sources"], serde_json::json!([sensor]));
         assert_eq!(report["coverage_extent"]["length_m"], 0.0);
     }

@@ -131,8 +131,8 @@ fn every_flagged_section_fails_if_positions_are_exact() {
     every_flag(
         |judged| forward(judged) && direct(judged),
         |_, _, due| {
-            let stands = due.raised_s.is_some() && due.cleared_s.is_none();
-            (stands && !due.fails).then_some("the flag remains although the section doesn't fail")
+            let is_flagged = due.raised_s.is_some() && due.cleared_s.is_none();
+            (is_flagged && !due.fails).then_some("the flag remains although the section doesn't fail")
         },
     );
 }
@@ -161,8 +161,8 @@ fn filled_hole_has_no_flag() {
     let reversing = |judged: &Judged| judged.seeded.kind == Kind::Reversing;
     every_flag(reversing, |judged, due, _| {
         let section = judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
-        let stands = due.raised_s.is_some() && due.cleared_s.is_none();
-        (stands && section.verdict == Verdict::Pass).then_some("passes but keeps its flag")
+        let is_flagged = due.raised_s.is_some() && due.cleared_s.is_none();
+        (is_flagged && section.verdict == Verdict::Pass).then_some("passes but keeps its flag")
     });
 }
 

@@ -71,11 +71,11 @@ fn dive_in_parts_replays_and_verifies_as_one() {
 
     // One missing part is reported as a loss. If all parts but one are missing, each of them is reported.
     std::fs::remove_file(folder.path("parts/dive.part002.mcap")).unwrap();
-    let (code, lacking) = folder.replay("parts", &[]);
-    let losses = lacking["log"]["losses"].to_string();
+    let (code, report) = folder.replay("parts", &[]);
+    let losses = report["log"]["losses"].to_string();
     assert!(code == Some(3) && losses.contains("part 2 of the recording is missing (after "), "{losses}");
-    let (code, lacking) = folder.replay("parts/dive.part001.mcap", &[]);
-    let losses = lacking["log"]["losses"].to_string();
+    let (code, report) = folder.replay("parts/dive.part001.mcap", &[]);
+    let losses = report["log"]["losses"].to_string();
     assert!(
         code == Some(3) && losses.contains("part 2 of the recording is missing, and any after"),
         "{losses}"

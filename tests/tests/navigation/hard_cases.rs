@@ -45,14 +45,14 @@ struct Errors {
     anywhere_m: f64,
     upside_down: u32,
     turned_round: u32,
-    lacking: usize,
+    without_fix: usize,
 }
 
 fn errors(track: &Track) -> Errors {
     let mut found = Errors::default();
     for tracked in &track.fixes {
         let Ok(fix) = tracked.fix else {
-            found.lacking += 1;
+            found.without_fix += 1;
             continue;
         };
         let truth = tracked.truth;
@@ -83,7 +83,7 @@ fn fix_is_accurate_beyond_90_degrees_of_pitch_and_at_180_degrees_of_yaw() {
     let errors = errors(&track);
     println!("{errors:?} of {}", track.fixes.len());
     assert!(errors.upside_down > 5000 && errors.turned_round > 5000, "{errors:?}");
-    assert!(errors.lacking * 100 < track.fixes.len(), "{errors:?}");
+    assert!(errors.without_fix * 100 < track.fixes.len(), "{errors:?}");
     found("loop.attitude_turn", errors.turn_rad, 0.02);
     found("loop.attitude_place", errors.along_axis_m, 0.1);
     found("loop.attitude_grazing", errors.anywhere_m, 0.3);

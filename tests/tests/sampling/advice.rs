@@ -132,7 +132,7 @@ impl Case {
     /// phase at that same speed.
     fn planned_mps(&self) -> f64 {
         let first = dive(&self.scene(0.1, 0.1, 3.0), self.dumb, TICK);
-        let alternatives = first.beats.last().unwrap().advice.alternatives;
+        let alternatives = first.entries.last().unwrap().advice.alternatives;
         alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
@@ -176,7 +176,7 @@ impl Judged {
         };
         let mut holes: Vec<f64> = sections.iter().map(|section| section.hole_m.unwrap()).collect();
         holes.sort_by(f64::total_cmp);
-        let predicted_t_m = dive.median(|beat| beat.advice.predicted_t_m.unwrap());
+        let predicted_t_m = dive.median(|entry| entry.advice.predicted_t_m.unwrap());
         Self {
             failing: share(Verdict::Fail),
             passing: share(Verdict::Pass),
@@ -195,8 +195,8 @@ impl Judged {
     }
 }
 
-fn v_max_mps(beat: &AdviceEntry) -> f64 {
-    beat.advice.v_max_mps
+fn v_max_mps(entry: &AdviceEntry) -> f64 {
+    entry.advice.v_max_mps
 }
 
 fn row(case: &Case, followed: &Followed) {
@@ -218,7 +218,7 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
         // Advice and forecast agree until the vehicle slows down at the end.
         let forecast = |dive: &Advised| {
             let settled = &dive.settled()[..dive.settled().len() - BRAKING];
-            settled.iter().filter(|beat| beat.advice.will_exceed).count() as f64 / settled.len() as f64
+            settled.iter().filter(|entry| entry.advice.will_exceed).count() as f64 / settled.len() as f64
         };
         // If heads are apart along the hull, the spacing T has its minimum at one speed. Rounding of counter and angles
         // can keep T above the target there.
@@ -353,8 +353,8 @@ fn advice_says_so_if_a_lower_speed_does_not_help() {
     for speed_mps in [0.1, 0.03] {
         let dive = coarse.dive(speed_mps, speed_mps);
         let all = |of: fn(&AdviceEntry) -> bool| dive.settled().iter().all(of);
-        assert!(all(|beat| beat.advice.reason == Reason::AngularStep && beat.advice.v_max_mps <= 0.0));
-        assert!(all(|beat| beat.advice.will_exceed));
+        assert!(all(|entry| entry.advice.reason == Reason::AngularStep && entry.advice.v_max_mps <= 0.0));
+        assert!(all(|entry| entry.advice.will_exceed));
         assert!(matches!(dive.settled()[0].advice.remedy, Some(Remedy::Mode(_))));
         assert!(Judged::of(&coarse, &dive).failing > 0.98, "{speed_mps} m/s");
     }
@@ -383,9 +383,9 @@ fn filter_lowers_the_advised_speed_only_by_its_position_margin() {
 
 /// Number of changes of a displayed value per minute. A change is a pair of consecutive updates for which `changed`
 /// returns true.
-fn a_minute(beats: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry) -> bool) -> f64 {
-    let changes = beats.windows(2).filter(|pair| changed(&pair[0], &pair[1])).count();
-    changes as f64 * 300.0 / beats.len() as f64
+fn a_minute(entries: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry) -> bool) -> f64 {
+    let changes = entries.windows(2).filter(|pair| changed(&pair[0], &pair[1])).count();
+    changes as f64 * 300.0 / entries.len() as f64
 }
 
 #[test]
@@ -396,14 +396,14 @@ fn advice_in_the_field_changes_slowly_enough_to_read() {
     assert_ne!(text, shorter);
     let scene = scenes::scene(&shorter);
     let dive = dive(&scene, None, TICK);
-    let beats = &dive.beats;
+    let entries = &dive.entries;
     let jumps = |a: &AdviceEntry, b: &AdviceEntry| (v_max_mps(a) - v_max_mps(b)).abs() > 0.05 * v_max_mps(a);
-    let jumps = a_minute(&beats[10..], jumps);
-    let reasons = a_minute(&beats[10..], |a, b| a.advice.reason != b.advice.reason);
-    let forecasts = a_minute(beats, |a, b| a.advice.will_exceed != b.advice.will_exceed);
+    let jumps = a_minute(&entries[10..], jumps);
+    let reasons = a_minute(&entries[10..], |a, b| a.advice.reason != b.advice.reason);
+    let forecasts = a_minute(entries, |a, b| a.advice.will_exceed != b.advice.will_exceed);
     let target_m = scene.vehicle.target.max_hole_m;
-    let over = |beat: &AdviceEntry| beat.advice.predicted_t_m > Some(target_m);
-    let crossings = a_minute(beats, |a, b| over(a) != over(b));
+    let over = |entry: &AdviceEntry| entry.advice.predicted_t_m > Some(target_m);
+    let crossings = a_minute(entries, |a, b| over(a) != over(b));
     println!(
         "a minute: {jumps:.2} jumps of more than 5 %, {reasons:.2} other reasons, {forecasts:.2} other forecasts \
          for {crossings:.2} crossings of the target"
@@ -412,8 +412,8 @@ fn advice_in_the_field_changes_slowly_enough_to_read() {
     assert!(crossings > 10.0 && forecasts < 0.5 * crossings, "{forecasts} of {crossings}");
     // A forecast is displayed for at least a second before it is withdrawn.
     let mut since = None;
-    for (k, beat) in beats.iter().enumerate() {
-        match (beat.advice.will_exceed, since) {
+    for (k, entry) in entries.iter().enumerate() {
+        match (entry.advice.will_exceed, since) {
             (true, None) => since = Some(k),
             (false, Some(begun)) => {
                 assert!(k - begun >= 6, "from update {begun} to {k}");
@@ -430,7 +430,7 @@ fn tick_length_does_not_change_displayed_advice() {
     let scene = case.scene(0.15, 0.15, 6.0);
     let dives = [1, 20, 370].map(|ms| dive(&scene, None, DurNs(ms * 1_000_000)));
     for other in &dives[1..] {
-        assert_eq!(dives[0].beats, other.beats);
+        assert_eq!(dives[0].entries, other.entries);
         assert_eq!(dives[0].digest, other.digest);
     }
 }

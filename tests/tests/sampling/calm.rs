@@ -28,8 +28,8 @@ fn plan_and_live_position_errors_agree() {
         let expected_m = errors.pass_error_m(time_s);
 
         let dive = outing.dive(speed_mps, speed_mps);
-        let said_m = dive.median(|beat| beat.advice.margins.map_or(0.0, |margins| margins.pass_error_m));
-        let advised_mps = dive.median(|beat| beat.advice.v_max_mps);
+        let said_m = dive.median(|entry| entry.advice.margins.map_or(0.0, |margins| margins.pass_error_m));
+        let advised_mps = dive.median(|entry| entry.advice.v_max_mps);
         println!(
             "{}: {expected_m:.4} m expected, {said_m:.4} said; {plan_mps:.4} m/s planned, {advised_mps:.4} advised",
             vehicle.name
@@ -63,7 +63,7 @@ fn advised_speeds_match_the_largest_passing_speeds() {
 fn advice_does_not_depend_on_the_driven_speed() {
     let outing = Outing::steady(VEHICLES[3], 1);
     let advised = [0.094, 0.099, 0.1, 0.101, 0.106]
-        .map(|speed_mps| outing.dive(0.1, speed_mps).median(|beat| beat.advice.v_max_mps));
+        .map(|speed_mps| outing.dive(0.1, speed_mps).median(|entry| entry.advice.v_max_mps));
     println!("{advised:.4?}");
     assert!(advised.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() < 0.05), "{advised:?}");
 }

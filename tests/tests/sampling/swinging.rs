@@ -15,14 +15,15 @@ fn advised_speed_of_a_swinging_vehicle_is_positive_and_passes() {
         let outing = Outing { target_m, effects, ..Outing::steady(VEHICLES[3], 1) };
         let planned_mps = outing.planned_share * outing.plan_mps();
         let slow = outing.dive(planned_mps, 0.2 * planned_mps);
-        let advised_mps = slow.median(|beat| beat.advice.v_max_mps);
-        let says_steady = |beat: &AdviceEntry| beat.advice.remedy == Some(Remedy::HoldHeading);
+        let advised_mps = slow.median(|entry| entry.advice.v_max_mps);
+        let says_steady = |entry: &AdviceEntry| entry.advice.remedy == Some(Remedy::HoldHeading);
         assert!(
-            slow.beats.iter().filter(|beat| says_steady(beat)).count() > slow.beats.len() / 2,
+            slow.entries.iter().filter(|entry| says_steady(entry)).count() > slow.entries.len() / 2,
             "{target_m} m"
         );
         // The speed after all margins is near the advised speed, because both meet the target.
-        let with_all_mps = slow.median(|beat| beat.advice.margins.map_or(0.0, |margins| margins.losses_mps));
+        let with_all_mps =
+            slow.median(|entry| entry.advice.margins.map_or(0.0, |margins| margins.losses_mps));
         assert!((0.9..2.0).contains(&(with_all_mps / advised_mps)), "{with_all_mps}, not {advised_mps} m/s");
         assert!(advised_mps > 0.01, "target {target_m} m: {advised_mps} m/s");
         let followed = outing.dive(planned_mps, advised_mps);

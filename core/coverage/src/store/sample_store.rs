@@ -225,7 +225,7 @@ impl SampleStore {
         );
         let cell = self.cell_at(slot, row, self.column(arc_m));
         if let Some(tier) =
-            thinning::stands_for(&self.open, cell, (sample.x_m, arc_m), sample.step_m, self.edge_m())
+            thinning::dropping_tier(&self.open, cell, (sample.x_m, arc_m), sample.step_m, self.edge_m())
         {
             self.thinned += 1;
             if let Some(brick) = self.bricks.get_mut(number as usize) {

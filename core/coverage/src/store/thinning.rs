@@ -22,7 +22,7 @@ pub(super) fn delta_m(tier: u8, edge_m: f64) -> f64 {
 }
 
 /// Returns the tier by which a sample is dropped from its cell. `None` if it must be stored.
-pub(super) fn stands_for(
+pub(super) fn dropping_tier(
     open: &OpenBricks,
     at: CellAt,
     (x_m, arc_m): (f64, f64),

@@ -152,7 +152,7 @@ impl Listening {
     }
 
     /// Returns the part of a fix that is still missing.
-    pub fn lacks(&self) -> NoFix {
+    pub fn missing_part(&self) -> NoFix {
         if self.attitude.is_none() && self.force.is_none() {
             NoFix::Heading
         } else if self.counted.is_none() {

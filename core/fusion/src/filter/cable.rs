@@ -333,15 +333,15 @@ mod tests {
 
     #[test]
     fn stationary_counter_counts_as_stuck_only_if_cable_slack_varies_strongly() {
-        let stands = |is_lively: bool| {
+        let unchanged = |is_lively: bool| {
             move |t: f64, reading: &mut CableReading| {
                 reading.shown_m = if t < 6.0 { reading.shown_m } else { 7.6 };
                 reading.is_lively = is_lively;
             }
         };
-        let at_s = disputed_at(1.0, stands(true)).unwrap();
+        let at_s = disputed_at(1.0, unchanged(true)).unwrap();
         assert!((at_s - 8.0).abs() < 1e-9, "{at_s}");
-        assert_eq!(disputed_at(1.0, stands(false)), None);
+        assert_eq!(disputed_at(1.0, unchanged(false)), None);
     }
 
     #[test]
@@ -422,8 +422,8 @@ mod tests {
     #[test]
     fn estimate_off_by_over_1_m_restarts_from_a_running_counter() {
         let (_, used) = ends(2.0, 0.3, 1.1).unwrap();
-        let Use::Seek(lacking_m) = used else { panic!("{used:?}") };
-        assert!(lacking_m > 1.1, "{lacking_m}");
+        let Use::Seek(missing_m) = used else { panic!("{used:?}") };
+        assert!(missing_m > 1.1, "{missing_m}");
         assert_eq!(ends(0.0, 0.03, 1.1), None, "the counter is stationary");
     }
 }

@@ -47,9 +47,9 @@ pub struct CounterCorrections {
     by_chance: [f64; 2],
     /// Time for which the cable count has not changed, s.
     stood_s: f64,
-    /// Standard deviations of the length that a stuck wheel may have lost, m: `lacks_m` since the count became
+    /// Standard deviations of the length that a stuck wheel may have lost, m: `uncounted_m` since the count became
     /// stationary, `lost_m` between two head passes.
-    lacks_m: f64,
+    uncounted_m: f64,
     lost_m: f64,
     /// Variance of the length that the counter may have lost permanently since the last call of `take_slipped_m2`,
     /// m^2.
@@ -82,9 +82,9 @@ impl CounterCorrections {
             return;
         }
         if self.stood_s >= STANDS_S {
-            self.slipped_m2 += self.lacks_m * self.lacks_m;
+            self.slipped_m2 += self.uncounted_m * self.uncounted_m;
         }
-        (self.stood_s, self.lacks_m) = (0.0, 0.0);
+        (self.stood_s, self.uncounted_m) = (0.0, 0.0);
         self.fade(dt_s / RECENT_S);
     }
 
@@ -96,12 +96,12 @@ impl CounterCorrections {
         }
         if self.stood_s <= PASSES_S {
             let ([way_m, _], [chance_m, _]) = (self.sums, self.by_chance);
-            self.lacks_m = STUCK_SHARE * (way_m.abs() - CHANCE_SDS * chance_m).max(0.0);
+            self.uncounted_m = STUCK_SHARE * (way_m.abs() - CHANCE_SDS * chance_m).max(0.0);
         } else {
             self.fade(dt_s / PASSES_S);
         }
-        self.lost_m = self.lost_m.max(self.lacks_m);
-        debug_assert!(self.lacks_m >= 0.0, "a standard deviation isn't negative: {} m", self.lacks_m);
+        self.lost_m = self.lost_m.max(self.uncounted_m);
+        debug_assert!(self.uncounted_m >= 0.0, "a standard deviation isn't negative: {} m", self.uncounted_m);
     }
 
     fn fade(&mut self, times: f64) {

@@ -28,9 +28,9 @@ pub struct CountStep {
     smallest: u64,
     largest: u64,
     common: u64,
-    /// `changes` counts the readings that differ from the reading before, and `stands` those that are equal to it.
+    /// `changes` counts the readings that differ from the reading before, and `unchanged` those that are equal to it.
     changes: u32,
-    stands: u32,
+    unchanged: u32,
     /// Steps found in the last two blocks that showed a step, in units of the stated step. 0 means none yet.
     blocks: [u64; 2],
 }
@@ -44,7 +44,7 @@ impl CountStep {
         };
         let change = math::round_to_i64((length_m - before_m) / stated_m).unsigned_abs();
         if change == 0 {
-            self.stands = self.stands.saturating_add(1);
+            self.unchanged = self.unchanged.saturating_add(1);
             return;
         }
         self.changed = at;
@@ -55,7 +55,7 @@ impl CountStep {
         if self.changes == BLOCK {
             let [_, latest] = self.blocks;
             // Equal changes without pauses show a constant speed, but no step.
-            if self.stands >= BLOCK / 5 {
+            if self.unchanged >= BLOCK / 5 {
                 self.blocks = [latest, self.smallest];
             } else if self.smallest < self.largest {
                 self.blocks = [latest, self.common];
@@ -73,7 +73,7 @@ impl CountStep {
         }
         // Until a block is full, the step is assumed to be the smallest change so far. Before the first change, it is
         // assumed to be a common step.
-        match (self.changes, self.stands >= self.changes) {
+        match (self.changes, self.unchanged >= self.changes) {
             (0, _) => stated_m.max(COMMON_STEP_M),
             (_, true) => stated_m * self.smallest as f64,
             _ => stated_m,

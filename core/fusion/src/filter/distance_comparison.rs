@@ -347,8 +347,9 @@ mod tests {
 
     #[test]
     fn stuck_counter_is_doubted_within_8_s() {
-        let stands = |t: f64| way_m(t.min(60.0));
-        let (first_s, doubt) = compared(70, stands, |t| Some(speed_mps(t)), |t| Some(way_m(t.min(60.0))));
+        let stops_at_60_s = |t: f64| way_m(t.min(60.0));
+        let (first_s, doubt) =
+            compared(70, stops_at_60_s, |t| Some(speed_mps(t)), |t| Some(way_m(t.min(60.0))));
         assert!((61.0..68.0).contains(&first_s.unwrap()), "{first_s:?}");
         assert_eq!(doubt.unwrap().log, Some(SourceId(4)));
     }

@@ -706,11 +706,11 @@ impl Eskf {
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
             }
-            Use::Seek(lacking_m) => {
+            Use::Seek(missing_m) => {
                 self.way_sought = Some(reading.at);
                 self.slack_level.skip();
-                self.slipped_m2 += lacking_m * lacking_m;
-                add_to(&mut self.doubts, CREEP, lacking_m * lacking_m);
+                self.slipped_m2 += missing_m * missing_m;
+                add_to(&mut self.doubts, CREEP, missing_m * missing_m);
                 agreement::seek_way(&mut self.doubts);
                 self.ties += 1;
             }

@@ -287,7 +287,7 @@ impl FilterNavigation {
         } else {
             self.listening = Listening::after(self.listening.before());
         }
-        self.standing = Err(self.listening.lacks());
+        self.standing = Err(self.listening.missing_part());
         self.is_running = false;
         self.restarts += 1;
     }
@@ -418,7 +418,7 @@ impl Navigation for FilterNavigation {
             self.window.drop_until(old);
             self.window.forget(old);
             self.listening.hear(&self.context, number, sensor, times.valid, reading);
-            self.standing = Err(self.listening.lacks());
+            self.standing = Err(self.listening.missing_part());
             self.epoch_zero = self.listening.since().unwrap_or(times.valid);
             let at = self.epoch_before(times.valid);
             if let Some((state, factors)) = self.listening.settle(at, &self.context) {
@@ -458,7 +458,7 @@ impl Navigation for FilterNavigation {
         let Some(running) = self.running() else { return 0 };
         let variances = [0, 1, 2].map(|axis| running.factors.variance(RATE_BIAS + axis));
         let is_known = variances.iter().all(|variance| *variance < BIAS_KNOWN_RADPS * BIAS_KNOWN_RADPS);
-        if is_known || self.unit.is_none() { 0 } else { self.stillness.lacking_s(running.at) }
+        if is_known || self.unit.is_none() { 0 } else { self.stillness.stop_left_s(running.at) }
     }
 
     fn setting_doubt(&self) -> Option<SettingDoubt> {

@@ -86,7 +86,7 @@ mod tests {
         let sure = PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 };
         let near = Relative::along(0.05);
         assert_eq!(sure.standing(near), Ok(near));
-        for (unsure, relative, lacking) in [
+        for (unsure, relative, no_fix) in [
             (PoseSd { yaw_rad: 0.24, ..sure }, near, None),
             (PoseSd { yaw_rad: 0.26, ..sure }, near, Some(NoFix::Heading)),
             (PoseSd { place_m: 0.49, ..sure }, near, None),
@@ -96,7 +96,7 @@ mod tests {
             (sure, Relative::along(0.99), None),
             (sure, Relative::along(1.01), Some(NoFix::Chainage)),
         ] {
-            assert_eq!(unsure.standing(relative).err(), lacking, "{unsure:?}, {relative:?}");
+            assert_eq!(unsure.standing(relative).err(), no_fix, "{unsure:?}, {relative:?}");
         }
     }
 }

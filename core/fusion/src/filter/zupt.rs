@@ -165,13 +165,13 @@ impl RestDetector {
     ///
     /// 0 if the vehicle floats or its inertial unit is too noisy, because then no stop counts as rest. Also 0 once the
     /// first minute is over, because the gyro bias seldom makes passes uncertain later in a dive.
-    pub fn lacking_s(&self, now: MonoNs) -> u32 {
-        let lacking = ENOUGH.saturating_sub(self.rested);
+    pub fn stop_left_s(&self, now: MonoNs) -> u32 {
+        let left_s = ENOUGH.saturating_sub(self.rested);
         let begins = self.asks_from.is_some_and(|from| (0..ASKS_FOR.0).contains(&now.since(from).0));
-        if lacking == 0 || self.floats || !begins {
+        if left_s == 0 || self.floats || !begins {
             return 0;
         }
-        lacking + MEANS - self.rate.alike.min(self.force.alike).min(MEANS)
+        left_s + MEANS - self.rate.alike.min(self.force.alike).min(MEANS)
     }
 }
 
@@ -242,7 +242,7 @@ mod tests {
 
     /// Returns how many more seconds of standing still are required at `end_s`, with this turn rate and cable
     /// length.
-    fn lacking_s(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64, end_s: u32) -> u32 {
+    fn stop_left_s(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64, end_s: u32) -> u32 {
         let mut stillness = RestDetector::default();
         stillness.ask_from(MonoNs(0));
         for k in 0..100 * end_s {
@@ -256,25 +256,25 @@ mod tests {
                 stillness.take_mean_rate();
             }
         }
-        stillness.lacking_s(MonoNs(u64::from(end_s) * 1_000_000_000))
+        stillness.stop_left_s(MonoNs(u64::from(end_s) * 1_000_000_000))
     }
 
     #[test]
     fn floating_vehicle_is_not_asked_to_stand_still_again() {
         let sways = |t: f64| 0.01 * math::sin(t / 2.0);
         let set_off = |t: f64| (t - 40.0).max(0.0) * 0.1;
-        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "the vehicle has stood still long enough");
-        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "the vehicle has never stood still");
-        assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "the vehicle may still come to rest");
-        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "the vehicle is floating");
-        assert_eq!(lacking_s(sways, set_off, 55), 0, "the vehicle was floating before");
+        assert_eq!(stop_left_s(|_| 0.0, |_| 0.0, 35), 0, "the vehicle has stood still long enough");
+        assert_eq!(stop_left_s(|_| 0.0, |t| 0.1 * t, 35), 30, "the vehicle has never stood still");
+        assert_eq!(stop_left_s(sways, |_| 0.0, 10), 30, "the vehicle may still come to rest");
+        assert_eq!(stop_left_s(sways, |_| 0.0, 35), 0, "the vehicle is floating");
+        assert_eq!(stop_left_s(sways, set_off, 55), 0, "the vehicle was floating before");
         let lands = |t: f64| if t < 30.0 { sways(t) } else { 0.0 };
-        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "the vehicle now stands still");
+        assert!((15..30).contains(&stop_left_s(lands, |_| 0.0, 45)), "the vehicle now stands still");
         // The vehicle moves slowly, and its coarse counter pauses between steps.
-        assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
-        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "the dive is under way");
+        assert_eq!(stop_left_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
+        assert_eq!(stop_left_s(|_| 0.0, |t| 0.1 * t, 61), 0, "the dive is under way");
         let mut set_back = RestDetector::default();
         set_back.ask_from(MonoNs(3_600_000_000_000));
-        assert_eq!(set_back.lacking_s(MonoNs(0)), 0, "the clock was set back by an hour");
+        assert_eq!(set_back.stop_left_s(MonoNs(0)), 0, "the clock was set back by an hour");
     }
 }

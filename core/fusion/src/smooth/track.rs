@@ -290,11 +290,11 @@ mod tests {
     #[test]
     fn time_outside_every_piece_of_the_track_has_no_fix() {
         let track = track();
-        let lacks = |clock: u32, t: f64| track.fix(clock, at(t)).err();
+        let no_fix_at = |clock: u32, t: f64| track.fix(clock, at(t)).err();
         for (clock, t) in
             [(0, -0.01), (0, 2.11), (0, 9.99), (0, 12.0), (0, 14.11), (1, 0.5), (1, 10.5), (2, 1.0)]
         {
-            assert_eq!(lacks(clock, t), Some(NoFix::Heading), "{clock} {t}");
+            assert_eq!(no_fix_at(clock, t), Some(NoFix::Heading), "{clock} {t}");
         }
         let at_x_m = |clock: u32, t: f64| {
             let fix = track.fix(clock, at(t)).unwrap();

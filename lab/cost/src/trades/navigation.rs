@@ -18,7 +18,7 @@ use headrace_simulator::{START, Scenery};
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 
 use self::cable::CableNavigation;
-use self::heard::Hearing;
+use self::heard::RecordedReadings;
 use super::figures::{error, rms};
 use crate::error::CostError;
 use crate::measure::{in_turns, side_by_side};
@@ -82,9 +82,9 @@ struct Setting {
 struct Dived {
     recorded: Recorded,
     vehicle: VehicleConfig,
-    hearing: Hearing,
+    recorded_readings: RecordedReadings,
     /// The part of the recorded input for which navigation is timed.
-    timed: Hearing,
+    timed: RecordedReadings,
     by_cable: JudgedDive,
 }
 
@@ -365,18 +365,18 @@ impl Dived {
         let text = place.vehicle.replace(PRESET, &rate);
         let vehicle = inputs.vehicle(&text)?;
         let recorded = Recorded::of(&inputs.scene_of(&place.text, &text, seed)?, &vehicle)?;
-        let (hearing, by_cable) = Hearing::of(&recorded, &vehicle)?;
-        let timed = hearing.first(TIMED_S);
-        Ok(Self { recorded, vehicle, hearing, timed, by_cable })
+        let (recorded_readings, by_cable) = RecordedReadings::of(&recorded, &vehicle)?;
+        let timed = recorded_readings.first(TIMED_S);
+        Ok(Self { recorded, vehicle, recorded_readings, timed, by_cable })
     }
 
-    fn navigation(&self, way: &Way, hearing: &Hearing) -> Box<dyn Navigation> {
+    fn navigation(&self, way: &Way, recorded_readings: &RecordedReadings) -> Box<dyn Navigation> {
         let (profile, site) = (&self.vehicle.tunnel.profile, self.vehicle.site);
         match way {
             Way::Cable => Box::new(CableNavigation::new(profile)),
             Way::Direct => Box::new(DirectNavigation::new(profile.clone(), site)),
             Way::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, *settings)),
-            Way::Smoothed(settings) => Box::new(hearing.smoothed(&self.vehicle, settings)),
+            Way::Smoothed(settings) => Box::new(recorded_readings.smoothed(&self.vehicle, settings)),
         }
     }
 
@@ -393,7 +393,7 @@ impl Dived {
 
     fn figures(&self, way: &Way, place: &Place) -> Result<(Figures, JudgedDive), CostError> {
         let mut known = Vec::new();
-        self.hearing.run(self.navigation(way, &self.hearing).as_mut(), &mut |at, fix| {
+        self.recorded_readings.run(self.navigation(way, &self.recorded_readings).as_mut(), &mut |at, fix| {
             known.extend(fix.ok().map(|fix| (at, fix, self.recorded.scenery.pose(at).position)));
         });
         let lag_s = self.between_passes_s(place);
@@ -414,7 +414,7 @@ impl Dived {
         let dive = match way {
             Way::Cable => self.dive_by_cable(),
             way => {
-                self.recorded.judged_with(&self.vehicle, self.navigation(way, &self.hearing), &mut |_| {})?
+                self.recorded.judged_with(&self.vehicle, self.navigation(way, &self.recorded_readings), &mut |_| {})?
             }
         };
         let figures = Figures {
@@ -472,7 +472,7 @@ fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostErro
         let (way, _) = place.text.split_once("[effects]").unwrap_or((&place.text, ""));
         let bare = Place { text: format!("{way}[effects]\nmotion_within_turn = {{}}\n"), ..place.copied() };
         let dived = Dived::of(inputs, &bare, USUAL_HZ, 1)?;
-        for (at, chainage_m) in dived.hearing.chainages() {
+        for (at, chainage_m) in dived.recorded_readings.chainages() {
             displacement_m =
                 displacement_m.max(2.0 * (chainage_m - dived.recorded.scenery.chainage_m(at)).abs());
         }

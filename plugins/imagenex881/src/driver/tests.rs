@@ -74,12 +74,12 @@ impl Wire for Ends<'_> {
 }
 
 impl Rig {
-    /// Creates a rig whose head is at `stands_rad` at the start.
-    fn new(text: &str, program: HeadProgram, stands_rad: f64, faults: Faults) -> Self {
+    /// Creates a rig whose head is at `at_rad` at the start.
+    fn new(text: &str, program: HeadProgram, at_rad: f64, faults: Faults) -> Self {
         let settings = settings(text).unwrap();
         let now = BEGUN;
-        let stands = HeadProgram { start_rad: stands_rad, growing: true, sector: None };
-        let setup = EmulatorSetup { start: now, head: Some(stands), site: Site::default(), polled: false };
+        let at_rest = HeadProgram { start_rad: at_rad, growing: true, sector: None };
+        let setup = EmulatorSetup { start: now, head: Some(at_rest), site: Site::default(), polled: false };
         let head = HeadEmulator::new(settings.clone(), LATENCY, &setup);
         let setup = DriverSetup { begun: BEGUN, head: Some(program) };
         Self {
@@ -216,8 +216,8 @@ fn head_is_homed_to_its_scan_program_from_any_position() {
     let sector = HeadProgram { start_rad: 0.5, growing: false, sector: Some((0.0, PI / 2.0)) };
     for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
         for program in [turning(0.0, true), turning(4.0, false), sector] {
-            for stands_rad in [0.0, 1.0, 3.0, 6.1] {
-                let mut rig = Rig::new(text, program, stands_rad, Faults::default());
+            for at_rad in [0.0, 1.0, 3.0, 6.1] {
+                let mut rig = Rig::new(text, program, at_rad, Faults::default());
                 rig.run(after_s(12));
                 rig.assert_on_time(after_s(4));
                 rig.assert_gapless(after_s(4), 0);
@@ -285,8 +285,8 @@ fn power_cycled_head_is_located_and_homed() {
     let mut rig = Rig::new("mode = \"fast\"", turning(0.0, true), 0.0, Faults::default());
     rig.run(after_s(5));
     let text = "mode = \"fast\"";
-    let stands = turning(2.0, false);
-    let setup = EmulatorSetup { start: rig.now, head: Some(stands), site: Site::default(), polled: false };
+    let at_rest = turning(2.0, false);
+    let setup = EmulatorSetup { start: rig.now, head: Some(at_rest), site: Site::default(), polled: false };
     rig.head = HeadEmulator::new(settings(text).unwrap(), LATENCY, &setup);
     rig.run(after_s(30));
     rig.assert_on_time(after_s(12));

@@ -56,7 +56,7 @@ impl Feeds {
         let mut feeds = Self::default();
         for sense in SENSES {
             let fitting =
-                |topic: &&Topic| topic.of().is_some_and(|of| of.is_telling() && of.sense() == sense);
+                |topic: &&Topic| topic.of().is_some_and(|of| of.is_self_describing() && of.sense() == sense);
             let fitting: Vec<&Topic> = topics.iter().filter(fitting).collect();
             let sensors: Vec<_> =
                 EmulatedSensor::all(vehicle).filter(|(_, device)| device.sense() == sense).collect();
@@ -147,7 +147,7 @@ fn feed(
         return Err(section.invalid("sensor", &problem).into());
     }
     let base = section.choice("time", &[("record", Base::Record), ("header", Base::Header)])?;
-    if base == Some(Base::Header) && !of.is_telling() {
+    if base == Some(Base::Header) && !of.is_self_describing() {
         return Err(section.invalid("time", "must be \"record\": such messages have no header").into());
     }
     let units = if of.sense() == Sense::Depth { PRESSURE } else { LENGTH };

@@ -77,7 +77,7 @@ impl Type {
     }
 
     /// Whether the message type states what was measured. A bare number may be anything.
-    pub(super) fn is_telling(self) -> bool {
+    pub(super) fn is_self_describing(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
 }
@@ -119,7 +119,7 @@ pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_
 }
 
 fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static str>> {
-    let header = if of.is_telling() { Some(wire.header()?) } else { None };
+    let header = if of.is_self_describing() { Some(wire.header()?) } else { None };
     let values = match of {
         Type::Imu => inertial(wire)?,
         Type::Range => range(wire)?,

@@ -103,7 +103,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     scan.walk(file, magic_len)?;
     scan.check_format(file)?;
     let summarised = scan.take_summary(file)?;
-    if !summarised && !scan.has_list || !scan.ours && scan.lacks_schemas() {
+    if !summarised && !scan.has_list || !scan.ours && scan.is_without_schemas() {
         scan.look_into_chunks(file)?;
     }
     scan.miss_parts();
@@ -451,7 +451,7 @@ impl Scan {
     }
 
     /// Whether the schema of any channel hasn't been found yet.
-    fn lacks_schemas(&self) -> bool {
+    fn is_without_schemas(&self) -> bool {
         let numbers = self.definitions.values().filter_map(|definition| definition.form.as_ref());
         numbers.map(|(schema, _)| *schema).any(|schema| schema > 0 && !self.schemas.contains_key(&schema))
     }

@@ -172,22 +172,22 @@ impl View {
         };
         let vehicle = Vehicle { timestamp: at.into(), position: "known", known: Some(known), deviations };
         made.push(Topic::Vehicle, &vehicle);
-        self.beat(at, made);
+        self.publish_regular(at, made);
         Some(())
     }
 
     fn no_pose(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
         let at = MonoNs(words.integer()?);
-        let lacking = words.one_of(&NoFix::ALL, |lacking| lacking as u64)?;
+        let no_fix = words.one_of(&NoFix::ALL, |no_fix| no_fix as u64)?;
         let vehicle =
-            Vehicle { timestamp: at.into(), position: lacking.as_str(), known: None, deviations: None };
+            Vehicle { timestamp: at.into(), position: no_fix.as_str(), known: None, deviations: None };
         made.push(Topic::Vehicle, &vehicle);
-        self.beat(at, made);
+        self.publish_regular(at, made);
         Some(())
     }
 
     /// Publishes the messages for viewers that are due at regular intervals.
-    fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
+    fn publish_regular(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
         self.at = at;
         made.push_some(Topic::Points, self.points.close_before(at).as_ref());
         if let Some((x_m, _)) = self.last {

@@ -80,8 +80,8 @@ fn pose_is_published_as_transform_pose_and_vehicle_state() {
     assert_eq!((&vehicle["position"], &vehicle["speed_mps"]), (&"known".into(), &0.2.into()));
     assert_eq!((&vehicle["place_sd_m"], &vehicle["tilt_sd_deg"]), (&0.01.into(), &0.06.into()));
 
-    let lacking = record(RecordKind::NoPose, &[1_400_000_000, NoFix::Chainage as u64]);
-    let made = taken(&mut view, "poses", 8, &[lacking]);
+    let no_fix = record(RecordKind::NoPose, &[1_400_000_000, NoFix::Chainage as u64]);
+    let made = taken(&mut view, "poses", 8, &[no_fix]);
     assert_eq!(made.keys().collect::<Vec<_>>(), ["vehicle"]);
     assert_eq!(made["vehicle"][0]["position"], "no_chainage");
     assert_eq!(made["vehicle"][0].get("chainage_m"), None, "viewers have no null");
@@ -159,8 +159,8 @@ fn advice(at: u64, v_max_mps: f64, will_exceed: bool) -> Vec<u64> {
 fn advice_is_published_on_change_and_every_second() {
     let mut view = view();
     taken(&mut view, "poses", 0, &[pose(0, 10.0)]);
-    let beats: Vec<_> = (0..15).map(|k| advice(k * 200_000_000, 0.3, false)).collect();
-    let made = taken(&mut view, "advice", 3_000_000_000, &beats);
+    let updates: Vec<_> = (0..15).map(|k| advice(k * 200_000_000, 0.3, false)).collect();
+    let made = taken(&mut view, "advice", 3_000_000_000, &updates);
     assert_eq!((made["advice"].len(), made["alerts"].len()), (3, 1));
     assert_eq!(made["advice"][0]["words"], "may go 0.30 m/s (distance between turns)");
     let made = taken(&mut view, "advice", 3_000_000_001, &[advice(3_000_000_000, 0.1, true)]);

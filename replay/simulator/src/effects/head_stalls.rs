@@ -110,8 +110,8 @@ fn stall(mut heads: Query<'_, '_, (&mut Samples<Sounding>, &mut HeadStalls)>) {
     for (mut samples, mut stalling) in &mut heads {
         let HeadStalls { parameters, stalls, behind } = &mut *stalling;
         for sounding in &mut samples.list {
-            let stands = stalls.at(sounding.at);
-            behind.step(sounding, !stands, parameters.is_reported);
+            let is_stalled = stalls.at(sounding.at);
+            behind.step(sounding, !is_stalled, parameters.is_reported);
         }
     }
 }
@@ -132,9 +132,9 @@ mod tests {
         let count = hours * 36_000;
         let (mut begun, mut still, mut before) = (0, 0, false);
         for k in 0..count {
-            let stands = stalls.at(START + DurNs::from_secs_f64(f64::from(k) * step_s));
-            (begun, still) = (begun + i32::from(stands && !before), still + i32::from(stands));
-            before = stands;
+            let is_stalled = stalls.at(START + DurNs::from_secs_f64(f64::from(k) * step_s));
+            (begun, still) = (begun + i32::from(is_stalled && !before), still + i32::from(is_stalled));
+            before = is_stalled;
         }
         let free = math::exp(-6.0 / 60.0);
         let share = f64::from(still) / f64::from(count);

@@ -67,7 +67,7 @@ pub(super) struct Heeding {
     pub(super) goes_back: bool,
     /// Whether the pilot stops when advised to, and waits for the first advice before setting out. The monitor advises
     /// stops to estimate gyro biases, or if it has no position.
-    pub(super) stands: bool,
+    pub(super) stops_if_advised: bool,
     /// Time that the pilot waits at the dive's start before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
@@ -221,11 +221,12 @@ impl Advised {
     }
 
     /// Whether the pilot keeps the vehicle stationary. The total time is limited to [`MOST_STOOD_S`].
-    fn stands(&mut self, advice: Option<&PilotAdvice>) -> bool {
-        let stands =
-            self.pilot.stands && self.stood_s < MOST_STOOD_S && advice.is_none_or(|advice| advice.stand);
-        self.stood_s += if stands { STEP_S } else { 0.0 };
-        stands
+    fn keeps_stationary(&mut self, advice: Option<&PilotAdvice>) -> bool {
+        let is_stationary = self.pilot.stops_if_advised
+            && self.stood_s < MOST_STOOD_S
+            && advice.is_none_or(|advice| advice.stand);
+        self.stood_s += if is_stationary { STEP_S } else { 0.0 };
+        is_stationary
     }
 
     fn wanted_mps(&mut self, at_s: f64, advice: Option<&PilotAdvice>) -> f64 {
@@ -237,7 +238,7 @@ impl Advised {
         if let Some(hurry) = hurry.filter(|_| anew) {
             return hurry.speed_mps * (1.0 + hold);
         }
-        if self.stands(advice) {
+        if self.keeps_stationary(advice) {
             return 0.0;
         }
         let pilot = &self.pilot;

@@ -224,7 +224,7 @@ fn advised(section: &Section<'_>, tunnel: Tunnel<'_>, seed: u64) -> Result<Traje
         lag_s: or("lag_s", 3.0..=60.0, 3.0)?,
         within: or("within", 0.0..=0.5, 0.05)?,
         goes_back: section.boolean("goes_back")?.unwrap_or(true),
-        stands: section.boolean("stands")?.unwrap_or(false),
+        stops_if_advised: section.boolean("stands")?.unwrap_or(false),
         waits_s: or("waits_s", 0.0..=3600.0, 0.0)?,
         hurries,
         at_most_s: or("at_most_s", 1.0..=1.0e6, 600.0 + 5.0 * (to_m - from_m) / speed_mps)?,

@@ -109,8 +109,8 @@ fn uncertainty_grows_while_all_sensors_are_silent() {
     let mut before = nav.running().unwrap().factors;
     for k in 1..24 {
         let t = at(FAULT_S + 1.0 + 0.5 * f64::from(k));
-        let beat = Event { received: t, valid: t, source: OTHER, reading: rig.rate(0.0) };
-        Rig::hear(&mut nav, &beat);
+        let heartbeat = Event { received: t, valid: t, source: OTHER, reading: rig.rate(0.0) };
+        Rig::hear(&mut nav, &heartbeat);
         let running = nav.running().unwrap();
         // The errors of position, velocity and attitude grow. The creep of the cable does not grow.
         for i in (0..10).filter(|i| *i != CREEP) {
@@ -171,8 +171,8 @@ fn saturated_inertial_samples_are_rejected() {
             assert!(nav.consistency(IMU).unwrap().dropped > 0);
             // The speed change by a rejected force is unknown, so the speed becomes uncertain. There is no fix until
             // the speed is certain again.
-            let lacking = if is_rate { 0 } else { math::round_to_i64(10.0 * for_s) + 5 };
-            assert!(i64::from(tally.lacking) <= lacking, "{magnitude} for {for_s} s: {tally:?}");
+            let without_fix = if is_rate { 0 } else { math::round_to_i64(10.0 * for_s) + 5 };
+            assert!(i64::from(tally.without_fix) <= without_fix, "{magnitude} for {for_s} s: {tally:?}");
         }
     }
 }
@@ -192,7 +192,7 @@ fn fix_stays_right_with_a_disturbed_compass() {
             });
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &events);
-            assert_eq!(tally.lacking, 0, "{off_deg} degrees: {tally:?}");
+            assert_eq!(tally.without_fix, 0, "{off_deg} degrees: {tally:?}");
             assert!(off_deg < 20.0 || !sudden || nav.consistency(IMU).unwrap().gated > 300);
         }
     }
@@ -234,9 +234,9 @@ fn jumping_sensor_is_rejected() {
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
         // The chainage is unknown while counter and estimate differ by metres, until a second after the jump.
-        let lacking = if source == TETHER { 45 } else { 0 };
+        let without_fix = if source == TETHER { 45 } else { 0 };
         assert!(
-            tally.lacking <= lacking && consistency.gated >= 6,
+            tally.without_fix <= without_fix && consistency.gated >= 6,
             "source {source}: {tally:?} {consistency:?}"
         );
     }

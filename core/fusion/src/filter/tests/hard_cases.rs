@@ -23,8 +23,8 @@ fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
     let mut nav = rig.navigation();
     let last = events.iter().map(|event| event.valid).max().unwrap();
     let end = last + DurNs::from_millis(1000);
-    let beat = Event { received: end, valid: end, source: OTHER, reading: rig.rate(0.0) };
-    for event in events.iter().chain([&beat]) {
+    let heartbeat = Event { received: end, valid: end, source: OTHER, reading: rig.rate(0.0) };
+    for event in events.iter().chain([&heartbeat]) {
         Rig::hear(&mut nav, event);
     }
     let running = nav.running().unwrap();
@@ -44,7 +44,7 @@ fn one_minute_of_ordinary_motion_has_consistent_innovations() {
         events.extend(logged);
         events.sort_by_key(|event| event.valid);
         let tally = rig.run(&mut nav, &events);
-        assert_eq!(tally.lacking, 0, "seed {seed}");
+        assert_eq!(tally.without_fix, 0, "seed {seed}");
         for source in [TETHER, DEPTH, ECHOES, ECHOES + 3, HEADS, HEADS + 1, VELOCITY_LOG] {
             let consistency = nav.consistency(source).unwrap();
             let nis = consistency.nis().unwrap();
@@ -91,7 +91,7 @@ fn covariance_stays_valid_with_noise_of_any_scale() {
         rig.settings = Settings { tether_sd_m, depth_sd_m, echo_sd_m, return_sd_m, ..rig.settings };
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &rig.events(0.0, 40.0));
-        assert!(tally.fixes + tally.lacking > 300);
+        assert!(tally.fixes + tally.without_fix > 300);
     }
 }
 
@@ -169,7 +169,7 @@ fn simultaneous_readings_are_fused() {
     events.sort_by_key(|event| event.valid);
     let mut nav = rig.navigation();
     let tally = rig.run(&mut nav, &events);
-    assert!(tally.fixes > 380 && tally.lacking == 0, "{tally:?}");
+    assert!(tally.fixes > 380 && tally.without_fix == 0, "{tally:?}");
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn late_readings_are_counted_and_ignored() {
         events.sort_by_key(|event| event.received);
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
-        assert_eq!(tally.lacking, 0);
+        assert_eq!(tally.without_fix, 0);
         assert_eq!(nav.consistency(ECHOES).unwrap().late, if is_late { 250 } else { 0 });
         let with = outcome(&rig, &events);
         events.retain(|e| e.source != ECHOES || seconds(e.valid) <= 5.0);
@@ -234,7 +234,7 @@ fn errors_stay_within_limits_at_any_attitude() {
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
             // If no echosounder faces up or down, the height is missing at first, so there is no fix.
-            assert!(tally.lacking <= 2, "{name}: {tally:?}");
+            assert!(tally.without_fix <= 2, "{name}: {tally:?}");
         }
     }
 }
@@ -359,7 +359,7 @@ fn chainage_sd_between_passes_is_the_same_at_any_chainage() {
             let rig = Rig::new(way, seed);
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 60.0));
-            assert!(tally.fixes > 500 && tally.lacking == 0, "{off_m} m: {tally:?}");
+            assert!(tally.fixes > 500 && tally.without_fix == 0, "{off_m} m: {tally:?}");
             let [here, there] = [&near_nav, &nav].map(|nav| nav.fix(at(60.0)).unwrap());
             let [here_sd_m, there_sd_m] =
                 [here, there].map(|fix| fix.relative.sd_m(Vec3::new(0.0, 3.0, 3.0)));

@@ -31,12 +31,12 @@ fn zero_velocity_update_is_skipped_for_motion_in_any_direction() {
         let before = moves.state;
         moves.rest(Some(turn));
         assert_eq!(moves.state, before, "{axis} {side}: a moving vehicle must not be corrected");
-        let mut stands = moving(axis, side * 0.105);
-        stands.rest(Some(turn));
+        let mut at_rest = moving(axis, side * 0.105);
+        at_rest.rest(Some(turn));
         // The estimated velocity and the zero-velocity update are equally uncertain, so the result is their mean.
-        let half = stands.state.velocity_mps.scaled(2.0) + -before.velocity_mps.scaled(0.105 / 0.115);
-        assert!(half.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.velocity_mps);
-        let bias = stands.state.rate_bias_radps + -turn.scaled(0.5);
-        assert!(bias.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.rate_bias_radps);
+        let half = at_rest.state.velocity_mps.scaled(2.0) + -before.velocity_mps.scaled(0.105 / 0.115);
+        assert!(half.norm() < 1e-12, "{axis} {side}: {:?}", at_rest.state.velocity_mps);
+        let bias = at_rest.state.rate_bias_radps + -turn.scaled(0.5);
+        assert!(bias.norm() < 1e-12, "{axis} {side}: {:?}", at_rest.state.rate_bias_radps);
     }
 }

@@ -210,9 +210,9 @@ impl Rig {
                 tally.fixes += 1;
                 self.check_fix(nav, now, &fix, tally);
             }
-            Err(lacks) => {
-                tally.lacking += 1;
-                tally.lacks = Some(lacks);
+            Err(no_fix) => {
+                tally.without_fix += 1;
+                tally.no_fix = Some(no_fix);
             }
         }
     }
@@ -365,9 +365,9 @@ pub(super) struct Tally {
     checked: Option<MonoNs>,
     /// Number of epochs with a fix (`fixes`), and number of epochs without a fix.
     pub(super) fixes: u32,
-    pub(super) lacking: u32,
+    pub(super) without_fix: u32,
     /// Part of the fix that was missing in the last epoch without a fix.
-    pub(super) lacks: Option<NoFix>,
+    pub(super) no_fix: Option<NoFix>,
     /// Largest error of the estimate so far, in standard deviations.
     pub(super) sd: f64,
 }

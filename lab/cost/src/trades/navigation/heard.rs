@@ -29,14 +29,14 @@ struct Heard {
 }
 
 /// All readings of a dive, in the loop's order.
-pub(super) struct Hearing {
+pub(super) struct RecordedReadings {
     sensors: Vec<SensorInfo>,
     readings: Vec<Heard>,
     /// Time from the first to the last reading, s.
     pub(super) duration_s: f64,
 }
 
-impl Hearing {
+impl RecordedReadings {
     /// Replays a dive with navigation by the cable alone, and records its readings.
     ///
     /// Errors: the loop can't be armed or driven.
@@ -93,7 +93,7 @@ impl Hearing {
         self.run_noting(navigation, take, &mut || {});
     }
 
-    /// Runs a navigation as [`Hearing::run`] does, and calls `after` after each reading.
+    /// Runs a navigation as [`RecordedReadings::run`] does, and calls `after` after each reading.
     fn run_noting(
         &self,
         navigation: &mut dyn Navigation,
