@@ -51,7 +51,7 @@ impl Value {
     }
 }
 
-/// Remark in the import's report about ranges outside a head's range setting.
+/// Remark in the import's report, for ranges outside a head's range setting.
 pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
 /// A sensor of the vehicle file, with the emulator that encodes its values.
@@ -106,7 +106,7 @@ impl EmulatedSensor {
         self.reach_m.is_some()
     }
 
-    /// Returns a value that the sensor can report, and whether this value differs from the given one.
+    /// Returns the value that the sensor can report instead of `value`, and whether the two values differ.
     ///
     /// A beam whose range is outside the head's range setting becomes a beam without an echo.
     pub(super) fn within_reach(&self, value: Value) -> (Value, bool) {

@@ -16,8 +16,8 @@ pub trait Format {
         MOST_HELD
     }
 
-    /// Returns how far entries may be out of time order, ns. An entry may follow entries whose timestamps are later by
-    /// up to this time.
+    /// Returns how far entries may be out of time order, ns. An entry may come after entries whose timestamps are later
+    /// than its own by up to this time.
     fn reach_ns(&self) -> u64 {
         WINDOW_NS
     }

@@ -46,8 +46,8 @@ impl Stream {
         self.block(step, 0)
     }
 
-    /// Block number `block` of random numbers for `step`. An effect that draws more than two numbers per step needs
-    /// more than one block.
+    /// Block number `block` of random numbers for `step`. A block has two numbers, so an effect that draws more per
+    /// step needs several blocks.
     pub fn block(self, step: u64, block: u64) -> Draw {
         let half = |value: u64| [(value & 0xFFFF_FFFF) as u32, (value >> 32) as u32];
         let ([a, b], [c, d]) = (half(step), half(block));
@@ -56,7 +56,7 @@ impl Stream {
 }
 
 impl Draw {
-    /// Two random numbers, uniform between 0 and 1, both ends excluded, in steps of 2^-53.
+    /// Two random numbers that are uniformly distributed between 0 and 1, in steps of 2^-53. Neither 0 nor 1 occurs.
     pub fn uniform(&self) -> [f64; 2] {
         let [a, b, c, d] = self.words;
         let number = |high: u32, low: u32| {

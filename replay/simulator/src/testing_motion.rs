@@ -74,7 +74,7 @@ pub(crate) const WAYPOINTS: &str = "kind = \"waypoints\"\n[[trajectory.waypoints
 /// A message on a line: time, direction, and bytes.
 pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 
-/// A test bench: the scene of this file with arbitrary effects.
+/// A test bench: the scene that this file describes, with the given effects.
 pub(crate) struct Bench {
     layout: &'static str,
     scene: String,

@@ -41,7 +41,7 @@ enum Fault {
     Babble,
 }
 
-/// Time span of a fault. Its end is excluded.
+/// Time span of a fault. The time `to` is no longer part of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Span {
     from: MonoNs,
@@ -152,7 +152,7 @@ impl<M: Measurement> Stuck<M> {
 
 /// A measurement whose value can be replaced by that of another measurement.
 trait Sticking: Measurement {
-    /// Returns this measurement with the value of `other`. Time and head angles are unchanged.
+    /// Returns this measurement with the value of `other`. This measurement's own time and head angles are kept.
     #[must_use]
     fn valued(self, other: &Self) -> Self;
 }
@@ -212,7 +212,7 @@ fn jump_soundings(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Jumped, Op
     for (mut samples, Jumped { size, span }, echosounder) in &mut sonars {
         for sounding in samples.list.iter_mut().filter(|sounding| span.holds(sounding.at)) {
             if echosounder.is_some() {
-                // A range with an error is never negative.
+                // An added negative error must not make a range negative.
                 sounding.range_m = sounding.range_m.map(|range_m| (range_m + size).max(0.0));
             } else {
                 sounding.reported_rad += size.to_radians();

@@ -58,13 +58,13 @@ struct ImuBias {
     parameters: Parameters,
     stream: Stream,
     constant: [f64; 6],
-    /// Latest varying biases of turn rates, then of forces, in standard deviations.
+    /// Latest varying biases, in standard deviations: three of turn rates, then three of forces.
     wandering: [f64; 6],
     /// Latest tilt of the attitude in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Previous sample interval, with two factors for the biases and two for the tilt: the correlation over the
-    /// interval, and the weight of a new random number.
+    /// Previous sample interval, with two factors for the biases and the same two for the tilt. The factors are the
+    /// correlation over the interval and the weight of a new random number.
     ///
     /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),
@@ -225,8 +225,8 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Over many seeds, the variance at the first sample and much later is as given, and the correlation between the
-    /// two samples is exp(-t / tau).
+    /// Over many seeds, the variance at the first sample and much later equals the given one, and the correlation
+    /// between the two samples is exp(-t / tau).
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);
@@ -307,7 +307,8 @@ mod tests {
             .collect();
         let lag = plain.iter().position(|inertia| inertia.at.since(plain[0].at).0 >= 2_000_000_000).unwrap();
         let wanted = f64::to_radians(0.5) * f64::to_radians(0.5);
-        // For a process with correlation time tau, the samples of t seconds are worth t / (2 tau) independent samples.
+        // For a process with correlation time tau, all samples within a time t carry as much information as t / (2 tau)
+        // independent samples.
         let worth = plain.len() as f64 / lag as f64 / 2.0;
         for axis in 0..2 {
             let product = |lag: usize| {

@@ -134,8 +134,8 @@ mod tests {
 
     const KEYS: &str = "[effects.imu_bumps]\nper_hour = 400\nspeed_mps = [0.05, 0.2]\nseconds = 0.3\n";
 
-    /// The bumps, found as the difference of two dives, have the given rate, length and strength. After a bump the
-    /// vehicle has its previous speed.
+    /// Finds the bumps as the difference between a dive with them and a dive without. They have the given rate, length
+    /// and strength. After a bump the vehicle moves as fast as before it.
     #[test]
     fn bumps_have_the_given_rate_length_and_strength() {
         let (plain, with) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));

@@ -128,8 +128,8 @@ mod tests {
         }
     }
 
-    /// Messages are far apart, so that none delays the next one. Mean and variance of the delay are then those of an
-    /// exponential distribution.
+    /// The messages are so far apart that a delayed message never holds up the next one. Mean and variance of the delay
+    /// are then those of an exponential distribution.
     #[test]
     fn message_delay_jitter_is_exponentially_distributed() {
         let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };

@@ -92,7 +92,7 @@ impl Effect for PerSensor<Places<Parameters>> {
     }
 }
 
-/// The range of a beam by way of two walls, m; `None` if there is no such path within `far_m`.
+/// Range m of an echo that reaches the sonar by way of two walls; `None` if there is no such path within `far_m`.
 fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f64> {
     let first = ray.hit?;
     let from = first.point + first.normal.scaled(OFF_WALL_M);
@@ -107,7 +107,8 @@ fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f
 }
 
 impl Parameters {
-    /// Whether a return arrives by way of two walls. `square` is the cosine of the beam's incidence.
+    /// Whether a return arrives by way of two walls. `square` is the cosine of the beam's incidence. `before` tells
+    /// whether the previous return did so.
     fn is_bounced(&self, before: bool, square: f64, chance: f64) -> bool {
         let share = self.share + (self.square_share - self.share) * square;
         let Some(mean) = self.mean_run.filter(|_| share > 0.0 && share < 1.0) else { return chance < share };
@@ -187,8 +188,8 @@ mod tests {
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&pipe, [out_m, radius_m], angle_rad);
-            // The sine of incidence follows from the law of sines. Seen from the centre, the ends of a chord are pi - 2
-            // i apart, where i is the incidence.
+            // The sine of incidence follows from the law of sines. The ends of a chord are pi - 2 i apart as seen from
+            // the circle's centre, where i is the incidence.
             let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
             let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
             let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();

@@ -1,12 +1,12 @@
-//! Wall displaced from the profile, towards the reference point or away from it.
+//! Parts of the wall that are displaced from the profile, towards its reference point or away from it.
 
 use headrace_geometry::math::{self, PI};
 use headrace_geometry::tunnel::WallPoint;
 
 /// A displaced patch of wall, with the shape of a raised cosine along the tunnel and along the wall.
 ///
-/// The wall moves along the ray from the profile's reference point. If the displacement ends short of that point, all
-/// of the section remains visible from it.
+/// The wall moves along the ray from the profile's reference point. A displacement inwards ends short of the reference
+/// point, so all of the wall remains visible from there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bulge {
     /// Number of the feature that the patch belongs to.

@@ -126,7 +126,7 @@ impl Heap {
     }
 }
 
-/// Adds a bulge if the wall and the earlier bulges leave room for it.
+/// Adds a bulge to `bulges` if the wall and the earlier bulges leave room for it.
 fn add(
     bulges: &mut Vec<Bulge>,
     bulge: Bulge,
@@ -171,7 +171,8 @@ fn add(
     Ok(())
 }
 
-/// Minimum distance from the profile's reference point to the wall of a patch, m.
+/// Minimum distance from the profile's reference point to the wall that the bulge displaces, before the displacement,
+/// m.
 fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     let [ry, rz] = site.profile.reference();
     let distance_m = |k: u32| {

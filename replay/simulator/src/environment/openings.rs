@@ -47,7 +47,7 @@ pub(super) fn rock_trap(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Height of the floor at the edges of a rock trap, m. The higher edge counts.
+/// Height of the floor at the edges of a rock trap, m. The result is the height at the higher of the two edges.
 fn edge_m(ground: Ground<'_>, chainage_m: f64, half_width_m: f64) -> Option<f64> {
     let [_, from_m] = ground.tube.scaled(chainage_m, ground.tube.profile().reference());
     let height_m = |y: f64| {
@@ -102,7 +102,7 @@ pub(super) fn side_tunnel(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Range of chainage over which a side tunnel opens into the tunnel, m. Valid also next to a bend.
+/// Range of chainage over which a side tunnel opens into the tunnel, m. The result is also valid next to a bend.
 fn mouth_span_m(
     ground: Ground<'_>,
     chainage_m: f64,

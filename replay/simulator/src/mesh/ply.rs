@@ -8,7 +8,7 @@ use ply_rs_bw::ply::{
 use super::error::MeshError;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Names of the property that lists a face's corners. Both are in use.
+/// Names of the property that lists a face's corners. Files use either name.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// Maximum length of an error text. An error quotes a line of the file, which may have any length.
 const MAX_ERROR_CHARS: usize = 300;

@@ -146,7 +146,8 @@ fn rough_tube() -> Triangles {
 
 /// Range of the nearest hit by the Moller-Trumbore method over all triangles; infinite if there is no hit.
 ///
-/// `None` for a ray that passes within a billionth of an edge, where the two methods may differ.
+/// `None` for a ray that passes within a billionth of an edge, because the mesh's own method may give another result
+/// there.
 fn brute(t: &Triangles, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
     let mut nearest = f64::INFINITY;
     for face in &t.faces {
@@ -233,7 +234,8 @@ fn no_ray_slips_between_triangles() {
             let (direction, distance) = toward(origin, target);
             let hit = mesh.cast(origin, direction, f64::INFINITY);
             let range = hit.unwrap_or_else(|| panic!("out by {target:?} from {origin:?}")).range_m;
-            // From a point off the centre of the rough body, another face may hide the target.
+            // Odd rays start off the centre of the rough body. A face nearer than the target may hide the target from
+            // there.
             assert!(
                 range < distance + 1e-9 && (i % 2 == 1 || range > distance - 1e-9),
                 "{range}, not {distance}"
@@ -283,7 +285,7 @@ fn lowest_face_number_wins_at_equal_ranges() {
     let hit = |t: &Triangles, direction| {
         Mesh::new(t.clone(), Role::Body).unwrap().cast([0.0; 3], direction, 9.0).unwrap()
     };
-    // The faces' diagonals, which are edges of triangles, cross in the middle.
+    // A ray along an axis hits the middle of a face, where the face's diagonal is the common edge of two triangles.
     let along_x = hit(&triangles, [1.0, 0.0, 0.0]);
     assert_eq!(along_x, MeshHit { range_m: 1.0, normal: [-1.0, 0.0, 0.0], face: 2 });
     assert_eq!(hit(&triangles, [0.0, 0.0, -1.0]).face, 8);

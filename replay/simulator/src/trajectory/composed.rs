@@ -24,8 +24,8 @@ enum Base {
 }
 
 impl Trajectory {
-    /// Creates a trajectory of legs at constant speed from `start_m`, at one position in the cross-section. The vehicle
-    /// stays level.
+    /// Creates a trajectory of legs at constant speed from `start_m`, all at the same position in the cross-section.
+    /// The vehicle stays level.
     pub fn of_legs(start_m: f64, across_m: [f64; 2], legs: Vec<Leg>) -> Self {
         let legs = Legs::new(start_m, across_m, legs);
         Self { duration_s: legs.duration_s(), base: Base::Legs(legs), sways: Vec::new() }
@@ -60,7 +60,7 @@ impl Trajectory {
         }
     }
 
-    /// Duration, s. For an advised pilot, the maximum duration until he has finished.
+    /// Duration, s. For an advised pilot, this is the maximum duration until he has finished.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }

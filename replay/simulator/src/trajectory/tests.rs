@@ -47,7 +47,7 @@ fn legs_follow_each_other_without_a_jump() {
 }
 
 /// Corners are rounded over two seconds. The trajectory therefore starts a little after its first waypoint and ends a
-/// little before its last one. The difference is a sixth of the distance travelled in half a second.
+/// little before its last one. Each difference is a sixth of the distance travelled in half a second.
 #[test]
 fn waypoints_are_passed_at_their_speeds() {
     let trajectory = trajectory(
@@ -102,7 +102,7 @@ fn pilot_reaches_the_end_within_bounds_in_both_directions() {
     }
 }
 
-/// The distance back is as given, to the nearest step.
+/// The pilot goes back by the distance `back_m`, rounded to the nearest step of the simulation.
 #[test]
 fn pilot_goes_back_the_given_distance() {
     let keys = "kind = \"pilot\"\nto_m = 190\nspeed_mps = 1\nstops_per_hour = 0\nbacks_per_hour = 30\n\
@@ -201,7 +201,7 @@ fn spline_stays_within_the_hull_of_its_points() {
     }
 }
 
-/// Position, speed and acceleration have no jump at a knot. Beyond the ends, the curve continues straight.
+/// Position, speed and acceleration have no jump at a knot. Beyond its ends, the curve is a straight line.
 #[test]
 fn spline_acceleration_has_no_jumps() {
     let (knots, _) = random_knots(3);
@@ -239,8 +239,8 @@ fn random_drift_has_the_given_amplitude_and_sd() {
         products += offsets[0] * offsets[1] / f64::from(count);
     }
     for (variance, reach) in squares.into_iter().zip(reach) {
-        // The tolerance is that of a variance from about 2,000 independent values. The variance is 151/315 of the
-        // variance of uniform random numbers.
+        // The wanted variance is 151/315 of the variance of the control points, which are uniform random numbers. The
+        // tolerance allows for the error of a variance that is estimated from about 2,000 independent values.
         let wanted = reach * reach / 3.0 * 151.0 / 315.0;
         assert!((variance - wanted).abs() <= 0.1 * wanted, "{variance} {wanted}");
     }
@@ -287,7 +287,7 @@ fn current_changes_the_speed_only_within_its_stretch() {
             legs.place(after_s).chainage_m
         );
     }
-    // A leg is refused only if the flow is too strong on the leg itself.
+    // A leg is refused only if the flow is too strong somewhere on that leg.
     let mut strong = Flow::default();
     assert!(strong.add(Stretch { from_m: 100.0, to_m: 200.0 }, -1.0));
     legs.carry(&strong).unwrap();

@@ -56,8 +56,8 @@ fn mean_range_is_averaged_over_the_disc_of_the_cone() {
         let ranges_m = cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m);
         mean(ranges_m).unwrap()
     };
-    // Mean of h / cos x over rays at angle x from the axis, where h is the height. The squares of the angles are evenly
-    // spread.
+    // Mean range h / cos x of rays to a flat wall, where h is the height of the beam's origin and x a ray's angle from
+    // the axis. The squares of the angles are evenly spread, as for rays that fill a disc.
     let count = 10_000;
     let ring = |k: i32| 3.0 / math::cos(half_rad * math::sqrt((f64::from(k) + 0.5) / f64::from(count)));
     let whole_m = (0..count).map(ring).sum::<f64>() / f64::from(count);

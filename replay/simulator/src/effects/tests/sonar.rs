@@ -3,7 +3,7 @@
 use crate::testing::{Dive, Dived};
 use crate::truth::TruthRow;
 
-/// Each effect on sonars, as a table of a scene with some keys.
+/// Each effect on sonars, as the table that a scene contains, with some keys.
 const EFFECTS: [&str; 11] = [
     "[effects.beam_cone]\n",
     "[effects.occlusion]\n",
@@ -44,7 +44,7 @@ fn adding_an_effect_keeps_the_random_numbers_of_other_effects() {
     for effects in [EFFECTS[0], EFFECTS[2], EFFECTS[3], EFFECTS[4]] {
         assert!(alone == outliers(effects, 1), "{effects}");
     }
-    // The effects run in the fixed order, even if the scene names them in another order.
+    // The scene names the two effects in the wrong order. They run in the program's fixed order all the same.
     let (a, b) = (EFFECTS[8], EFFECTS[7]);
     assert_eq!(dive.dive(&format!("{a}{b}")).messages, dive.dive(&format!("{b}{a}")).messages);
 }

@@ -56,7 +56,8 @@ fn side_tunnel_has_the_given_length() {
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     let hit = cast(&environment, [10.0, -1.0, 2.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 35.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // Ranges from inside the side tunnel to the opposite wall and to its own side wall.
+    // Ranges from a point inside the side tunnel, first to the opposite wall of the main tunnel and then to a side wall
+    // of the side tunnel.
     let back = cast(&environment, [10.5, 30.0, 2.0], [0.0, -1.0, 0.0]).unwrap();
     assert!((back.range_m - 34.0).abs() < 1e-12 && back.what == What::Wall, "{back:?}");
     let side = cast(&environment, [10.5, 30.0, 2.0], [1.0, 0.0, 0.0]).unwrap();

@@ -6,15 +6,16 @@ use super::*;
 
 const RADIUS_M: f64 = 3.0;
 const SIDES: u32 = 240;
-/// Largest distance between the sides of the polygon and its circumscribed circle, per metre of radius.
+/// Largest distance between a side of the polygon that stands for a circle and the polygon's circumscribed circle, per
+/// metre of radius.
 const SAGITTA: f64 = 8.6e-5;
 
 fn circle() -> Profile {
     shapes::circle(RADIUS_M).unwrap()
 }
 
-/// A prism around the circle's axis, as PLY text. It extends from x = 0 to `length_m` in `rings`, and lacks the faces
-/// whose numbers are in `without`.
+/// A tube-shaped prism about the x-axis, as PLY text. It extends from x = 0 to `length_m` in `rings`, and lacks the
+/// faces whose numbers are in `without`.
 fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     let (mut vertices, mut faces, mut count) = (String::new(), String::new(), 0);
     for ring in 0..=rings {
@@ -133,7 +134,7 @@ fn mesh_of_the_profile_gives_the_ranges_of_the_profile() {
 fn no_ray_escapes_between_mismatched_mesh_and_profile() {
     for (radius_m, seed) in [(4.0, 61), (2.0, 62)] {
         let environment = wall(&tube(radius_m, 10.0, 2, &[]));
-        // Points between the inner and the outer circle of the polygon may be inside or outside.
+        // Points between the polygon's inscribed and circumscribed circles may be inside or outside the mesh.
         let is_within = |p: V3, share: f64| {
             let radius_m = if (40.0..=50.0).contains(&p[0]) { radius_m * share } else { RADIUS_M };
             math::hypot(p[1], p[2] - RADIUS_M) < radius_m
@@ -168,7 +169,7 @@ fn no_ray_escapes_between_mismatched_mesh_and_profile() {
 
 #[test]
 fn mesh_with_ragged_ends_is_a_wall_only_where_closed() {
-    // Some faces of the first and the last ring are missing. The mesh is closed from x = 0.25 m to 9.75 m.
+    // Some faces of the first and the last ring are missing, so the mesh is closed only from x = 0.25 m to 9.75 m.
     let ragged = tube(4.0, 10.0, 40, &[0, 1, 2, 50, 51, 39 * SIDES + 7]);
     let environment = wall(&ragged.replace("\n0.0 ", "\n-0.0 "));
     let placed =
