@@ -29,7 +29,7 @@ pub trait Format {
 
     /// Parses the next bytes of the file, `front`, and adds entries to `out`.
     ///
-    /// `end` means that no bytes follow after `front`.
+    /// `end` tells that the file has no bytes after `front`.
     fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step;
 }
 

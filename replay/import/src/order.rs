@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::entry::Entry;
 
-/// An entry is held back until another entry is later by more than this time, ns. Until then, earlier entries may
-/// follow.
+/// An entry is held back until another entry's timestamp is later by more than this time, ns, because earlier entries
+/// may still follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
 /// Maximum number of entries held back for sorting, whatever their timestamps.
 const MOST_ENTRIES: usize = 1 << 15;
@@ -32,7 +32,8 @@ impl Default for Order {
 }
 
 impl Order {
-    /// Creates an empty order. An entry may follow entries whose timestamps are up to `window_ns` later.
+    /// Creates an empty order. An entry may come after entries whose timestamps are up to `window_ns` later than its
+    /// own.
     pub(super) fn reaching(window_ns: u64) -> Self {
         let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
         Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }

@@ -121,8 +121,8 @@ pub enum RoutingError {
 
 /// Returns the sensors that receive data: the sensors of the vehicle file, or the sensors in `explicit`.
 ///
-/// `explicit` has pairs of a sensor's id and the name of its connection. These connections replace those in the vehicle
-/// file.
+/// `explicit` has pairs of a sensor's id and the name of its connection. If `explicit` isn't empty, it replaces the
+/// connections in the vehicle file.
 ///
 /// Errors: see [`RoutingError`].
 pub fn takers(

@@ -29,8 +29,8 @@ impl Format for TlogFormat {
 
     fn step(&mut self, front: &[u8], _: bool, out: &mut Vec<Entry>) -> Step {
         let logged = match Tlog::new(front).next() {
-            // After damage an entry that seems truncated is probably not an entry, but only the end of the file shows
-            // that.
+            // After damage, an entry that seems truncated is probably no entry at all. This is certain only at the end
+            // of the file.
             None | Some(Err(TlogError::Short { .. })) => return Step::More,
             Some(Err(_)) => return self.lost(),
             Some(Ok(logged)) => logged,

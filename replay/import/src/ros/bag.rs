@@ -37,13 +37,13 @@ pub struct Bag {
     /// The chunk whose records are being read.
     chunk: Option<Chunk>,
     first_ns: Option<u64>,
-    /// Position of the index, and counts, as stated in the bag's header.
+    /// Position of the index, and numbers of connections and chunks, as stated in the bag's header.
     stated: Option<Stated>,
     chunks: u64,
     lost: BTreeMap<&'static str, u64>,
 }
 
-/// Position of the index, and counts, as stated in the bag's header.
+/// Position of the index, and numbers of connections and chunks, as stated in the bag's header.
 #[derive(Debug, Clone, Copy)]
 struct Stated {
     index_at: u64,
@@ -51,7 +51,8 @@ struct Stated {
     chunks: u32,
 }
 
-/// The content of an unpacked chunk, the position reached in it, and the parsing result to return at the chunk's end.
+/// The content of an unpacked chunk, the position up to which it has been read, and the parsing result to return at its
+/// end.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
@@ -69,7 +70,7 @@ struct Record<'a> {
 enum Accepted<'a> {
     /// The record has been processed completely.
     Read,
-    /// The record is a chunk with this compression; its content must be unpacked.
+    /// The record is a chunk with this compression. Its content must still be unpacked.
     Chunk(&'a [u8]),
 }
 
@@ -146,8 +147,8 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
-    // In a damaged file the lengths may be arbitrary. A field name must follow, and begins with a lower-case letter.
-    // This check detects most wrong lengths.
+    // In a damaged file the lengths may be arbitrary. After the lengths, a field name must follow, which begins with a
+    // lower-case letter. Most wrong lengths fail this check.
     if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
         return Err(Stop::Bad);
     }
@@ -197,7 +198,8 @@ impl Format for Bag {
             Err(Stop::Bad) => Step::Lost(1, NO_RECORD),
             Err(Stop::More(None)) if was_astray => {
                 self.astray = true;
-                // After damage a long header is probably not a header, but only the end of the file shows that.
+                // After damage, a header that seems incomplete is probably no header at all. This is certain only at
+                // the end of the file.
                 if end { Step::Lost(1, NO_RECORD) } else { Step::More }
             }
             // A chunk that is cut off by the end of the file may still contain whole messages.
@@ -392,7 +394,8 @@ enum Unpacked {
 
 /// Unpacks a chunk with the stated compression and size. `cut` means that the file ends within the chunk.
 ///
-/// Source: ROS wiki, "Bags/Format/2.0". Compressions are none, bz2, and lz4 as roslz4 writes it, in LZ4 frames.
+/// Source: ROS wiki, "Bags/Format/2.0". The compressions are none, bz2 and lz4. The package roslz4 writes the latter as
+/// LZ4 frames.
 fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
     let Some(size) = usize::try_from(size).ok().filter(|size| *size <= MOST_UNPACKED) else {
         return Unpacked::Bad("chunks that would unpack to more than 64 MiB");

@@ -76,7 +76,7 @@ impl Type {
         }
     }
 
-    /// Whether the message type states what was measured. A bare number may be anything.
+    /// Whether the message type states what was measured. A bare number doesn't, because it may be anything.
     pub(super) fn is_telling(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
@@ -156,7 +156,7 @@ fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let force: [f64; 3] = wire.doubles()?;
     let force_mps2 = told(wire.doubles()?).then_some(force);
     let whole = |values: &[f64]| values.iter().all(|value| value.is_finite());
-    // Senders without an orientation leave its default, which is all zeros.
+    // Senders that know no orientation leave the field at its default, which is all zeros.
     let wxyz = wxyz.filter(|wxyz| whole(wxyz) && wxyz.iter().any(|part| part.abs() > 0.0));
     Some(Values::Inertial {
         wxyz,
@@ -172,7 +172,7 @@ fn is_minus_one(value: f64) -> bool {
 fn range(wire: &mut Wire<'_>) -> Option<Values> {
     let _radiation = wire.u8()?;
     let [_field_of_view, least, most, range] = wire.singles()?;
-    // Newer definitions of this message append a variance.
+    // Newer definitions of this message end with a variance, which isn't used.
     if !wire.is_done() {
         wire.f32()?;
     }
