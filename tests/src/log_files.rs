@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mcap::{Attachment, Message, MessageStream, WriteOptions};
 
-/// Messages with the devices' raw data, in the order of the log file.
+/// Messages that contain the devices' raw data, in the order of the log file.
 pub fn raw_messages(log: &[u8]) -> Vec<Message<'_>> {
     let all = MessageStream::new(log).unwrap().map(Result::unwrap);
     all.filter(|message| message.channel.topic.starts_with("/raw/")).collect()

@@ -12,7 +12,7 @@ const END_M: f64 = 2.0;
 /// Failed sections within this distance of each other form one stretch, m.
 const JOIN_M: f64 = 0.5;
 
-/// A hole up to this multiple of the target counts as close to the target.
+/// A hole whose diameter is at most this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
 /// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of these
@@ -45,8 +45,8 @@ impl Judged {
         self.right.contains(&self.told)
     }
 
-    /// Whether the only displayed cause is nearly right: the cause was injected, and without the cause the hole exceeds
-    /// the target by at most 5 %.
+    /// Whether a single cause is displayed that is nearly right. It was injected, and without it the hole exceeds the
+    /// target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
@@ -63,7 +63,7 @@ pub struct InterventionDive {
     pub sections: Vec<Judged>,
 }
 
-/// A stretch: neighbouring failed sections that share a right answer.
+/// A stretch: neighbouring failed sections that have at least one right set of causes in common.
 pub struct Stretch<'a> {
     /// Sections of the stretch.
     pub sections: &'a [Judged],
@@ -106,8 +106,8 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let is_inner = |section: &&SectionRow| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
-    // The target may be changed here: holes don't depend on it. All later reports use the new target for their
-    // verdicts.
+    // The target may still be changed here, because holes don't depend on it. All later reports use the new target for
+    // their verdicts.
     let all = report(&drawn, &|_| true);
     let without: Vec<Report> = match kinds {
         [_, _] => (0..2).map(|k| report(&drawn, &|other| other != k)).collect(),
@@ -201,7 +201,8 @@ impl InterventionDive {
     }
 }
 
-/// Kinds of causes in the dive with this number. Dives with even numbers have one cause, all others two, in rotation.
+/// Kinds of causes in the dive with this seed. Dives with even seeds have one cause, all others have two. Consecutive
+/// dives take the causes in turn.
 pub fn kinds(seed: u64) -> Vec<usize> {
     let number = usize::try_from(seed).unwrap();
     if number.is_multiple_of(2) {
