@@ -21,7 +21,7 @@ use headrace_sensor::reading::Reading;
 use headrace_simulator::{START, Scene, Scenery, Simulation};
 use headrace_vehicle::NavigationConfig;
 
-/// Capacity for records of the navigation, more than a dive of an hour needs.
+/// Capacity of the queue for records of the navigation. A dive of an hour needs less.
 const MOST_SAID: usize = 1 << 20;
 
 /// A position fix that the loop requested, with the true pose at that time.
@@ -50,13 +50,14 @@ pub struct Track {
     pub fixes: Vec<Tracked>,
     /// Filter states at the ends of epochs, in time order.
     pub epochs: Vec<Epoch>,
-    /// Consistency statistics after each fused measurement: time of the last epoch, source, and statistics so far.
+    /// Consistency statistics after each fused measurement: time of the last epoch, number of the source, and
+    /// statistics up to this measurement.
     pub consistency: Vec<(MonoNs, usize, Consistency)>,
     /// Report of the dive.
     pub report: Report,
 }
 
-/// A time in which some sources are silent.
+/// A period of a dive in which some sources are silent.
 #[derive(Debug, Clone, Default)]
 pub struct Silence {
     /// Numbers of the silent sources.
@@ -133,7 +134,7 @@ struct RecordedNavigation<N> {
     said: SyncSender<Said>,
 }
 
-/// The recorded fixes and estimates are not part of a loop's snapshot.
+/// A loop's snapshot doesn't include the recorded fixes and estimates.
 impl<N: Transparent> Stateful for RecordedNavigation<N> {
     fn save(&self, to: &mut Saver) {
         self.inner.save(to);

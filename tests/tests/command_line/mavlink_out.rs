@@ -1,5 +1,5 @@
-//! Checks the messages of `--mavlink-out` as a ground station receives them. They are read with a decoder that was
-//! written from the MAVLink guide, independently of headrace's decoder.
+//! Checks the messages of `--mavlink-out` as a ground station receives them. The decoder in this file was written from
+//! the MAVLink guide, independently of headrace's decoder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::UdpSocket;
@@ -123,7 +123,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     );
     assert!(limits.iter().any(|mps| (0.2..0.35).contains(mps)), "{limits:?}");
     assert!(values("HR_MISS_M").iter().any(|m| *m > 2.0));
-    // STATUSTEXT messages with parts of a long text have the same id; the test joins them.
+    // STATUSTEXT messages with the parts of a long text have the same id. The test joins these parts.
     let mut texts: BTreeMap<(usize, u16), String> = BTreeMap::new();
     for (place, said) in of(253).enumerate() {
         let id = u16::from_le_bytes([said.payload[51], said.payload[52]]);

@@ -1,7 +1,7 @@
 //! Transformations of a dive that must not change its results.
 //!
-//! They are a mirror, other origins of chainage and arc length, other names and another order of heads, and another
-//! tick length.
+//! The transformations are a mirror, other origins of chainage and arc length, other names of heads, another order of
+//! heads, and another tick length.
 
 use headrace_coverage::Verdict;
 use std::fmt::Write as _;
@@ -21,7 +21,7 @@ use serde_json::Value;
 
 const TOLERANCE_M: f64 = 1e-9;
 
-/// Two dives with results that must agree after a transformation.
+/// Two dives. After a transformation, the results of the second must agree with those of the first.
 struct Beside<'a> {
     here: &'a Dive,
     there: &'a Dive,
@@ -64,8 +64,8 @@ impl Beside<'_> {
                 && both(deviations[0], deviations[1])
         };
         let cause = |section: &SectionRow| section.cause.map(|evidence| evidence.cause);
-        // The dives may report different holes of the same size. The hole reported for the second dive must also be a
-        // hole of the first dive.
+        // The two dives may report different holes of the same size. The hole of the second dive must then also exist
+        // in the first dive.
         let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
             near(2.0 * wall.clear_m([x - self.along_m, (self.around)(sigma)]), hole_m)
         });

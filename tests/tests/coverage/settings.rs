@@ -1,4 +1,5 @@
-//! Wrong settings are reported with their value within a hundred metres. Correct settings aren't reported.
+//! Wrong settings are reported within a hundred metres of driving, with their right value. Correct settings aren't
+//! reported.
 
 use headrace_monitor::alert_list::SettingJson;
 use headrace_simulator::Scene;
@@ -57,7 +58,7 @@ fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u6
     doubted(&parse(truly), &parse(told))
 }
 
-/// Vehicle files, each with the id of the head whose setting is wrong.
+/// Vehicle files, each with the id of the head whose setting the tests make wrong.
 const OF_VEHICLES: [(&str, &str); 2] = [("vita1.toml", "sonar_0"), ("vita2-4.toml", "sonar_1")];
 const ASIDE_M: f64 = 0.5;
 
