@@ -1,5 +1,5 @@
-//! Places with several visits. A later visit can add to the coverage but never revokes a pass, and two visits
-//! combine.
+//! Places with several visits. A later visit can add to the coverage, but it never revokes a pass. The samples of two
+//! visits count together.
 
 use headrace_coverage::Verdict;
 use headrace_tests::{scenes, truth};

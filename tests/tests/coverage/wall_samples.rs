@@ -52,7 +52,7 @@ fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
 }
 
 /// Difference between the range of each ping and the true range of the object that its beam met, m. The list is in the
-/// loop's order; `None` if one of the two ranges is missing.
+/// loop's order. An element is `None` if one of the two ranges is missing.
 fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
     let scene = scenes::scene_from(scene, &|_| Ok(vehicle.as_bytes().to_vec()));
     let mut simulation = Simulation::with_truth(&scene).unwrap();
@@ -72,13 +72,14 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
 /// Returns and sections of a dive in murk, compared with the objects that the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Number of returns from the wall. The loop classified `met_doubtful` of them as doubtful.
+    /// Number of returns from the wall. `met_doubtful` counts those of them that the loop classified as doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Number of returns from objects other than the wall. The loop accepted `strays_wall` of them as wall.
+    /// Number of returns from objects other than the wall. `strays_wall` counts those of them that the loop accepted as
+    /// wall.
     strays: usize,
     strays_wall: usize,
-    /// Number of passed sections. `worst` is their largest ratio of true hole to target.
+    /// Number of passed sections. `worst` is the largest ratio of true hole to target in these sections.
     passed: usize,
     worst: f64,
 }
@@ -119,7 +120,8 @@ fn no_section_passes_with_a_head_stuck_at_one_range() {
     assert_eq!(kinds, ["profile_contradicted"]);
 }
 
-/// In the centre of a pipe, two heads at one range seem to agree on a wider wall, whatever their noise.
+/// If two heads in the centre of a pipe are stuck at the same range, they seem to agree on a wall with another radius,
+/// whatever their noise.
 #[test]
 fn no_section_passes_with_all_heads_stuck_at_one_range() {
     for range_m in [0.78, 1.22] {
@@ -250,7 +252,7 @@ fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
         assert!(all.iter().all(|alert| alert.sensor.is_none()), "{all:?}");
         let told = dive.report.dive.samples_rejected.doubtful_returns;
         assert_eq!(usize::try_from(told).unwrap(), doubtful);
-        // No section fails because doubtful returns are missing.
+        // No section fails only because its doubtful returns don't count.
         let all =
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);
         let wall = Wall::new(all, dive.profile.perimeter_m()).unwrap();

@@ -9,7 +9,7 @@ use crate::records::{
 pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
-    /// Words that the report of a replay must contain. Alternatives are separated by `|`.
+    /// Words that the report of a replay must contain. A `|` separates alternatives.
     pub(crate) told: &'static str,
 }
 

@@ -44,7 +44,7 @@ fn channel_defined_later_is_unknown_after_seeking_back() {
         log.go_to(&begin).unwrap();
         assert_eq!(rest(&mut log), straight);
     }
-    // A reader that seeks to the end before it reads anything knows both channels.
+    // This reader seeks to the end of the log before it reads anything. It must nevertheless know both channels.
     let mut other = LogReader::new(Cursor::new(with_a_late_channel()), "late".to_owned()).unwrap();
     other.go_to(&end).unwrap();
     assert_eq!((rest(&mut other), other.header().sources.len()), ((Vec::new(), straight.1), 1));

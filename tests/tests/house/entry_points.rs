@@ -19,7 +19,8 @@ const SIGNS: [&str; 9] = [
     "postcard::take_from",
     "from_utf8(",
 ];
-/// Files that interpret only text of this program, or text of a listed file.
+/// Files that needn't be listed, because they interpret only text that this program wrote or that a listed file has
+/// read.
 const OWN_TEXT: [&str; 14] = [
     "core/sampling/src/advice/answer.rs",
     "plugins/dashboard/src/assets.rs",
@@ -37,7 +38,7 @@ const OWN_TEXT: [&str; 14] = [
     "core/monitor/src/fixtures.rs",
 ];
 
-/// Whether a file has a sign outside its comments and unit tests.
+/// Whether a file has one of the [`SIGNS`] outside its comments and unit tests.
 fn interprets_bytes(text: &str) -> bool {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let mut lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));

@@ -42,7 +42,7 @@ fn damaged_log_and_its_recovery_have_the_same_digest() {
         let losses = |report: &Value| report["log"]["losses"].as_array().unwrap().len();
         assert_eq!(losses(&recovered), losses(&damaged), "{name}: {}", recovered["log"]["losses"]);
     }
-    // The recovered log also keeps the results that were published live.
+    // The recovered log also keeps the results that were recorded during the dive.
     let answer = folder.headrace(&["verify", "cut-fixed.mcap", "--json"]);
     let told: Value = serde_json::from_str(&answer.stdout).unwrap();
     assert_eq!(answer.code, Some(3), "{told}");
@@ -104,7 +104,7 @@ fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)>
     std::fs::create_dir_all(folder.path("disk")).unwrap();
     let program = headrace_tests::program();
     let program = program.get_program().to_str().unwrap();
-    // The small disk is a private mount of the shell, and ends with the shell.
+    // The small disk is a private mount of the shell. It disappears when the shell ends.
     let script = format!(
         "mount -t tmpfs -o size={kilobytes}k none disk || exit 99
         '{program}' run vehicle.toml --source dive.mcap --record disk/log.mcap --speed max --json > report.json 2> said.txt
@@ -121,7 +121,8 @@ fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)>
 fn recording_drops_echoes_on_a_nearly_full_disk_and_ends_on_a_full_disk() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
-    // The first disk is nearly full, with room for all small messages. The second one has room for a few seconds.
+    // The first disk becomes nearly full, but has room for all small messages. The second disk has room for only a few
+    // seconds of the dive.
     for (kilobytes, words) in [(20_000, "echo returns"), (80, "recording failed")] {
         let Some((code, report, said)) = on_a_disk_of(&folder, kilobytes) else {
             headrace_tests::skipped("unshare and mount are not allowed here");

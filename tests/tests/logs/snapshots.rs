@@ -75,8 +75,8 @@ pub(crate) fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     }
 }
 
-/// Saves a dive at many moments. Another loop runs from each saved state to the next one and must reach the same
-/// state.
+/// Saves a dive at many moments. From each saved state, another loop runs to the next moment, and must reach the same
+/// state there.
 fn goes_on_from_anywhere(scene: &Scene) {
     let packets = packets(scene);
     let (mut whole, mut other) = (armed(&scene.vehicle), armed(&scene.vehicle));

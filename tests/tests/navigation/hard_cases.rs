@@ -40,7 +40,7 @@ fn way() -> String {
 struct Errors {
     turn_rad: f64,
     /// Largest position error while the hull is within 30 degrees of the tunnel's axis, in either direction, m.
-    /// `anywhere_m` is the largest position error at any angle of the hull.
+    /// `anywhere_m` is the largest position error whatever the angle of the hull.
     along_axis_m: f64,
     anywhere_m: f64,
     upside_down: u32,

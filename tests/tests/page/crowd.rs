@@ -33,7 +33,7 @@ enum Client {
     Silent,
     /// Sends half of a request's head.
     HalfSent,
-    /// Reads the lines of the feed slowly.
+    /// Requests the lines of the feed and reads them slowly.
     SlowReader,
     /// Requests the lines of the feed and reads nothing.
     UnreadLines,
@@ -75,14 +75,15 @@ impl Group {
         }
     }
 
-    /// Keeps the group's connections open until the dive has ended; replaces the oldest one in each turn.
+    /// Keeps the group's connections open until the dive has ended. In each turn of the loop, the oldest connection is
+    /// replaced.
     fn stay(self, address: &str, query: &str, has_ended: &AtomicBool) {
         let mut open = std::collections::VecDeque::new();
         while !has_ended.load(Ordering::SeqCst) {
             while open.len() < self.members
                 && let Ok(mut stream) = TcpStream::connect(address)
             {
-                // The server may close the connection at once for a newer one.
+                // Sending may fail, because the server may close this connection at once in favour of a newer one.
                 let _closed = stream.write_all(self.request(query).as_bytes());
                 stream.set_nonblocking(true).unwrap();
                 open.push_back(stream);
@@ -108,7 +109,8 @@ struct Among {
     code: Option<i32>,
 }
 
-/// Runs a live dive with its page among a crowd. The crowd's clients show a token by this URL query.
+/// Runs a live dive with its page among a crowd. The crowd's clients use the URL query `query`, which may contain a
+/// token.
 fn dive_among(folder: &Folder, crowd: &[Group], query: &str) -> Among {
     drop(std::fs::remove_file(folder.path("live.mcap")));
     let arguments = ["run", "vehicle.toml", "--source", "dive.mcap", "--record", "live.mcap"];

@@ -12,7 +12,7 @@ use headrace_tests::garbling::{EachFrame, Garbled, flipped, of_head, of_ping, th
 use headrace_tests::random::Random;
 use headrace_tests::rig::{COUNTER, DEPTH, HEAD, PING, Rig, Sensor};
 
-/// A sensor on a line without faults, which other sensors' faults must not disturb.
+/// A sensor on a line without faults. The faults of other sensors must not disturb it.
 fn healthy() -> Sensor {
     Sensor { text: COUNTER, end: End::udp(), fault: Box::new(Healthy) }
 }
@@ -33,7 +33,8 @@ const OF_A_BUSY_MACHINE: [&str; 3] = [
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {
-        // Reading from an unplugged port and writing to it give different messages, and either one may come first.
+        // An unplugged port gives different messages when it is read and when it is written, and either message may
+        // come first.
         let status = status.replace("the port is gone", "Broken pipe");
         let is_news = status != "running" && !OF_A_BUSY_MACHINE.iter().any(|begin| status.starts_with(begin));
         if is_news && !all.contains(&status) {
@@ -178,8 +179,8 @@ fn lost_bytes_lose_only_their_own_frames() {
     garbled(thinned);
 }
 
-/// A line that inserts garbage between frames. The garbage ends with the header of a longer frame, whose bytes never
-/// come.
+/// A line that inserts garbage between frames. The garbage ends with the header of a longer frame, but the rest of that
+/// frame never comes.
 fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     let mut random = Random(seed);
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
@@ -216,8 +217,8 @@ fn bursts_of_garbage_lose_no_frame() {
     ended.untroubled(2);
 }
 
-/// A device that stalls in the middle of every third frame. The stall is shorter than the usual pause between frames,
-/// or longer than it, or lasts for ever.
+/// A device that stalls in the middle of every third frame. Some stalls are shorter than the usual pause between
+/// frames, some are longer, and some last for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -413,8 +414,8 @@ impl Fault for DeafAtFirst {
     }
 }
 
-/// The drivers of both devices share the line. While one of them waits for an answer that never arrives, the other one
-/// sends nothing.
+/// The drivers of both devices share the line. While one driver waits for an answer that never arrives, the other
+/// driver sends nothing.
 #[test]
 fn two_devices_on_one_line_start_although_first_answers_are_lost() {
     let end = End::tcp();
