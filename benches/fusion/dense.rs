@@ -39,7 +39,7 @@ fn transition() -> [[f64; ERRORS]; ERRORS] {
     core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]))
 }
 
-/// Hand-written filter on nalgebra's matrices of fixed size; its update uses Joseph's form.
+/// Hand-written filter on nalgebra's matrices of fixed size. Its update uses Joseph's form.
 #[derive(Clone)]
 pub(crate) struct Dense<const N: usize> {
     x: SVector<f64, N>,

@@ -1,5 +1,5 @@
 //! `headrace run` with foreign senders of data: ports that anybody can send to, other MAVLink systems, two sensors on
-//! one device, and velocity logs with older firmware.
+//! one device, and a serial port that another program has locked.
 
 use std::net::UdpSocket;
 use std::os::unix::fs::symlink;

@@ -1,8 +1,8 @@
 //! The CAN and HID drivers on a real kernel, with emulated devices.
 //!
-//! All sent data is decoded. If an interface or counter disappears, the other sensor goes on. A returning interface or
-//! counter is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
-//! --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
+//! All sent data is decoded. If the CAN interface or the counter disappears, the other sensor goes on. When it returns,
+//! it is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run --with
+//! target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -31,9 +31,9 @@ const TETHER: usize = 1;
 
 /// Longest time that a test waits for expected data.
 const LONG: DurNs = DurNs::from_millis(20_000);
-/// A line that is silent for this time has no more data.
+/// If a line is silent for this time, no more data is expected on it.
 const SETTLED: DurNs = DurNs::from_millis(200);
-/// Number of messages sent at once. It is smaller than the number of reports that the kernel buffers for a counter.
+/// Number of messages sent at once. The kernel buffers more reports than this for a counter.
 const BURST: usize = 20;
 
 const COUNTER: &str = "hid:1209:0001:HR-0001";
@@ -216,14 +216,14 @@ impl Rehearsal {
         }
     }
 
-    /// Sends `count` messages and checks that all of them, and nothing else, are decoded.
+    /// Sends `count` messages and checks that the program decodes all of them and nothing else.
     #[track_caller]
     fn exactly(&mut self, source: usize, stand: &mut EmulatedPort, count: usize) {
         let before = self.settle(source);
         self.exactly_after(before, source, stand, count);
     }
 
-    /// As [`Self::exactly`], but without a wait before sending; `before` messages have already been decoded.
+    /// As [`Self::exactly`], but sends at once. `before` messages have already been decoded.
     #[track_caller]
     fn exactly_after(&mut self, before: u64, source: usize, stand: &mut EmulatedPort, count: usize) {
         for burst in (0..count).step_by(BURST) {
@@ -272,7 +272,7 @@ fn every_can_frame_and_every_hid_report_is_decoded() {
     assert!(histories.iter().all(|history| history.lost == 0), "{histories:?}");
 }
 
-/// A slow driver, which records the timestamp of each message and the time of reading it.
+/// A slow driver. It records the timestamp of each message and the time at which it read the message.
 struct Dawdler {
     driver: Box<dyn Driver>,
     noted: Arc<SegQueue<(MonoNs, MonoNs)>>,
@@ -333,7 +333,7 @@ fn late_read_does_not_change_a_frame_timestamp() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // The tolerance is needed because the stamps come from another clock, and the two clocks can't be read at the same
+    // The tolerance is needed because the timestamps come from another clock, and two clocks can't be read at the same
     // moment.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
@@ -417,7 +417,7 @@ fn replugged_can_adapter_is_used_again() {
     rehearsal.send(IMU, &mut imu, 3);
     rehearsal.exactly(TETHER, &mut tether, 60);
     let vcan = Interface::up("vcan6");
-    // The inertial unit's end of the line existed before the new interface, and continues to work.
+    // The inertial unit's end of the line was opened before the interface was made again, and still works.
     rehearsal.call(IMU, &mut imu);
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");
@@ -446,7 +446,8 @@ fn replugged_counter_is_used_again_under_another_device_number() {
     assert!(rehearsal.said.iter().any(lost), "{:?}", rehearsal.said);
     rehearsal.exactly(IMU, &mut imu, 100);
 
-    // Another counter takes the old number. The first counter gets a new number, and only this counter is read.
+    // Another counter takes the device number of the first one. The first counter gets a new number, and is still the
+    // only one that is read.
     let mut other = counter("HR-0002");
     assert_eq!(path("HR-0002"), first);
     let mut tether = counter("HR-0001");
