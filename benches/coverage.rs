@@ -129,8 +129,7 @@ fn covering(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// Finds the holes of all sections with each method. The printed times are divided by the number of samples in these
-/// sections.
+/// Finds the holes of all sections with each method. The printed times are per sample in the sections.
 fn holes(what: &str, samples: &[WallSample]) {
     let store = covered(samples);
     let sections = || (0..SECTIONS).map(|k| 7.0 + SECTION_M * k as f64);

@@ -154,7 +154,7 @@ fn messages_of(scene: &Scene, seconds: u64) -> Vec<Kept> {
     panic!("the scene lasts less than {seconds} s");
 }
 
-/// End of a tick in the dive's time; the first tick has number 1.
+/// Time of the dive at the end of a tick. The first tick has number 1.
 fn tick_end(number: u64) -> MonoNs {
     START + DurNs(TICK.0 * i64::try_from(number).unwrap())
 }

@@ -221,7 +221,7 @@ impl Driver for Timed {
     }
 }
 
-/// The bare read loop, which is the reference: reads data as it arrives and records the delay.
+/// The bare read loop, which is the reference. It reads data as it arrives and records the delays.
 fn bare(connect: &Connect, finish: Finish) {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => {
@@ -263,8 +263,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     loop {
         let count = read(&mut buffer);
         let at = now();
-        // A count of zero means end of file, because the device's end of the line is closed when the measurement is
-        // over.
+        // A count of zero means end of file, because the device's end of the line is closed after the measurement.
         if count == 0 {
             return;
         }
@@ -323,7 +322,7 @@ impl Ends {
         self.twin.as_ref().map_or_else(|| self.ours.connect().clone(), |twin| twin.connect().clone())
     }
 
-    /// Writes a message to both ports and alternates which port is first.
+    /// Writes a message to both ports. `ours_first` tells whether the driver's port is first.
     fn write(&mut self, bytes: &[u8], ours_first: bool) {
         let [ours, twin] = &self.courses;
         let write = |stand: &mut EmulatedPort, courses: &[&Course]| {
@@ -436,7 +435,8 @@ fn named<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'stati
     thread::Builder::new().name(name.to_owned()).spawn(work).unwrap()
 }
 
-/// CPU time of this process's threads with this name prefix, s. Source: Linux, /proc/PID/task/TID/schedstat.
+/// CPU time of those threads of this process whose name begins with `beginning`, s. Source: Linux,
+/// /proc/PID/task/TID/schedstat.
 fn run_s(beginning: &str) -> f64 {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
     let of = |task: std::fs::DirEntry| {
@@ -447,7 +447,7 @@ fn run_s(beginning: &str) -> f64 {
     tasks.flatten().map(of).sum()
 }
 
-/// Emulates the devices: passes requests of hosts to the simulation, and the simulation's messages to both ports.
+/// Emulates the devices. Passes hosts' requests to the simulation, and its messages to both ports of each device.
 fn emulate(mut simulation: Simulation, mut ends: Vec<Ends>, ending: &AtomicBool) {
     let origin = now();
     let mut is_ours_first = false;

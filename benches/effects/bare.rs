@@ -91,7 +91,7 @@ struct ByHand<'a> {
     heads: Vec<(Head, Mount)>,
     end: MonoNs,
     due: Vec<Sounding>,
-    /// Messages that haven't been sent yet: time, source, and start and end in `bytes`.
+    /// Messages that haven't been sent yet: time, source, and the start and end of the message in `bytes`.
     waiting: Vec<(MonoNs, usize, usize, usize)>,
     bytes: Vec<u8>,
 }

@@ -12,8 +12,7 @@ const EFFECTS: [(&str, &str); 2] = [
     ("occlusion, and a beam of 16 rays", "motion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\n"),
 ];
 const WALL: &str = "[[tunnel.features]]\nkind = \"mesh\"\nfile = \"rock.ply\"\nrole = \"wall\"\n";
-/// Number of points around the profile. `RINGS` is the number along the tunnel. Together they give a million triangles
-/// in 150 m.
+/// Number of points around the profile. `RINGS` is the number along the tunnel. In 150 m they give a million triangles.
 const SIDES: u32 = 400;
 const RINGS: u32 = 1_250;
 const LENGTH_M: f64 = 150.0;

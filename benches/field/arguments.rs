@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
     pub(crate) seeds: u64,
     /// Seed of the first dive of each cell.
     pub(crate) from_seed: u64,
-    /// Length of each dive, m; it overrides the vehicle's own length.
+    /// Length of each dive, m. It overrides the default length of the vehicle's dives.
     pub(crate) metres: Option<f64>,
     /// JSON file to which the figures of all cells are written.
     pub(crate) json: PathBuf,

@@ -41,7 +41,7 @@ pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
             }
         }
     }
-    // The longest dives run first. If they ran last, one core would be idle at the end.
+    // The longest dives run first. Otherwise, one core is idle while the other one finishes them.
     cells.sort_by_key(|named| named.cell.let_in_m.is_none());
     cells
 }
@@ -67,7 +67,7 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if !told_apart && arguments.cell.is_empty() {
         return false;
     }
-    // Results under these conditions don't depend on the place.
+    // Cells with these conditions are near the portal only, because their results don't depend on the place.
     let anywhere = [Condition::Told, Condition::AsBuilt, Condition::Altered];
     if anywhere.contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);

@@ -23,8 +23,7 @@ pub(crate) const GRAVITY_MPS2: f64 = 9.806_65;
 pub(crate) const SAMPLE_S: f64 = 0.01;
 const SAMPLE: DurNs = DurNs(10_000_000);
 const SAMPLES: usize = 10;
-/// Number of epochs before the measurement. They last about two minutes, which is enough to fill all clones of past
-/// poses.
+/// Number of epochs before the measurement: about two minutes, enough to fill all clones of past poses.
 const EPOCHS_BEFORE: usize = 1300;
 /// The echosounders look left, right and up.
 const YAWS_AND_PITCHES: [(f64, f64); 3] =
@@ -127,8 +126,7 @@ impl Dive {
         self.running.factors
     }
 
-    /// The filter's clones of past poses, and the time of the last epoch, which is an upper bound of the last clone's
-    /// time.
+    /// The filter's clones of past poses, and the time of the last epoch. No clone is later.
     pub(crate) fn clones(&self) -> (ErrorClones, MonoNs) {
         (self.running.clones.clone(), self.running.at)
     }

@@ -107,7 +107,7 @@ pub fn wall_until(dive: &Dive, until: MonoNs) -> Wall {
     Wall::new(samples.map(|sample| sample.place), dive.profile.perimeter_m()).unwrap()
 }
 
-/// The flag of a section: when it was due, and when the loop raised and cleared it.
+/// The flag of a section, with the times at which the flag was due and at which the loop raised and cleared it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flag {
     /// Chainage of the section's start, m.

@@ -25,8 +25,8 @@ fn built() -> PathBuf {
     folder.join(format!("headrace_under_test{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// A new folder for one test, removed with its content. Commands run in this folder, so that their messages contain
-/// bare file names.
+/// A new folder for one test. The folder is removed with its content after the test. Commands run in this folder, so
+/// that their messages contain bare file names.
 pub struct Folder(PathBuf);
 
 /// Result of a run of the program.
@@ -114,7 +114,7 @@ impl Folder {
         answer
     }
 
-    /// Checks that `scene.toml` is refused with exit code 2 and these words, and that no log is written.
+    /// Checks that `scene.toml` is refused with exit code 2 and these words on stderr, and that no log is written.
     #[track_caller]
     pub fn refuses_scene(&self, words: &[&str]) {
         let answer = self.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
@@ -125,7 +125,7 @@ impl Folder {
         assert!(!self.path("dive.mcap").exists(), "a refused scene leaves no log");
     }
 
-    /// Runs `replay LOG --json` with more arguments; returns exit code and report.
+    /// Runs `replay LOG --json` with the arguments `further`. Returns exit code and report.
     pub fn replay(&self, log: &str, further: &[&str]) -> (Option<i32>, Value) {
         let answer = self.headrace(&[&["replay", log, "--json"], further].concat());
         let report = serde_json::from_str(&answer.stdout)

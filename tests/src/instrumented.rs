@@ -129,7 +129,7 @@ impl Seen {
     }
 }
 
-/// Simulates the scene of these two files and replays it in ticks of 20 ms.
+/// Simulates the scene in the files `vehicle` and `scene`, and replays it in ticks of 20 ms.
 pub fn dive(vehicle: &str, scene: &str) -> Dive {
     dive_in_ticks(vehicle, scene, Pace::default().tick)
 }

@@ -197,7 +197,7 @@ fn faults(schema: &Value, text: &Value) -> Vec<String> {
 }
 
 impl Viewer {
-    /// Connects to the page with this URL query, which begins with `?` or is empty.
+    /// Connects to the page. The URL query `query` is empty or begins with `?`.
     pub fn connect(
         serving: &Serving,
         query: &str,
@@ -252,7 +252,7 @@ impl Viewer {
         }
     }
 
-    /// Reads messages until one of this type arrives.
+    /// Reads messages until a message of type `kind` arrives.
     pub fn until_type(&mut self, kind: &str) -> Value {
         let before = self.others.len();
         self.until(kind, |viewer| viewer.others[before..].iter().any(|other| other["type"] == kind));

@@ -1,4 +1,4 @@
-//! Finds the largest speed at which a vehicle's sections truly pass, to compare this speed with the advised and planned
+//! Finds the largest speed at which a vehicle's sections truly pass, for comparison with the advised and planned
 //! speeds.
 //!
 //! A dive passes if nearly all of its sections have the verdict "pass", and if no circle without true samples
@@ -114,16 +114,15 @@ impl Outcome {
     /// Largest constant speed that exceeds the advice seldom enough, m/s. It may exceed the advice in the same fraction
     /// of updates as the fraction of sections that may fail.
     ///
-    /// Some excess is allowed because a swaying vehicle gets lower advice for short times, which a constant speed can't
-    /// follow.
+    /// Some excess is allowed, because a swaying vehicle gets lower advice for short times.
     pub fn told_mps(&self) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }
 
-    /// Number of changes of the displayed advised speed per minute. A dive shorter than half a minute counts as half a
-    /// minute long, so that a single change doesn't give a high rate.
+    /// Number of times per minute that the displayed advised speed or its reason changes. A dive shorter than half a
+    /// minute counts as half a minute long, so that a single change doesn't give a high rate.
     pub fn changes_a_minute(&self) -> f64 {
         let changed = |pair: &[AdviceEntry]| {
             (pair[0].advice.v_max_mps - pair[1].advice.v_max_mps).abs() > 1e-6

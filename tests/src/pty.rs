@@ -135,8 +135,7 @@ impl Drop for OnTerminal {
     }
 }
 
-/// The lines as displayed, without colours. A line that is overwritten appears once for each version that was
-/// displayed.
+/// The lines as displayed, without colours. An overwritten line appears once for each displayed version.
 pub fn shown_lines(written: &str) -> Vec<String> {
     let mut plain = String::new();
     let mut rest = written;

@@ -194,8 +194,8 @@ impl Rig {
         self.end_but(None)
     }
 
-    /// As [`Rig::end`], but doesn't wait for the frames of the sensor `overrun`, which may have lost frames at a full
-    /// ring.
+    /// As [`Rig::end`], but doesn't wait for the frames of the sensor `overrun`, because a full ring may have dropped
+    /// some of them.
     #[track_caller]
     pub fn end_but(mut self, overrun: Option<usize>) -> Ended {
         for device in &self.devices {

@@ -32,8 +32,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Runs the program in a folder on a terminal of `columns` columns. Its environment has `TERM=xterm` and the given
-    /// variables.
+    /// Runs the program in a folder on a terminal of `columns` columns. It gets `TERM=xterm` and these variables.
     pub fn run(folder: &Folder, arguments: &[&str], columns: u16, variables: &[(&str, &str)]) -> Self {
         Self::sized(folder, arguments, (columns, 24), variables)
     }
@@ -102,8 +101,7 @@ impl Screen {
         terminal
     }
 
-    /// The page as text without trailing spaces. The program may leave these out, depending on the content that it
-    /// overwrites.
+    /// The page as text without trailing spaces. The program may leave these out.
     pub fn page(&self) -> String {
         let page = self.terminal().screen().contents();
         page.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")

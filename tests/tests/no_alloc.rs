@@ -171,7 +171,7 @@ fn million_packets_need_no_allocation() {
     assert!(written.messages >= packets as u64, "recorded input is never dropped");
 }
 
-/// The decoders get the bytes of these devices in pieces. Some of the bytes are damaged.
+/// The decoders get the bytes of their devices in pieces. Some of the bytes are damaged.
 #[test]
 fn decoders_of_other_vehicles_allocate_nothing() {
     let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };

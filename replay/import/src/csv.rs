@@ -189,8 +189,8 @@ impl Target {
         Ok(())
     }
 
-    /// Encodes a row's values for one sensor as the bytes that the sensor would have sent. If all cells for the
-    /// sensor are empty, there are no bytes.
+    /// Encodes a row's values for one sensor as the bytes that the sensor would have sent. If all of the sensor's cells
+    /// are empty, nothing is added.
     ///
     /// Errors: the reason, as text, if a cell can't be parsed or encoded.
     fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
@@ -238,8 +238,7 @@ fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<V
     })
 }
 
-/// Parses a decimal number of time units as nanoseconds. The result is exact, except that fractions of a nanosecond are
-/// cut off.
+/// Parses a decimal number of time units as nanoseconds. The result is exact, but cut off to whole nanoseconds.
 fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     if whole.is_empty() || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {

@@ -34,7 +34,7 @@ pub(super) enum Value {
 impl Value {
     /// Whether the measured value is possible, by limits far beyond the values in tunnels.
     ///
-    /// Larger values must be refused, because wire formats would wrap or clamp them to plausible values.
+    /// Larger values must be refused, because wire formats turn them into plausible values by wrapping or clamping.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
         // A NaN means "not measured", which is allowed.

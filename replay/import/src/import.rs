@@ -49,8 +49,7 @@ pub struct Imported {
 }
 
 impl<R: Read> Import<Input<R>> {
-    /// Opens a file, and reads until its start time is known. `what` is the word for an entry of the file in error
-    /// texts.
+    /// Opens a file, and reads until its start time is known. `what` names an entry of the file in error texts.
     ///
     /// Errors: the file can't be read, or has no entry.
     pub fn open(
@@ -64,8 +63,7 @@ impl<R: Read> Import<Input<R>> {
 }
 
 impl<S: Source> Import<S> {
-    /// Opens a source of entries, and reads until its start time is known. `what` is the word for an entry in error
-    /// texts.
+    /// Opens a source of entries, and reads until its start time is known. `what` names an entry in error texts.
     ///
     /// Errors: the source can't be read, or has no entry.
     pub fn of(mut input: S, what: &'static str) -> Result<Self, ImportError> {

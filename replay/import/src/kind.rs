@@ -122,8 +122,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the name by which the file calls the connection of a sensor. `connect` is the sensor's key in the
-    /// vehicle file.
+    /// Returns the name that a file gives to a connection. `connect` is the connection's address in the vehicle file.
     pub(crate) fn usual_line(self, connect: &str) -> Option<String> {
         match self {
             Self::Candump => match Connect::parse(connect) {

@@ -32,8 +32,7 @@ impl Default for Order {
 }
 
 impl Order {
-    /// Creates an empty order. An entry may come after entries whose timestamps are up to `window_ns` later than its
-    /// own.
+    /// Creates an empty order. An entry may come after entries with timestamps that are up to `window_ns` later.
     pub(super) fn reaching(window_ns: u64) -> Self {
         let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
         Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }

@@ -95,7 +95,7 @@ pub enum RoutingError {
         /// Form of a connection's name in this kind of log file.
         line: &'static str,
     },
-    /// An option names a connection, but the file contains values instead of the bytes of connections.
+    /// An option names a connection, but the file has no connections, because it contains values instead of bytes.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
         /// Kind of the file that contains values.

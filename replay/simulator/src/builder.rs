@@ -37,7 +37,7 @@ struct Slot(usize);
 
 type Configs = ScheduleConfigs<ScheduleSystem>;
 
-/// The heads' programs, which effects may change before the heads are switched on.
+/// Access to the heads' programs. Effects may change the programs before the heads are switched on.
 pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,

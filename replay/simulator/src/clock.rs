@@ -14,7 +14,7 @@ const PARTS: i128 = 1_000_000_000_000;
 /// A clock that is correct at the start and drifts at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Clock {
-    /// Excess of a second of this clock over a true second, in parts; see [`PARTS`].
+    /// Length of a second of this clock minus that of a true second, in parts (see [`PARTS`]).
     longer: i128,
 }
 

@@ -1,5 +1,4 @@
-//! Finds the changes that each effect makes to each measurement, by comparing the measurement before and after each
-//! system.
+//! Finds the changes that each effect makes to each measurement, by comparing it before and after each system.
 //!
 //! Effects need not report their changes. This module is only active in a simulation with ground truth.
 
@@ -126,8 +125,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// Returns a recording system. It records all changes since the previous recording system ran, and attributes them to
-/// `effect`.
+/// Returns a recording system. It attributes all changes since the previous recording system ran to `effect`.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

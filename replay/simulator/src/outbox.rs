@@ -27,7 +27,7 @@ const NEVER: MonoNs = MonoNs(u64::MAX);
 pub(crate) struct Outbox {
     /// Waiting messages of each source, in the order of the sources.
     lanes: Vec<Lane>,
-    /// Time at which the next message of each source is due; `NEVER` if none waits.
+    /// For each source, the time at which its next message is due; `NEVER` if none waits.
     due: Vec<MonoNs>,
     /// Messages with timestamps before this time are released.
     until: MonoNs,

@@ -158,7 +158,7 @@ impl Scene {
         self.active().map(|(kind, _)| kind.name()).collect()
     }
 
-    /// Leaves these effects out from now on. Effects that were left out before are restored.
+    /// Leaves the effects named `names` out of the simulation. Effects that an earlier call left out are restored.
     pub fn leave_out(&mut self, names: &[&str]) {
         self.without = names.iter().map(|name| (*name).to_owned()).collect();
     }

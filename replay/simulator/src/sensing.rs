@@ -86,7 +86,7 @@ pub(crate) struct Ray {
     pub hit: Option<Hit>,
 }
 
-/// Distance up to which the walls ahead of a sonar are computed: its range setting and a margin, m.
+/// Distance up to which the walls ahead of a sonar are computed, m. It is the sonar's range setting and a margin.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 

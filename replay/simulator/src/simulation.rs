@@ -353,7 +353,7 @@ impl Simulation {
         }
     }
 
-    /// All measurements of a sensor in the dive, simulated without the other sensors.
+    /// All measurements of the sensor `source` in the dive. No other sensor is simulated.
     pub(crate) fn measurements_of<M: Measurement>(mut self, source: usize) -> Vec<M> {
         self.keep_only(source);
         let mut all: Vec<M> = Vec::new();
@@ -504,8 +504,7 @@ mod tests {
         let scene = bench.scene();
         let mut simulation = Simulation::for_hosts(&scene).unwrap();
         let (ping, mut at) = (bench.source("ping"), START);
-        // Message 1400 of the Ping protocol, addressed to all devices. It requests a profile by its id, and ends with a
-        // checksum.
+        // Message 1400 of the Ping protocol, addressed to all devices. It has a profile's id and a checksum.
         simulation.hear(ping, at, &[0x42, 0x52, 2, 0, 0x78, 0x05, 0, 255, 0x14, 0x05, 0x2B, 0x02]);
         let mut pings = |simulation: &mut Simulation| {
             counts_m(simulation, bench.source("tether"), &mut at);

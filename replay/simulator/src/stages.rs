@@ -22,19 +22,19 @@ const SAME_ANGLE_RAD: f64 = 1e-9;
 pub enum Stage {
     /// Devices give the times and kinds of their measurements.
     Begin,
-    /// Heads turn. Effects on beam angles act here.
+    /// Heads turn. Effects on beam angles act in this stage.
     Turn,
     /// Sonars get a position and a direction.
     Aim,
     /// Beams hit walls and objects.
     Look,
-    /// Pings get a range. Effects on ranges act here.
+    /// Pings get a range. Effects on ranges act in this stage.
     Hear,
-    /// Other sensors get pressure, motion and cable length. Effects on these act here.
+    /// All sensors except sonars get pressure, motion or cable length. Effects on these quantities act in this stage.
     Feel,
     /// Devices encode their measurements.
     Tell,
-    /// Effects on the devices' lines act here.
+    /// Effects on the devices' lines act in this stage.
     Line,
 }
 

@@ -332,8 +332,8 @@ impl Seen {
     }
 }
 
-/// For each sample: its estimated chainage, and the vehicle's chainage offset (true minus estimated), m. Sorted by
-/// chainage.
+/// For each sample: its estimated chainage, and the vehicle's chainage offset (true minus estimated) at its time, m.
+/// The samples are sorted by chainage.
 #[derive(Default)]
 struct Shifts(Vec<(f64, f64)>);
 

@@ -129,7 +129,7 @@ impl Wall {
     }
 }
 
-/// Circumcircles of a Delaunay triangulation, limited to centres on the wall; the largest comes first.
+/// Circumcircles of a Delaunay triangulation, limited to those with a centre on the wall. The largest comes first.
 fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError> {
     let tidy = |value: f64| if value.abs() < TINY_M { 0.0 } else { value };
     let vertices = images.iter().map(|[x, sigma]| Vertex(Point2::new(tidy(*x), tidy(*sigma)))).collect();

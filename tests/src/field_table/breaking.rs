@@ -19,7 +19,7 @@ pub struct DeviceFault {
     pub sense: Sense,
     /// Name of the device.
     pub sensor: String,
-    /// One of [`FAULTS`]. A device with the fault `die` never recovers; a device with the fault `return` does.
+    /// One of [`FAULTS`]. With `die`, the device dies for good. With `return`, it dies and later recovers.
     pub fault: &'static str,
     /// Start of the fault, seconds after the start of the dive.
     pub from_s: f64,

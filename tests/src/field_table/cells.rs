@@ -88,7 +88,7 @@ pub enum Condition {
     /// As `DataSheet`, but the vehicle file states the true sensor noises. The file makes no allowance for rough walls,
     /// tilt or cable slack.
     Told,
-    /// A MEMS inertial unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error; steel
+    /// A MEMS inertial unit and cable slack, stated in the vehicle file. Also a counter with 0.5 % error, and steel
     /// nearby.
     Poor,
     /// Several lost returns in a row, returns from objects in front of the wall, and second echoes.
@@ -464,7 +464,7 @@ impl Cell {
         }
     }
 
-    /// Limits an offset from the centre line, m, so that the vehicle keeps clear of the wall of a narrow pipe.
+    /// Reduces an offset from the centre line, m, if the vehicle is in a narrow pipe and must keep clear of its wall.
     fn aside_m(&self, most_m: f64) -> f64 {
         if self.vehicle.name == "pipe" { 0.3 * most_m } else { most_m }
     }
@@ -522,7 +522,7 @@ impl Cell {
     /// Murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
     ///
     /// In these stretches, 10 to 30 % of the heads' returns are missing, several in a row. Clusters in front of the
-    /// wall cause 5 % of the returns, and second echoes cause some. Source: field.md, "murk".
+    /// wall cause 5 % of the returns, and second echoes cause some more. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();

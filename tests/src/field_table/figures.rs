@@ -254,13 +254,12 @@ impl Figures {
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Fraction of false passes: of the sections with a true hole D_true over the target, the fraction that passed.
+    /// Fraction of false passes: passed sections among those with a true hole D_true over the target.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Fraction of false fails: of the sections with a true hole D_true below 0.9 times the target, the fraction that
-    /// failed.
+    /// Fraction of false fails: failed sections among those with a true hole D_true below 0.9 times the target.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }

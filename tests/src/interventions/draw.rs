@@ -63,8 +63,7 @@ pub enum Injected {
     MissingReturns { keys: String },
     /// A range setting of the heads that is shorter than the distance to the wall, m.
     OutOfRange { range_m: u32 },
-    /// Parts of the vehicle hide the wall from the beams. Vehicle files declare these parts also if this cause isn't
-    /// injected.
+    /// Parts of the vehicle hide the wall from the beams. Vehicle files always declare these parts.
     Occluded,
     /// The vehicle is offset from the centre line by [y, z], m.
     Aside { over_m: [f64; 2], by_m: [f64; 2] },
@@ -126,7 +125,7 @@ pub struct Drawn {
     pub end_m: f64,
     /// Speed without injected causes, m/s.
     pub speed_mps: f64,
-    /// Target T, m; only an estimate until the dive has been simulated.
+    /// Target T, m. Until the dive has been simulated, this is only an estimate.
     pub target_m: f64,
     /// Ratio of the target to the largest hole without injected causes.
     pub margin: f64,
@@ -210,7 +209,7 @@ pub const KINDS: [Cause; 11] = [
 ];
 
 impl Drawn {
-    /// Draws the dive of a seed with these kinds of causes, given as indices of [`KINDS`].
+    /// Draws the dive of a seed. `kinds` are the kinds of its causes, as indices of [`KINDS`].
     pub fn of(seed: u64, kinds: &[usize]) -> Self {
         let mut draw = Draw::new(seed);
         let causes: Vec<Cause> = kinds.iter().map(|kind| KINDS[*kind]).collect();
@@ -319,8 +318,7 @@ impl Drawn {
             },
             Cause::Phase => {
                 let mut offsets_deg = vec![0.0; count];
-                // With these offsets, all heads look in almost the same direction at any time, so their passes leave
-                // gaps.
+                // With these offsets, all heads always look in almost the same direction, so their passes leave gaps.
                 for (head, offset_deg) in offsets_deg.iter_mut().enumerate().skip(1) {
                     let together_deg = 360.0 * head as f64 / count as f64;
                     *offset_deg = math::wrap_signed(together_deg * draw.between(0.7, 1.0), 360.0);

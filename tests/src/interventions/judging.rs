@@ -32,8 +32,8 @@ pub struct Judged {
     pub run: Option<u32>,
     /// Diameter of the section's hole, m.
     pub hole_m: f64,
-    /// Diameter of the hole with one injected cause removed, one value per cause, m; infinite if the hole can't
-    /// be measured.
+    /// For each injected cause, the diameter of the hole if this cause is removed, m; infinite if the hole can't be
+    /// measured.
     pub without_m: Vec<f64>,
     /// Evidence that the program reports for the displayed causes.
     pub evidence: Evidence,
@@ -82,7 +82,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// Number of displayed missed stretches (`run`) that contain sections of this stretch.
+    /// Number of missed stretches (`run`) that the program displays for the sections of this stretch.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();

@@ -40,8 +40,7 @@ fn mends(action: Action, injected: &Injected) -> bool {
     }
 }
 
-/// Simulates the displayed remedy of each missed stretch. Skips missed stretches in which the injected causes explain
-/// no section.
+/// Simulates the displayed remedy of each missed stretch. Skips those in which injected causes explain no section.
 pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
     let of_run = |told: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()

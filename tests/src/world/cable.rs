@@ -169,7 +169,7 @@ impl Line for OpenCable {
         self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
-    /// Exchanges one message with the device, as over UDP. The answer also arrives as one message with its own length.
+    /// Writes one message to the device. As over UDP, the answer arrives as one message with its own length.
     fn exchange(
         &mut self,
         write: &[u8],

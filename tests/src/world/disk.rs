@@ -79,8 +79,7 @@ impl SimulatedDisk {
         self.clock.now().max(self.busy_until())
     }
 
-    /// Performs an operation when all earlier operations are complete. Returns the time at which this operation is
-    /// complete.
+    /// Performs an operation when all earlier operations are complete. Returns the time of its completion.
     fn take_turn(&self, is_sync: bool) -> MonoNs {
         let begins = self.begins();
         let active = self.faults.iter().filter(|window| window.holds(begins));

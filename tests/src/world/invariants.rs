@@ -77,8 +77,8 @@ fn of_changed(lived: &DiveResult, replayed: &Replayed) -> Option<String> {
     Some(format!("the recording after its change ({change:?}): {what}"))
 }
 
-/// Checks one device: other devices' faults don't affect it, delays lose no frame, and it runs again after all
-/// faults.
+/// Checks that other devices' faults don't affect a device, that delays lose none of its frames, and that it runs again
+/// after all faults.
 fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let is_of = |fault: MachineFault| matches!(fault, MachineFault::LoopStalls | MachineFault::PortsStall);

@@ -119,8 +119,7 @@ pub struct World {
     /// Moments at which the recorder had emptied its queue, each with the number of packets that it had then recorded.
     /// A disk failure clears the list.
     taken: VecDeque<(MonoNs, usize)>,
-    /// Syncs in progress: the time at which each is complete, and the number of packets that are then certainly in the
-    /// log.
+    /// Syncs in progress: the completion time of each, and the number of packets that are then certainly in the log.
     syncing: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
     is_behind: bool,
@@ -141,8 +140,7 @@ impl World {
         Self::with(seed, None, None)
     }
 
-    /// As [`World::new`], but with a sabotage that breaks an invariant, and with only the given ones of the seed's
-    /// faults.
+    /// As [`World::new`], but with a sabotage that breaks an invariant, and with only these of the seed's faults.
     pub fn with(seed: u64, sabotage: Option<Sabotage>, faults: Option<&[Fault]>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
@@ -301,8 +299,7 @@ impl World {
             self.taken.clear();
             return;
         }
-        // The packets taken so far can only be certain if the recorder has emptied its queue or has synced in this
-        // step.
+        // Packets taken so far can only be certain if the recorder has emptied its queue or synced in this step.
         if is_empty || self.disk.syncs() > syncs {
             self.taken.push_back((now, self.consumed.len() - self.skipped));
             while let Some((at, count)) = self.taken.front().copied()

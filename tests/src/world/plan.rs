@@ -129,7 +129,7 @@ pub enum DiskFault {
     },
 }
 
-/// Operations per second of a limited disk: from an SD card in poor condition to a hard disk.
+/// Operations per second of a limited disk, from an SD card in poor condition to a hard disk.
 const OPS_PER_S: [u16; 5] = [3, 10, 30, 100, 300];
 /// Durations of slow syncs, ms.
 const SYNCS_MS: [u16; 6] = [10, 100, 250, 700, 2000, 5000];

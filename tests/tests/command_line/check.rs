@@ -340,8 +340,8 @@ fn too_many_sensors_give_the_same_error_in_check_and_run() {
     assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
 }
 
-/// The heads' phases are set at the start of the dive, for the planned speed in the vehicle file. The speed limit from
-/// `check` applies to these phases. `run` gives the same limit.
+/// At the start of a dive, the phases of the heads are set for the planned speed in the vehicle file. The speed limit
+/// from `check` is the limit for heads with these phases. `run` gives the same limit.
 #[test]
 fn check_gives_the_speed_limit_for_head_phases_of_the_planned_speed() {
     let folder = Folder::new();

@@ -214,7 +214,7 @@ fn unwritable_output_is_a_failure() {
     // A live dive succeeds even if its stdout is redirected to a full disk.
     let dive = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max"];
     assert_eq!(code(&dive, full()).0, Some(0));
-    // Closing the reading end is no error: the reader wants no more output.
+    // If a reader closes its end of the pipe, this is no error, because it wants no more output.
     for arguments in [&["replay", "live.mcap"][..], &["replay", "live.mcap", "--json"], &["help"], &dive] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);

@@ -25,7 +25,7 @@ fn figure(line: &Value, key: &str) -> f64 {
     line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
 }
 
-/// Displayed conditions (such as "too_fast") between two chainages while the vehicle moves in one direction. The
+/// Displayed conditions (such as "too_fast") between two chainages while the vehicle moves in one direction. The first
 /// seconds after a reversal are left out.
 fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");

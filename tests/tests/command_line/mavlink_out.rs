@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, root};
 
-/// Names of values that QGroundControl would mistake for values of the autopilot.
+/// Names of values that QGroundControl takes for values of the autopilot. headrace must not use them.
 const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 

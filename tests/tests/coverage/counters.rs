@@ -1,5 +1,4 @@
-//! Cable counters with a resolution of 1 cm, on swinging cables. They cause no wrong displayed speed and no wrong
-//! verdict.
+//! Cable counters with steps of 1 cm, on swinging cables. They cause no wrong displayed speed and no wrong verdict.
 
 use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
@@ -40,7 +39,7 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
     scenes::seeded(&text, &|name: &str| scenes::vehicle_file(name), Some(seed))
 }
 
-/// Wrong results of a dive: errors of displayed speed and of verdicts.
+/// Wrong results of a dive: errors of the displayed speed, and wrong verdicts.
 #[derive(Debug, Default)]
 struct Wrong {
     /// Largest error of the displayed speed while there is a fix, m/s.

@@ -51,7 +51,7 @@ fn accounted_for(what: &str, report: &Report) {
     assert!(report.sections.iter().all(judged), "{what}");
 }
 
-/// Checks that a section fails because of these silent heads.
+/// Checks that a section fails, and that its reported cause is the silence of these heads.
 #[track_caller]
 fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     let evidence = section.cause.unwrap();
@@ -114,7 +114,7 @@ fn stretch_crossed_while_all_heads_are_silent_fails() {
     }
 }
 
-/// Report of a dive without position errors; the signed lengths of its legs are given in m.
+/// Report of a dive without position errors. `distances_m` are the signed lengths of its legs.
 fn legs(distances_m: &[f64]) -> Report {
     let vehicle = VEHICLE.replace("slack_sd_m = 0.02", "way = \"direct\"\n#");
     let mut scene = format!("seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n");
@@ -188,7 +188,7 @@ fn flags_wait_only_for_live_heads() {
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
-    // One of the four heads is silent; the vehicle is slow enough for the other three heads.
+    // One of the four heads is silent, but the vehicle is slow enough for the remaining three.
     let silent = silence("\"sonar_1\"", "from_s = 10");
     let (one, none) = (steady(6.0, &silent), steady(6.0, ""));
     accounted_for("one of four", &one);
@@ -364,12 +364,11 @@ fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainag
         let begun_s = report.dive.start_s;
         let true_m = |at_s: f64| START_M + SPEED_MPS * (at_s - begun_s);
         let end_s = if is_over { 120.0 } else { 20.0 / SPEED_MPS };
-        // When the counter works again, its reading is first compared with the estimate. Only then is there a fix
-        // again.
+        // When the counter works again, its reading is first compared with the estimate. Then there is a fix again.
         let late_s = gap.to_s - begun_s - end_s;
         assert!((-2.0..15.0).contains(&late_s) && gap.is_over == is_over, "{span}: {gap:?}");
         assert!((60.0..100.0).contains(&(gap.from_s - begun_s)), "{span}: {gap:?}");
-        // 50 pings per second of each of the four heads.
+        // Each of the four heads sends 50 pings per second.
         let pings = 200.0 * (gap.to_s - gap.from_s);
         assert!((gap.pings as f64 - pings).abs() < 0.05 * pings, "{span}: {gap:?}");
         let (from_m, to_m) = (gap.from_m.unwrap(), gap.to_m.unwrap());

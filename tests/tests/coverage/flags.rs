@@ -101,8 +101,7 @@ fn flag_of_a_moving_vehicle_is_raised_within_one_turn() {
 /// Longest distance that the heads may move between the due moment and the raising of a flag, m
 /// (`docs/why/coverage.md`, "Verdicts").
 const LATE_M: f64 = 0.25;
-/// Time from the start until the position estimate has converged, seconds. It consists of the alignment and another 20
-/// s.
+/// Time from the start until the position estimate has converged, seconds: the alignment, and 20 s after it.
 const SETTLED_S: f64 = 22.0;
 
 #[test]

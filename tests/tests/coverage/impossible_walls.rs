@@ -4,7 +4,7 @@
 use headrace_tests::{Folder, SCENE, VEHICLE};
 use serde_json::Value;
 
-/// Runs the short dive with another scene and vehicle; returns its report and terminal output.
+/// Simulates and replays a dive with these files. Returns its report and terminal output.
 fn dive(vehicle: &str, scene: &str) -> (Value, String) {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle);

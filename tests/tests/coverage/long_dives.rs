@@ -74,8 +74,7 @@ fn hour_of_parking_and_hundred_trips_back_and_forth_change_no_verdict() {
     println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
     assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
     found("loop.rounds", off_m[1], 0.02);
-    // Memory growth over two spans: from a third of the parked hour to its end, and from three quarters of the rounds
-    // to their end.
+    // Memory may hardly grow in the last two thirds of the parked hour, and in the last quarter of the rounds.
     let parked = PARKED_S as usize / 60;
     let rounds = used.len() - 3 - parked;
     let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;

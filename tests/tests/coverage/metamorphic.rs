@@ -90,8 +90,8 @@ impl Beside<'_> {
 
 /// Vehicle file without a navigation filter, with heads at these positions in the body frame.
 ///
-/// If `side` is -1, the places, the turning direction of the heads, and the directions of the echosounders are
-/// mirrored.
+/// If `side` is -1, the vehicle is mirrored: the positions and turning directions of its heads, and the directions of
+/// its echosounders.
 fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     let mut text = format!(
         "target_m = 0.7\n[tunnel]\nlength_m = 1200\n{tunnel}\n[navigation]\nway = \"direct\"\n[heads]\nplanned_speed_mps = 0\n"
@@ -208,7 +208,7 @@ fn reordered(vehicle: &str, heads: usize) -> String {
     tables.join("[[sensors]]\n")
 }
 
-/// Values of these keys in the report.
+/// Values of the keys `keys` in the report.
 fn answers<'a>(report: &'a Value, keys: &[&str]) -> Vec<&'a Value> {
     assert!(report["summary"]["flags_raised"].as_u64().unwrap() > 5, "{}", report["summary"]);
     keys.iter().map(|key| &report[*key]).collect()

@@ -91,8 +91,8 @@ fn holes_are_the_largest_empty_circles() {
                 && [Verdict::Fail, Verdict::Open].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        // The loop stores samples in packed form, which moves them by micrometres. The reported bounds include this
-        // movement.
+        // The loop stores samples in packed form, which moves them by micrometres. The reported bounds of the hole
+        // allow for this.
         let right =
             section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
@@ -251,10 +251,10 @@ fn holes_of_sample_lattices_match_exact_values() {
     let triangles =
         Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0).unwrap();
     holds(&triangles, 1.0, 2.0, 0.8 / math::sqrt(3.0));
-    // A single ring of samples: the hole grows with the distance from the ring.
+    // With a single ring of samples, the hole of a section grows with the section's distance from the ring.
     let ring = Wall::new(lattice(1, 10, |_, j| [0.0, 0.3 * j]), 3.0).unwrap();
     holds(&ring, 1.0, 2.0, 2.0 * math::hypot(2.0, 0.15));
-    // A single sample, repeated: the hole's centre is on the opposite side of the perimeter.
+    // With a single place of all samples, the centre of the hole is on the opposite side of the perimeter.
     let one = Wall::new(vec![[5.0, 0.0]; 7], 8.0).unwrap();
     holds(&one, 5.0, 8.0, 10.0);
     assert!(Wall::new(Vec::new(), 8.0).unwrap().largest(0.0, 1.0).is_none());

@@ -126,8 +126,7 @@ fn cell(vehicle: &str, condition: Condition) -> Cell {
     Cell { vehicle, condition, start_m: 100.0, let_in_m: None, driven: Driven::Planned }
 }
 
-/// If sound is faster than configured, measured ranges are too short. If the tunnel is wider than the design, they are
-/// too long.
+/// If sound is faster than configured, measured ranges are too short. If the tunnel is too wide, they are too long.
 #[test]
 fn wrong_range_scale_is_reported_with_its_value() {
     let wrong = [(Condition::WrongSound, 1.0 / 1.04 - 1.0), (Condition::WrongWall, 0.06)];

@@ -62,7 +62,7 @@ fn true_holes_match_a_fine_grid() {
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The dive's ends are left out. They are far from all samples, so the grid search would take long there.
+    // The dive's ends are left out. They are far from all samples, so the grid search takes too long there.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {

@@ -1,7 +1,7 @@
 //! Only returns that are accepted as wall fill holes. The test compares these returns with the objects that the beams
 //! truly met.
 //!
-//! Cases are stuck and noisy heads, murk, boulders and caves.
+//! The dives have stuck or noisy heads, murk, boulders or caves.
 
 use headrace_coverage::Verdict;
 use std::collections::BTreeMap;

@@ -22,7 +22,7 @@ const BEGIN: MonoNs = MonoNs(1_000_000_000);
 /// Lowest sensor number of the second vehicle (see `Surroundings::vehicles`).
 pub(crate) const OTHERS: u8 = 128;
 
-/// Kind of a file; it determines the reader.
+/// Kind of a file. It determines which reader gets the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     Log,

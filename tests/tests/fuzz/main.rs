@@ -8,7 +8,7 @@
 //!     HEADRACE_FUZZ_SEED=42 HEADRACE_FUZZ_SECONDS=60 cargo test -p headrace_tests --test fuzz -- --ignored --nocapture
 //!
 //! A failing file is kept in the system's temporary folder and printed with seed, number and kind.
-//! `HEADRACE_FUZZ_FILE=path` tries a kept file again; its name contains its kind. Other fuzzers can call
+//! `HEADRACE_FUZZ_FILE=path` tries a kept file again. The name of the file contains its kind. Other fuzzers can call
 //! [`targets::try_one`].
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]

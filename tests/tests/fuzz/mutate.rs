@@ -28,7 +28,7 @@ fn lie(random: &mut Random, truth: u64) -> u64 {
     }
 }
 
-/// Damages a file one to eight times; parts of `other` may be inserted.
+/// Damages the file `bytes` one to eight times. Parts of `other` may be inserted.
 pub(crate) fn broken(random: &mut Random, bytes: &[u8], other: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(4) * random.below(3) {

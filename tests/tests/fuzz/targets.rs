@@ -111,8 +111,8 @@ impl Surroundings {
             .collect()
     }
 
-    /// Maps the given topics to sensors; returns the feeds. Only topics of profiling heads take their times from header
-    /// stamps.
+    /// Maps the given topics to sensors; returns the feeds. Only messages for profiling heads get their times from the
+    /// timestamps in their headers.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {
@@ -162,7 +162,7 @@ pub(crate) fn try_one(
     }
 }
 
-/// Whether every checksum is present. A checksum of zero counts as missing. Without a checksum, a changed byte can't be
+/// Whether every checksum is present. A checksum of zero counts as missing. Without one, a changed byte can't be
 /// detected.
 fn is_vouched_for(log: &[u8]) -> bool {
     let mut rest = &log[8..];
@@ -261,7 +261,8 @@ fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
 /// Largest number of lines in the list of a file's errors, including the line that says that there are more.
 const MOST_ERRORS: usize = 101;
 
-/// Reads a vehicle file or a scene; returns its number of sensors. Errors: the list of errors in the file is faulty.
+/// Reads a vehicle file or a scene; returns its number of sensors. Errors: the reader's list of the errors in the file
+/// is itself faulty.
 fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
     let document = Document::new("file", text);

@@ -21,7 +21,8 @@ fn with_a_late_channel() -> Vec<u8> {
     [&data, &summary, &footer, MAGIC].concat()
 }
 
-/// Messages in the rest of a log, and all losses that the reader has reported.
+/// Reads a log from the present position to its end. Returns the messages, and all losses that the reader has reported
+/// so far.
 fn rest(log: &mut LogReader<Cursor<Vec<u8>>>) -> (Vec<Vec<u8>>, Vec<String>) {
     let mut messages = Vec::new();
     while let Some(message) = log.next().unwrap() {

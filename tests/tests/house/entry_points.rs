@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::workspace::{root, sources};
 
 const LIST: &str = "tests/tests/fuzz/entry_points";
-/// Signs that a file interprets external bytes: the traits of decoders and file formats, and the parsers of text and
+/// Texts that show that a file interprets external bytes: traits of decoders and file formats, and parsers of text and
 /// JSON.
 const SIGNS: [&str; 9] = [
     " Decoder for ",

@@ -31,8 +31,8 @@ fn json(path: PathBuf) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Every file in the image is named by the digest of its content. The image states its processor, and its labels are
-/// those that BlueOS reads.
+/// Every file in the image is named by the digest of its content. The image states its processor, and has the labels
+/// that BlueOS reads.
 #[test]
 fn blueos_image_contains_the_program() {
     let folder = Folder::new();

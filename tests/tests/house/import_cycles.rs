@@ -1,4 +1,4 @@
-//! Finds import cycles between files of a crate, because the files of a cycle can't be understood, tested or moved
+//! Finds import cycles between files of a crate, because files in a cycle can't be understood, tested or moved
 //! separately.
 //!
 //! A file depends on the files of its child modules, and on the file of each module that its paths name. `pub use`
@@ -27,7 +27,7 @@ fn no_files_import_each_other_in_a_cycle() {
     assert!(found.is_empty(), "import cycles of files, with their imports: {found:#?}");
 }
 
-/// Path of a module: the names from the crate's root on.
+/// Path of a module, as its names from the crate's root on.
 type Module = Vec<String>;
 
 #[derive(Debug, Default)]
@@ -112,8 +112,7 @@ impl Sources {
         Some(from)
     }
 
-    /// The module that a path from the crate's root names: the longest beginning of the path that is a module with a
-    /// file.
+    /// The module that a path from the crate's root names: the path's longest beginning that is a module with a file.
     fn named(&self, path: &[String]) -> Module {
         let is_module = |len: &usize| self.0.contains_key(&path[..*len]);
         path[..(1..=path.len()).take_while(is_module).last().unwrap_or(0)].to_vec()
@@ -148,8 +147,7 @@ impl Sources {
     }
 }
 
-/// Strongly connected components of a graph: the largest sets of nodes in which every node reaches all others (Tarjan
-/// 1972).
+/// Strongly connected components of a graph: largest sets of nodes in which each reaches all others (Tarjan 1972).
 fn components<N: Ord + Clone>(graph: &BTreeMap<N, BTreeSet<N>>) -> Vec<BTreeSet<N>> {
     let mut search = Search { graph, seen: BTreeMap::new(), stack: Vec::new(), found: Vec::new() };
     for node in graph.keys() {

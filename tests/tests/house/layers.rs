@@ -43,7 +43,7 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// The crate that lists all device kinds. It may use the crates of all devices, and those crates of the core that they
+/// The crate that lists all device kinds. It may use the crates of all devices, and the crates of the core that these
 /// may use.
 const DEVICES: &str = "plugins/devices";
 
@@ -146,8 +146,8 @@ fn core_has_no_io_and_no_locks() {
     assert!(said.is_empty(), "{said:#?}");
 }
 
-/// A test must not print a skip with `println!`. Cargo hides the output of passing tests, so `.ci/count-skipped`
-/// wouldn't count it.
+/// A test must not report with `println!` that it was skipped. Cargo hides the output of passing tests, so
+/// `.ci/count-skipped` misses such a report.
 #[test]
 fn skipped_tests_are_reported_only_by_the_helper() {
     // The searched text is split here, so that the search doesn't find this file itself.

@@ -79,7 +79,8 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
     let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
-    // Four camera frames have checksums that match no definition, so data is lost.
+    // Four frames of a camera have checksums that match no message definition. The exit code is 3, because data is
+    // lost.
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     let shown = json(&answer);
     assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);

@@ -45,7 +45,7 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message of an imported log: topic, nanoseconds since 1970 (by the log's clock anchor), and bytes.
+/// A message of an imported log: topic, time in nanoseconds since 1970 (by the clock metadata of the log), and bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -110,12 +110,12 @@ fn recordings_of_all_kinds_match_the_tables() {
                 "{name}: {topic}"
             );
         }
-        // The import computes angles from points. A beam without a return has no point, so these messages are left
-        // out.
+        // The import computes angles from points. A beam without a return has no point, so messages of such beams are
+        // left out of the comparison.
         let wanted: Vec<_> =
             of(&tables, "/raw/sonar_1").into_iter().filter(|(_, _, bytes)| bytes[8..10] != [0, 0]).collect();
         assert_eq!(of(&got, "/raw/sonar_1"), wanted, "{name}");
-        // A CSV table can't contain a missing return, so the numbers of pings differ. Only distance and confidence are
+        // A CSV table can't contain a missing return, so ping numbers differ. Only distance and confidence are
         // compared.
         let distances = |all: &[Heard]| -> Vec<_> {
             let pings = of(all, "/raw/ping_left").into_iter();

@@ -407,8 +407,7 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     assert_eq!(of_sensors, 0);
     let state = late.view().live_state_json();
     let dvl = state.sensors.iter().find(|sensor| sensor.id == "dvl").unwrap();
-    // The numbers of readings differ, because the live state also counts the reports since the last update of the
-    // alerts.
+    // The numbers of readings differ, because the live state also counts reports since the last update of the alerts.
     let after = dvl.withheld.as_ref().unwrap().split_once(' ').unwrap().1;
     assert_eq!((dvl.state.as_str(), after), ("withheld", text.splitn(3, ' ').nth(2).unwrap()));
     let report = Report::of(&late);

@@ -313,7 +313,7 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        // The file grows at each sync, twice a second. After four syncs, it certainly contains data whose loss can be
+        // The file grows at each sync, twice a second. After four syncs, it surely contains data whose loss can be
         // detected.
         (0..4).fold(0, |len, _| wait_for_more(&log, len, &mut dive));
         take();

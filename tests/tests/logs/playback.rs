@@ -146,8 +146,7 @@ fn every_seek_reaches_the_state_of_a_straight_replay() {
     for log in ["dive.mcap", "ticks.mcap", "parts"] {
         let (ticks, outcome) = through(&folder, log);
         assert!(outcome.losses.is_empty(), "{:?}", outcome.losses);
-        // Seeks end before the last two ticks, because a single step from the last two ticks would reach the end of the
-        // log.
+        // Seeks end before the last two ticks, because a single step from there reaches the end of the log.
         let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
         let span = late.since(begun).0;
         for interval in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
@@ -254,7 +253,7 @@ fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
             }
         }
     }
-    // Report and exit code must also equal those of a replay without pauses and seeks.
+    // The report and the exit code must also be the same as for a replay without pauses and seeks.
     for log in ["ticks.mcap", "parts"] {
         let (code, straight) = folder.replay(log, &[]);
         assert_eq!(code, Some(3));

@@ -98,8 +98,8 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
     assert!(lost > 20, "{lost} of 40");
 }
 
-/// Records the short dive on a disk of this size, and then moves the log to another disk. Returns `None` if the small
-/// disk can't be created.
+/// Records the short dive on a small disk of this size, and then copies the log to another disk. Returns exit code,
+/// report and stderr. Returns `None` if the small disk can't be created.
 fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)> {
     std::fs::create_dir_all(folder.path("disk")).unwrap();
     let program = headrace_tests::program();

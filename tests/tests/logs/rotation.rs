@@ -69,7 +69,7 @@ fn dive_in_parts_replays_and_verifies_as_one() {
     assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
     assert_eq!(folder.digest("joined.mcap", &[]), whole["digest"].as_str().unwrap());
 
-    // One missing part is reported as a loss. If all parts but one are missing, each of them is reported.
+    // One missing part is reported as a loss. If all parts except one are missing, each missing part is reported.
     std::fs::remove_file(folder.path("parts/dive.part002.mcap")).unwrap();
     let (code, lacking) = folder.replay("parts", &[]);
     let losses = lacking["log"]["losses"].to_string();

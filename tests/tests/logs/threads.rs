@@ -105,8 +105,7 @@ fn of_tick(dive: &Loop) -> u64 {
     hasher.finish()
 }
 
-/// Result of a dive on some number of threads: the hash of each tick, the error at the end, the report and the final
-/// state.
+/// Result of a dive on some number of threads: each tick's hash, the error at the end, the report and the final state.
 #[derive(PartialEq)]
 struct Dived {
     ticks: Vec<u64>,
@@ -121,8 +120,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     let (mut ticks, tick) = (Vec::new(), DurNs::from_millis(tick_ms));
     let mut note = |dive: &Loop| ticks.push(of_tick(dive));
     let driven = match threads {
-        // Zero threads mean the plain function `drive`. Its result is the reference for `drive_on`, which is under
-        // test.
+        // Zero threads mean the plain function `drive`, whose result is the reference for `drive_on`.
         0 => drive(&mut dive, &mut feed, Pace { tick, speed: None }, &mut note),
         threads => drive_on(threads, &mut dive, &mut feed, tick, &mut note),
     };

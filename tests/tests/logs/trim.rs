@@ -17,7 +17,6 @@ distance_m = 24
 speed_mps = 0.2
 "#;
 
-/// Records a dive live.
 fn recorded(scene: &str, vehicle: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle);

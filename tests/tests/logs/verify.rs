@@ -3,7 +3,6 @@
 use headrace_tests::{Folder, VEHICLE};
 use serde_json::Value;
 
-/// Records a dive live.
 fn recorded() -> Folder {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);

@@ -138,7 +138,7 @@ fn consistent_estimates(all: &[Dives]) {
     let means: Vec<f64> = (SETTLED..epochs)
         .map(|epoch| all.iter().map(|dives| nees(&dives.filter.epochs[epoch])).sum::<f64>() / runs)
         .collect();
-    // Wilson-Hilferty approximation: close to the chi-square bounds for this many degrees of freedom.
+    // Bounds of chi-square by the Wilson-Hilferty approximation, which is accurate for so many degrees of freedom.
     let freedom = runs * POSE.len() as f64;
     let bound = |z: f64| {
         let cube = 1.0 - 2.0 / (9.0 * freedom) + z * math::sqrt(2.0 / (9.0 * freedom));

@@ -40,8 +40,7 @@ const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;
 
-/// An inertial sample in the axes of the body. In this test, the axes of the tunnel's frame stand for east, north and
-/// up.
+/// An inertial sample in the axes of the body. In this test, the tunnel's axes stand for east, north and up.
 #[derive(Clone, Copy)]
 struct Sample {
     rate_radps: Vec3<Body>,
@@ -272,7 +271,7 @@ fn say(name: &str, off: &Off) {
     println!("{name:<60} {:>6.3} {:>7.3} {:>8.2}", off.inclination_rms, off.inclination_max, off.drift);
 }
 
-/// The same samples without the gyro bias. The bias is the mean rate during the rest before the motion.
+/// The samples without the gyro bias. The bias is the mean turn rate while the unit rests before the motion.
 fn unbiased(samples: &[Sample]) -> Vec<Sample> {
     let rest = samples.iter().take_while(|sample| !sample.moving);
     let bias = mean(rest.map(|sample| sample.rate_radps));

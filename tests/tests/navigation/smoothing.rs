@@ -139,8 +139,7 @@ fn smoothing_reduces_errors_and_stays_consistent() {
             "D of {} sections, {name}: error {error_m:.4} m, sigma {arc_m:.4} m, within two: {within:.3}",
             holes.len()
         );
-        // The configured slack time is shorter than the true one, so the standard deviations are larger than
-        // necessary.
+        // The configured slack time is shorter than the true one, so reported standard deviations are too large.
         assert!((0.9..=0.998).contains(&within), "{name}: {within}");
     }
 }

@@ -125,8 +125,7 @@ fn replay_begun_in_the_middle_shows_the_same_as_one_from_the_beginning() {
             [&["replay", "dive.mcap", ANY, "--speed", "0.01x", "--from", &from][..], &targets].concat();
         let middle = Serving::start(&folder, &arguments);
         let mut viewer = Viewer::connect(&middle, "", &[]).unwrap();
-        // The test sends no command to this replay, because after a pause or a jump the server would send all data
-        // again.
+        // The test sends no command to this replay, because after a pause or a jump the server sends all data again.
         viewer.until("the jump", |viewer| viewer.state["now_s"].as_f64() > Some(from_s + at_s - 0.1));
         let late = joining(&middle);
         let now_s = late.state["now_s"].clone();

@@ -1,4 +1,5 @@
-//! Crowds of other clients, drawn from seeds, neither delay an operator nor change a live dive or its recording.
+//! Crowds of other clients are drawn from seeds. They neither delay an operator, nor change a live dive or its
+//! recording.
 //!
 //! The page's server needs real sockets and time, so the simulated world of `tests/tests/world.rs` has no crowds.
 
@@ -75,8 +76,7 @@ impl Group {
         }
     }
 
-    /// Keeps the group's connections open until the dive has ended. In each turn of the loop, the oldest connection is
-    /// replaced.
+    /// Keeps the group's connections open until the dive has ended. In each turn, the oldest connection is replaced.
     fn stay(self, address: &str, query: &str, has_ended: &AtomicBool) {
         let mut open = std::collections::VecDeque::new();
         while !has_ended.load(Ordering::SeqCst) {
@@ -109,8 +109,7 @@ struct Among {
     code: Option<i32>,
 }
 
-/// Runs a live dive with its page among a crowd. The crowd's clients use the URL query `query`, which may contain a
-/// token.
+/// Runs a live dive with its page among a crowd. The clients use the URL query `query`, which may have a token.
 fn dive_among(folder: &Folder, crowd: &[Group], query: &str) -> Among {
     drop(std::fs::remove_file(folder.path("live.mcap")));
     let arguments = ["run", "vehicle.toml", "--source", "dive.mcap", "--record", "live.mcap"];

@@ -70,7 +70,7 @@ fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     found
 }
 
-/// Whether a message of a log contains these bytes after decompression.
+/// Whether any message of a log contains the text `words` after decompression.
 fn mentions(folder: &Folder, log: &str, words: &str) -> bool {
     let mut log = DiveLog::open(&[folder.path(log)]).unwrap();
     let mut is_found = false;

@@ -1,5 +1,4 @@
-//! Tests the screen after all devices have died during a dive. The displayed age of the data grows, although no new
-//! data arrives.
+//! Tests the screen after all devices have died during a dive. The displayed age of the data grows.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::Stdio;

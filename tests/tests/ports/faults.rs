@@ -21,7 +21,7 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// Beginnings of statuses that a sensor without faults has only because the machine is busy. The tests ignore these
+/// On a busy machine, a sensor without faults may have statuses that begin with these texts. The tests ignore such
 /// statuses.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",

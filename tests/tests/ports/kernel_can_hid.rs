@@ -26,7 +26,7 @@ const ENETDOWN: i32 = 100;
 const VENDOR_ID: u16 = 0x1209;
 const PRODUCT_ID: u16 = 0x0001;
 
-/// Runs `ip link` with these words, which are separated by spaces.
+/// Runs `ip link` with the arguments in `words`, which are separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
@@ -87,7 +87,7 @@ fn frame_carries_the_kernel_receive_time() {
     let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();
-        // Once one socket has received the frame, the kernel has also received it for the other socket.
+        // Once the other socket has received the frame, the kernel has also received it for the tested socket.
         assert_eq!(plain.read_frame().unwrap().data(), [number, 2, 3]);
         let received_by = SystemTime::now();
         thread::sleep(Duration::from_millis(5));

@@ -63,7 +63,7 @@ counts_per_metre = 2000
 const WAY: &str =
     "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 20\nspeed_mps = 0.2\n";
 
-/// Runs `ip link` with these words, which are separated by spaces.
+/// Runs `ip link` with the arguments in `words`, which are separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
@@ -114,7 +114,8 @@ struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// Starts supervisor and loop with these addresses of the sensors. `change` may wrap the driver of each sensor.
+    /// Starts supervisor and loop. `connects` are the addresses of the two sensors. `change` may wrap the driver of
+    /// each sensor.
     fn new(connects: [&str; 2], change: &dyn Fn(usize, Box<dyn Driver>) -> Box<dyn Driver>) -> Self {
         let scene = scenes::scene_from(WAY, &|_| Ok(TWO_SENSORS.as_bytes().to_vec()));
         let vehicle = &scene.vehicle;
@@ -333,8 +334,7 @@ fn late_read_does_not_change_a_frame_timestamp() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // The tolerance is needed because the timestamps come from another clock, and two clocks can't be read at the same
-    // moment.
+    // The tolerance is needed because the timestamps come from another clock, and two clocks can't be read at once.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
         assert!(

@@ -9,7 +9,8 @@ use std::process::{Child, Command, Stdio};
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Four heads, two of them on serial lines; echosounders on serial lines and on UDP; all other sensors on UDP.
+/// A scene with four heads, two of them on serial lines, and with echosounders on serial lines and on UDP. All other
+/// sensors are on UDP.
 pub(crate) fn scene(distance_m: f64) -> String {
     let vehicle = headrace_tests::root().join("deploy/vehicles/vita2-4.toml");
     format!(

@@ -185,8 +185,7 @@ fn splits_and_delays_of_a_stream_do_not_change_readings_or_times() {
             let (mut parts, mut rest, mut at) = (Vec::new(), stream.as_slice(), START);
             while !rest.is_empty() {
                 let (now, later) = rest.split_at((1 + random.below(longest)).min(rest.len()));
-                // If the parts are short, only some of them get a long delay, because the data otherwise lasts for
-                // hours.
+                // If parts are short, only some of them get a long delay, because the data otherwise lasts for hours.
                 at = at
                     + if longest > 2 || random.one_in(50) {
                         delay(&mut random)

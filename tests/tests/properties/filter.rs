@@ -54,7 +54,8 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 if (gain.variance / sum - 1.0).abs() > SHARE {
                     return Err(format!("innovation {} is not {sum}", gain.variance));
                 }
-                // The tolerance depends on the terms of the variance h P h^T, because these can be large and cancel.
+                // The tolerance depends on the terms of the variance h P h^T, because large terms can cancel each
+                // other.
                 if (after - left).abs() > SHARE * left + SHARE * size {
                     return Err(format!(
                         "{after:e} is left, not {left:e}; before {before:e}, noise {noise:e}"

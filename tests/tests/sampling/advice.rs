@@ -26,7 +26,7 @@ const BRAKING: usize = 15;
 /// Simulator effect: the heading oscillates by 10 degrees, as if a pilot steered.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
 
-/// A test case: a vehicle with its mode, target, offset and heading in the tunnel.
+/// A test case: a vehicle with its mode and target, its offset from the centre line, and its heading.
 #[derive(Clone, Copy)]
 struct Case {
     what: &'static str,
@@ -154,7 +154,7 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// Results of the evaluated part of a dive, which excludes the ends.
+/// Results of the evaluated part of a dive. The ends of the dive are left out.
 struct Judged {
     failing: f64,
     passing: f64,

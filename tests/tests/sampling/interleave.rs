@@ -118,7 +118,7 @@ fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     angles
 }
 
-/// Motion of a head: its start, and its angle in the body frame at each ping.
+/// Motion of a head: its start, the distance between pings, and its angle in the body frame at each ping.
 struct Track {
     x_m: f64,
     ping_m: f64,
@@ -253,8 +253,8 @@ fn sector_heads_stay_in_phase_and_their_pass_distances_alternate() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;
-            // The distances between heads are whole numbers of pings, so that all heads pass a chainage at the same
-            // steps.
+            // The distances between heads are whole numbers of pings, so that all heads pass any chainage at the same
+            // steps of their turns.
             let hull_m =
                 [37, 0, 251, 90, 90, 163].map(|pings| -f64::from(pings) * pitch_m / f64::from(STEPS));
             let rig = Rig::new(&hull_m[..heads], facing, 21.6);
@@ -263,8 +263,7 @@ fn sector_heads_stay_in_phase_and_their_pass_distances_alternate() {
             dive.assert_in_step(1e-7);
             for k in 0..heads {
                 dive.assert_two_distances(k, pitch_m);
-                // At the border of two sectors, the heads of both sectors turn back. They do so at evenly spaced
-                // chainages.
+                // At the border of two sectors, the heads of both turn back. They do so at evenly spaced chainages.
                 dive.assert_even(TAU * (k + 1) as f64 / heads as f64, pitch_m / heads as f64);
             }
             // If the distances between heads aren't whole numbers of pings, a head may reach the end of its sector up
@@ -324,8 +323,8 @@ fn pass_gaps_above_the_planned_speed_differ_by_the_phase_errors() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
-            // Delay of a head at position x along the hull, in addition to its planned phase, in turns: x / (v T) - x /
-            // (v' T), with planned speed v, driven speed v' and turn time T.
+            // Delay of a head at position x along the hull, in turns: x / (v T) - x / (v' T), with planned speed v,
+            // driven speed v' and turn time T. It adds to the head's planned phase.
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {

@@ -94,7 +94,7 @@ fn condition(angle_rad: f64) -> f64 {
     1.0 + angle_rad / (FRAC_PI_2 - angle_rad).abs()
 }
 
-/// Near 90 degrees, tangents are very large, so a formula that subtracts two tangents would lose all digits.
+/// Near 90 degrees, tangents are very large, so a formula that subtracts two tangents loses all digits.
 #[test]
 fn wall_steps_near_90_degrees_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -105,7 +105,7 @@ fn wall_steps_near_90_degrees_match_the_oracle() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// If the ping distance T_y is close to the target, a formula that subtracts the squares of both would lose digits.
+/// If the ping distance T_y is close to the target, a formula that subtracts the squares of the two loses digits.
 #[test]
 fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);

@@ -329,8 +329,8 @@ fn random_draws_of_two_effects_are_independent() {
     let stray = touched("outliers = { share = 0.3, sensors = [\"sonar_0\"] }");
     assert!(lost.len() > 500 && (share(&lost) - 0.3).abs() < 0.1 && (share(&stray) - 0.3).abs() < 0.1);
     let both: Vec<bool> = lost.iter().zip(&stray).map(|(a, b)| *a && *b).collect();
-    // If both effects shared a random stream, the overlap would be the whole smaller set of pings. With separate
-    // streams, the overlap is 0.09 to within five standard deviations.
+    // If the two effects used the same random stream, both would change the same pings. With separate streams, both
+    // change a share of 0.09, to within five standard deviations.
     let sd = (0.09_f64 * 0.91 / both.len() as f64).sqrt();
     assert!((share(&both) - 0.09).abs() < 5.0 * sd + 0.01, "{}", share(&both));
 }

@@ -51,8 +51,7 @@ struct Stated {
     chunks: u32,
 }
 
-/// The content of an unpacked chunk, the position up to which it has been read, and the parsing result to return at its
-/// end.
+/// The content of an unpacked chunk, the position reached in it, and the parsing result to return at its end.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
@@ -76,8 +75,8 @@ enum Accepted<'a> {
 
 /// Reason why a record of the bag can't be read.
 enum Stop<'a> {
-    /// The record is incomplete. If its header fields are complete, they are given with the available part of its
-    /// data.
+    /// The record is incomplete. If the fields of its header are complete, the variant holds them, and that part of the
+    /// record's data which is available.
     More(Option<(Fields<'a>, &'a [u8])>),
     Bad,
 }
@@ -131,7 +130,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Splits bytes with a length prefix from the rest.
+/// Splits off the bytes that a length prefix announces. Returns these bytes, and the rest after them.
 fn sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (len, rest) = bytes.split_first_chunk()?;
     rest.split_at_checked(usize::try_from(u32::from_le_bytes(*len)).ok()?)
@@ -394,8 +393,7 @@ enum Unpacked {
 
 /// Unpacks a chunk with the stated compression and size. `cut` means that the file ends within the chunk.
 ///
-/// Source: ROS wiki, "Bags/Format/2.0". The compressions are none, bz2 and lz4. The package roslz4 writes the latter as
-/// LZ4 frames.
+/// Source: ROS wiki, "Bags/Format/2.0". The compressions are none, bz2 and lz4. roslz4 writes lz4 as LZ4 frames.
 fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
     let Some(size) = usize::try_from(size).ok().filter(|size| *size <= MOST_UNPACKED) else {
         return Unpacked::Bad("chunks that would unpack to more than 64 MiB");

@@ -6,8 +6,7 @@ const AHEAD_NS: i64 = 5_000_000;
 const LATE_NS: i64 = 1_000_000_000;
 /// Maximum variation of the recording delay, ns. A larger variation means late messages or another clock.
 const VARIES_NS: i64 = 500_000_000;
-/// If the offset between two clocks is larger than this, they have different epochs, ns. Smaller offsets are clock
-/// errors.
+/// If two clocks differ by more than this, they have different epochs, ns. Smaller offsets are clock errors.
 const OTHER_BASE_NS: i64 = 3_600_000_000_000;
 /// If a header's timestamp deviates from the present clock offset by more than this, a new offset begins, ns.
 const ASTRAY_NS: i64 = 10_000_000_000;

@@ -115,7 +115,7 @@ impl Feed {
         self.say((at_ns, stamped), &value, out)
     }
 
-    /// Converts an inertial message. Parts may be missing, but not all of them.
+    /// Converts an inertial message. Attitude, turn rate or force may be missing, but not all three.
     fn inertia(
         &mut self,
         wxyz: Option<[f64; 4]>,
@@ -241,8 +241,7 @@ impl Feed {
     }
 }
 
-/// Returns "messages " as the unit in which losses are counted. Returns nothing if the reason `why` begins with its own
-/// unit.
+/// Returns "messages " as the unit in which losses are counted. Empty if the reason `why` begins with its own unit.
 fn messages(why: &str) -> &'static str {
     if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
 }

@@ -58,8 +58,7 @@ impl Type {
         TYPES.iter().find(|(_, known, _)| *known == name).map(|(known, ..)| *known)
     }
 
-    /// Whether a ROS 1 definition with this MD5 is the expected one. `*` stands for an unknown MD5, which is
-    /// accepted.
+    /// Whether `md5` is the MD5 of this type's definition in ROS 1. `*` stands for an unknown MD5, which is accepted.
     pub(super) fn is_defined_as(self, md5: &str) -> bool {
         md5 == "*" || TYPES.iter().any(|(known, _, known_md5)| *known == self && *known_md5 == md5)
     }

@@ -14,8 +14,8 @@ use super::wire::Wire;
 const MOST_BEAMS: usize = 1 << 16;
 /// Maximum time between a beam and its message's timestamp, s.
 const LONGEST_S: f64 = 120.0;
-/// Maximum distance of a point from the beam's plane, as a share of the point's range. Points farther away are dropped
-/// and counted.
+/// Maximum distance of a point from the beam's plane, as a share of the point's range. Other points are dropped and
+/// counted.
 const OFF_PLANE: f64 = 0.1;
 
 /// Interprets a range by REP 117; `None` without an echo.
@@ -284,7 +284,7 @@ mod tests {
             let beam = told.beams[0];
             assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
             assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
-            // The same point in the axes of a scanner: x is the head's zero angle, and y is the head's y.
+            // The same point in the axes of a scanner: x points where the head's angle is zero, and y is the head's y.
             let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
             assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
         }

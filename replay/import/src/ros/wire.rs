@@ -25,7 +25,7 @@ pub(super) struct Wire<'a> {
     big_endian: bool,
 }
 
-/// Header of a message, which has a timestamp.
+/// Header of a message, with the message's timestamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
     /// Timestamp, nanoseconds on the sender's clock, which may have any epoch.

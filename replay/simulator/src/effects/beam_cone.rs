@@ -58,7 +58,7 @@ const FORMS: [(&str, Form); 3] = [("first", Form::First), ("mean", Form::Mean), 
 struct Parameters {
     rays: usize,
     width_deg: Option<f64>,
-    /// Frequency that determines the width of a head's beam, kHz; only for heads.
+    /// Frequency that determines the width of a head's beam, kHz. Echosounders have none.
     frequency_khz: Option<f64>,
     form: Form,
     bin_m: Option<f64>,

@@ -134,8 +134,8 @@ impl ByteErrors {
         }
     }
 
-    /// Damages the messages on the line. A message keeps its index even if it loses all its bytes; the outbox drops
-    /// empty messages.
+    /// Damages the messages on the line. A message keeps its index even if it loses all its bytes, because the outbox
+    /// drops empty messages later.
     fn damage(&mut self, line: &mut Line) {
         let mut rest = std::mem::take(&mut self.rest);
         rest.clear();

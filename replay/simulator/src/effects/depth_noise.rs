@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    /// The drift's increments are independent of the noise in these samples.
+    /// In these samples, the changes of the drift must be independent of the noise.
     #[test]
     fn depth_noise_and_drift_are_independent() {
         let stream = Stream::new(3, "depth_noise", "depth");

@@ -150,7 +150,7 @@ impl<M: Measurement> Stuck<M> {
     }
 }
 
-/// A measurement whose value can be replaced by that of another measurement.
+/// A measurement whose value can be replaced by another measurement's value.
 trait Sticking: Measurement {
     /// Returns this measurement with the value of `other`. This measurement's own time and head angles are kept.
     #[must_use]

@@ -252,8 +252,8 @@ mod tests {
         assert!((both / n - wanted).abs() < 5.0 * math::sqrt((1.0 + wanted * wanted) / n), "{}", both / n);
     }
 
-    /// The process doesn't depend on the sample rate: with twice as many samples, the change over a time has the same
-    /// variance.
+    /// The bias doesn't depend on the sample rate. With twice as many samples per second, its change over a given time
+    /// has the same variance.
     #[test]
     fn bias_change_depends_on_time_not_on_sample_count() {
         let change = |millis: i64| {

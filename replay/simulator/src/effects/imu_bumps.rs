@@ -176,7 +176,7 @@ mod tests {
     }
 
     /// Directions are uniformly distributed on a sphere: each component has mean 0 and mean square 1/3. Sizes are
-    /// uniformly distributed from least to most, as mean and variance show.
+    /// uniformly distributed from the least to the most, which is tested by their mean and variance.
     #[test]
     fn bump_directions_and_sizes_are_uniformly_distributed() {
         let bumps = bumps(20_000);

@@ -94,7 +94,7 @@ impl ImuVibration {
         let Parameters { frequency_hz, accel_mps2, gyro_radps } = self.parameters;
         let half_rad = math::TAU / 2.0 * frequency_hz * inertia.period.as_secs_f64();
         let kept = if half_rad > 0.0 { math::sin(half_rad) / half_rad } else { 1.0 };
-        // Whole turns are removed first, so that no digits are lost after hours of diving.
+        // Whole turns are removed from the phase first, so that no digits are lost after hours of diving.
         let turns = frequency_hz * inertia.at.since(START).as_secs_f64();
         let now_rad = math::TAU * math::wrap(turns, 1.0);
         let [a, b, c, d, e, f] = self.phases_rad.map(|phase_rad| math::sin(now_rad + phase_rad));

@@ -159,15 +159,15 @@ mod tests {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Distances along the straightened beam: to the side wall ahead, and to floor or ceiling.
+            // Distances along the straightened beam to the first walls: `to_side` to the side wall, the other one to
+            // floor or ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =
                 [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
             crossings.sort_by(f64::total_cmp);
             let along_m = crossings[1];
-            // Second point at which the beam meets the wall: its position on the straightened beam, mirrored back into
-            // the rectangular tunnel.
+            // `fold` mirrors the straightened beam's second point on a wall back into the rectangular tunnel.
             let fold = |at: f64, period: f64| {
                 let at = math::wrap(at, 2.0 * period);
                 if at > period { 2.0 * period - at } else { at }

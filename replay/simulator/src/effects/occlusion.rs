@@ -48,7 +48,8 @@ struct Occlusion {
 pub(super) struct Stopped(Vec<bool>);
 
 impl Stopped {
-    /// Whether a part of the vehicle stops the beam of a sample; false for a sonar without this effect.
+    /// Whether a part of the vehicle stops the beam of a sample. False for a sonar on which the effect occlusion
+    /// doesn't act.
     pub(super) fn has(stopped: Option<&Self>, sample: usize) -> bool {
         stopped.and_then(|stopped| stopped.0.get(sample)).copied().unwrap_or(false)
     }

@@ -133,8 +133,8 @@ mod tests {
         }
     }
 
-    /// An effect with one table per stretch draws, at each step, the same random numbers as with one table for the
-    /// whole tunnel.
+    /// With one table per stretch, an effect draws the same random numbers at each step as with one table for the
+    /// tunnel.
     #[test]
     fn effect_in_adjacent_stretches_equals_the_effect_in_the_whole_tunnel() {
         let dive = Dive { seconds: 40.0, ..Dive::with_head() };

@@ -57,8 +57,7 @@ impl Runs {
         chance < in_run
     }
 
-    /// Correlation between the states of consecutive pings. The state is 1 for a ping in a run and 0 for any other
-    /// ping.
+    /// Correlation between the states of consecutive pings. The state is 1 in a run and 0 otherwise.
     #[cfg(test)]
     pub(super) fn correlation(&self) -> f64 {
         self.go_on - self.begin

@@ -20,7 +20,7 @@ use crate::stages::Stage;
 ///
 /// The head slows down at the ends of its sector. The steps there are short, which gives the false minima that Jorge et
 /// al. 2021 describe. Heads that turn continuously are unchanged. `lag_ms` is the time constant, 100 by default. The
-/// command is assumed to change linearly between two pings; for such a command the lag is exact. The head begins at
+/// command is assumed to change linearly between two pings, and for such a command the lag is exact. The head begins at
 /// rest. Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due to the control system of the head").
 pub(super) struct SectorEndSlowingKind;
 

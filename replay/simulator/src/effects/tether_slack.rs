@@ -129,8 +129,7 @@ mod tests {
         };
         assert_eq!(plain[25].at.since(plain[0].at).0, 500_000_000);
         let variance = product(0);
-        // The tolerance allows for the error of a standard deviation that is estimated from some 600 independent
-        // values.
+        // The tolerance allows for the error of a standard deviation from some 600 independent values.
         assert!((math::sqrt(variance) / (0.15 * 0.3997) - 1.0).abs() < 0.1, "{variance}");
         // Source: the autocorrelation of the cubic B-spline, 2416 : 1191 : 120 : 1 at 0, 1, 2, 3 spacings.
         for (spacings, wanted) in [(1, 1191.0), (2, 120.0), (3, 1.0), (4, 0.0)] {

@@ -114,7 +114,7 @@ impl Axis {
         [chainage_m, y, point.z()]
     }
 
-    /// Number of the piece nearest to a point; the point's chainage and its distance to the left of the axis, m.
+    /// Number of the piece nearest to a point. Also the point's chainage, and its distance to the left of the axis, m.
     pub(super) fn locate(&self, plan: Yz) -> (usize, f64, f64) {
         let mut nearest = (0, 0.0, 0.0);
         let mut least = f64::INFINITY;

@@ -169,7 +169,7 @@ fn power(base: f64, exponent: f64) -> f64 {
     result
 }
 
-/// Reads `size_m` of one boulder: one diameter or three.
+/// Reads `size_m` of a single boulder, which is one diameter or three.
 fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     let wanted = format!(
         "must be a diameter from {} to {}, or three: along the tunnel, along the wall, across the wall",
@@ -184,7 +184,7 @@ fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     }
 }
 
-/// Reads `size_m` of many boulders: the smallest and the largest diameter.
+/// Reads `size_m` of scattered boulders, which is the smallest and the largest diameter.
 fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
     match table.numbers("size_m", SIZE_M)?.as_deref() {
         None => Ok(None),

@@ -105,7 +105,7 @@ fn parse_fall(
     }
     let length_m = SPREADING * 2.0 * cavity.half_length_m;
     let heap = Heap { feature, chainage_m: cavity.chainage_m, length_m, width_m: floor_m(site.profile) };
-    // Cavity and heap have the same shape, so their volumes are proportional to the products of their three extents.
+    // Cavity and heap have the same shape. Their volumes are therefore proportional to the products of their extents.
     let volume = cavity.depth_m * cavity.half_length_m * cavity.half_width_m * 4.0;
     let usual_m = LOOSENING * volume / (heap.length_m * heap.width_m);
     let height_m = table.number("heap_height_m", 0.01..=50.0)?.unwrap_or(usual_m);

@@ -14,7 +14,7 @@ pub(super) struct Index {
     numbers: Vec<u32>,
 }
 
-/// Length of a bucket, m: about the length of a boulder, and several times the span of a profiler's ray.
+/// Length of a bucket, m: about the length of a boulder, and several times the chainage that a profiler's ray spans.
 const BUCKET_M: f64 = 1.0;
 /// Maximum number of buckets. A tunnel that needs more has longer buckets instead.
 const MOST_BUCKETS: f64 = 65_536.0;

@@ -133,8 +133,7 @@ fn check(
     if site.axis.pieces().iter().any(|piece| bend(piece.from_m, piece.to_m, piece.curvature_pm())) {
         return refuse("meets a bend of the axis; a mesh can be the wall of a straight stretch only");
     }
-    // If a point is farther from the axis than the radius of a bend, its nearest point of the axis could lie in the
-    // bend.
+    // If a point is farther from the axis than the radius of a bend, its nearest point of the axis may be in the bend.
     let (low, high) = wall.mesh.bounds();
     let (_, piece) = site.axis.piece_at(wall.from_m);
     let left_m = piece.left_of([wall.frame.origin[0], wall.frame.origin[1]]);

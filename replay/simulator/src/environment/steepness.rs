@@ -10,8 +10,8 @@ use super::bulge::Bulge;
 const DIRECTIONS: u32 = 2_000;
 /// Safety factor on the slope of the gauge, for directions between the samples.
 const MARGIN: f64 = 1.05;
-/// Largest ratio of change of chainage to distance travelled. It occurs at the inner wall of the tightest allowed bend,
-/// which has a radius of twice the tunnel's half-width.
+/// Largest ratio of a point's change of chainage to the distance that the point moves. It occurs at the inner wall of
+/// the tightest allowed bend, which has a radius of twice the tunnel's half-width.
 const INSIDE_OF_BEND: f64 = 2.0;
 
 /// The wall of a profile as seen from its reference point.

@@ -47,8 +47,7 @@ pub(super) struct Tube {
     stretches: Vec<Stretch>,
 }
 
-/// A length of tunnel within one piece of the axis, in which the profile's scale is linear and the same bulges displace
-/// the wall.
+/// A length of tunnel within one piece of the axis, with a linear scale of the profile and the same bulges everywhere.
 #[derive(Debug, Clone)]
 struct Stretch {
     from_m: f64,
@@ -69,7 +68,7 @@ struct Stretch {
 /// Passage of a ray through the water in the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
-    /// Distance along the ray at which the ray leaves the tube or reaches the given limit, m.
+    /// Distance along the ray at which the ray leaves the tube or reaches the limit of the search, m.
     pub(super) t_m: f64,
     /// Whether the ray's passage ends at the wall.
     pub(super) wall: bool,
@@ -217,8 +216,7 @@ impl Tube {
         if !self.holds(first, start) {
             return None;
         }
-        // Chainage is monotonic along a straight line. A ray that starts towards growing chainage therefore never turns
-        // back.
+        // Chainage is monotonic along a straight line. A ray towards growing chainage therefore never turns back.
         let [tx, ty] = first.piece.station(start_m).tangent;
         let forwards = ray.direction[0] * tx + ray.direction[1] * ty >= 0.0;
         let mut t_m = t_m;
@@ -319,8 +317,8 @@ impl Tube {
         Some(Face { normal: [against * tx, against * ty, 0.0], feature: Some(mesh.feature()) })
     }
 
-    /// Range at which the ray leaves the tube, in closed form, for a stretch with a straight axis and a constant
-    /// profile.
+    /// Range at which the ray leaves the tube, in closed form, if axis and profile of the stretch are straight and
+    /// constant.
     fn leave_plain(&self, stretch: &Stretch, ray: &Ray, t_m: f64) -> Option<f64> {
         let at = ray.at(t_m);
         let [tx, ty] = stretch.piece.station(0.0).tangent;
@@ -355,8 +353,7 @@ impl Tube {
         None
     }
 
-    /// Gauge of a point: its distance from the reference point, divided by the distance of the wall in the same
-    /// direction.
+    /// Gauge of a point: its distance from the reference point divided by the wall's distance in the same direction.
     fn gauge(&self, stretch: &Stretch, point: V3) -> f64 {
         let plan = [point[0], point[1]];
         if stretch.is_constant() {

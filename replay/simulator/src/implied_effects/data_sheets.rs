@@ -21,8 +21,7 @@ use headrace_vehicle::VehicleConfig;
 use super::call::{Call, number};
 use crate::facts::{Facts, SensorFacts};
 
-/// Largest difference in beam width between heads that count as having the same frequency, radians. It corresponds to 5
-/// kHz.
+/// Largest difference in beam width between heads that count as having one frequency, radians. It corresponds to 5 kHz.
 const SAME_BEAM_RAD: f64 = 2e-4;
 
 /// Effects implied by the models of the vehicle's sensors.

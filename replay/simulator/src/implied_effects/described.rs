@@ -54,7 +54,7 @@ struct Murk {
     grain_um: f64,
 }
 
-/// A leak: a flow out of the tunnel, or into the tunnel if negative.
+/// A leak: a flow out of the tunnel if `flow_m3ps` is positive, or into the tunnel if it is negative.
 #[derive(Debug, Clone, Copy)]
 struct Leak {
     chainage_m: f64,
@@ -222,7 +222,7 @@ impl Described {
     }
 
     fn of_leaks(&self, facts: &Facts, environment: &Environment) -> Vec<Call> {
-        // A current does not carry a vehicle with a trajectory given over ground.
+        // If the trajectory is given over ground, a current does not carry the vehicle.
         if self.leaks.is_empty() || facts.ground == Ground::Tunnel {
             return Vec::new();
         }

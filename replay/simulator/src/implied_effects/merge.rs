@@ -68,8 +68,7 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
         };
         let acting: Vec<&Call> = calls.iter().filter(acts).copied().collect();
         let pieces = pieces(&acting);
-        // A table of `interference` lists the heads of one frequency. Two calls for this effect therefore give two
-        // tables.
+        // A table of `interference` lists the heads of one frequency. Two calls therefore give two tables.
         let group = acting.first().filter(|_| effect == GROUPED).map(|call| call.sensors.as_ref());
         match shared.iter_mut().find(|(_, other, of)| *other == pieces && *of == group) {
             Some((ids, ..)) => ids.extend(sensor),

@@ -49,7 +49,7 @@ pub(super) struct Cap {
     pub(super) high: [f64; 3],
 }
 
-/// A hole in the surface: connected edges that belong to only one face each.
+/// A hole in the surface: connected edges, each of which belongs to only one face.
 struct Hole {
     edges: Vec<[u32; 2]>,
     low_x: f64,

@@ -157,8 +157,8 @@ impl Parts {
     }
 }
 
-/// The unit normal of a triangle, on the side from which a ray of this direction comes. For a triangle without area,
-/// the normal points against the ray.
+/// The unit normal of a triangle, on the side from which a ray with this `direction` comes. For a triangle without
+/// area, the normal points against the ray.
 pub(super) fn normal_against(triangle: [[f64; 3]; 3], direction: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = triangle;
     let normal = cross(minus(b, a), minus(c, a));

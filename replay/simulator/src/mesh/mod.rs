@@ -30,8 +30,7 @@ pub use ply::{Triangles, read};
 
 /// Margin of the tree's boxes around their contents, as a share of the mesh's size.
 ///
-/// The margin is larger than the rounding error of a triangle that is hit from a distance of up to a thousand times the
-/// mesh's size.
+/// The margin exceeds the rounding error of a triangle that is hit from up to a thousand times the mesh's size.
 const SLACK: f64 = 1e-12;
 
 /// Directions of the rays that test whether a point is inside.
@@ -98,8 +97,8 @@ impl Mesh {
     /// if there is no hit, or if a component of `origin` or `direction_unit` is not finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // Range and face of the best hit. The smallest face number wins at equal ranges, while the tree itself would
-        // return the hit that it visits first.
+        // Range and face of the best hit. At equal ranges, the smallest face number wins. The tree alone returns the
+        // hit that it visits first.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,

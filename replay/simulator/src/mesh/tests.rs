@@ -234,8 +234,7 @@ fn no_ray_slips_between_triangles() {
             let (direction, distance) = toward(origin, target);
             let hit = mesh.cast(origin, direction, f64::INFINITY);
             let range = hit.unwrap_or_else(|| panic!("out by {target:?} from {origin:?}")).range_m;
-            // Odd rays start off the centre of the rough body. A face nearer than the target may hide the target from
-            // there.
+            // Odd rays start off the centre of the rough body, so a nearer face may hide the target.
             assert!(
                 range < distance + 1e-9 && (i % 2 == 1 || range > distance - 1e-9),
                 "{range}, not {distance}"
@@ -249,7 +248,7 @@ fn no_ray_from_the_axis_of_a_tube_slips_through_its_wall() {
     let triangles = rough_tube();
     let mesh = Mesh::new(triangles.clone(), Role::Wall).unwrap();
     for &target in &triangles.vertices {
-        // Directions are perpendicular to the axis, so one or two components are zero or nearly zero.
+        // The rays are perpendicular to the axis, so one or two components of their directions are zero or nearly zero.
         let origin = [target[0], 0.0, 0.0];
         let (direction, distance) = toward(origin, target);
         let hit = mesh.cast(origin, direction, 100.0).unwrap();

@@ -95,7 +95,7 @@ fn mesh_wall_may_be_open_only_at_its_ends() {
     let whole = tube(100, 8, 100.0, || 2.0);
     assert!(Mesh::new(whole.clone(), Role::Wall).is_ok());
 
-    // Each ring has 16 faces. A missing face within 2 % of the wall's length from an end counts as part of the open
+    // Each ring has 16 faces. A face that is missing within 2 % of the wall's length from an end is part of the open
     // end.
     let mut t = whole.clone();
     t.faces.remove(16);

@@ -202,7 +202,7 @@ impl Advised {
         }
     }
 
-    /// The latest advice that was given at least `lag_s` before `at_s`, if any.
+    /// The advice that the pilot follows at `at_s`: the latest that was given at least `lag_s` earlier, if any.
     fn told_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
         let heard = |told: &&PilotAdvice| told.at <= by && by > MonoNs(START.0);

@@ -84,8 +84,8 @@ impl Trajectory {
         self.sways.push(knots);
     }
 
-    /// Lets the flow carry a vehicle that moves through the water. The vehicle reaches the same end after another
-    /// duration.
+    /// Lets the flow carry a vehicle that moves through the water. The vehicle ends at the same place, but after
+    /// another duration.
     ///
     /// Errors, as text: a leg makes no progress against the current, or the trajectory is given over ground.
     pub fn carry(&mut self, flow: &Flow) -> Result<(), String> {

@@ -58,8 +58,8 @@ impl Legs {
         Place { chainage_m, across_m: self.across_m, turned_rad: [0.0; 3] }
     }
 
-    /// Applies a flow of the water. The vehicle's speeds through the water stay the same. A leg is cut where the flow
-    /// changes.
+    /// Applies a flow of the water. The vehicle's speeds through the water stay the same. Changes of the flow cut a
+    /// leg.
     ///
     /// Errors, as text: a leg makes no progress against the flow.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {

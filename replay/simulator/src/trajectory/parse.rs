@@ -43,8 +43,7 @@ const KINDS: [(&str, TrajectoryKind); 5] = [
     ("recorded", TrajectoryKind::Recorded),
 ];
 
-/// Reads a trajectory in a tunnel of this design. Also returns whether its speeds are relative to the water or to the
-/// tunnel.
+/// Reads the trajectory of a scene. Also returns whether its speeds are relative to the water or to the tunnel.
 ///
 /// Errors: a key is missing, unknown or out of range, or the trajectory goes beyond the ends of the tunnel.
 pub(crate) fn parse(

@@ -66,8 +66,7 @@ pub(super) fn knots(timed: &[Timed]) -> (Knots, f64) {
     (through(timed, SPACING_S, duration_s), duration_s)
 }
 
-/// Unwraps each new angle to within half a turn of the previous angle, so that -179 degrees after 179 degrees becomes
-/// 181 degrees.
+/// Unwraps each new angle to within half a turn of the previous one. After 179 degrees, -179 degrees becomes 181.
 fn turn_short([.., roll, pitch, yaw]: &Offsets, [.., new_roll, new_pitch, new_yaw]: &mut Offsets) {
     for (before, angle) in [(roll, new_roll), (pitch, new_pitch), (yaw, new_yaw)] {
         *angle = before + math::wrap_signed(*angle - before, math::TAU);

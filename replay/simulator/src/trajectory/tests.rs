@@ -253,8 +253,8 @@ fn everywhere(speed_mps: f64) -> Flow {
     flow
 }
 
-/// If the flow changes within a leg, the time for each piece is its length divided by its own speed. The positions
-/// within a piece follow from these times.
+/// If the flow changes within a leg, the time for each piece is its length divided by its own speed. From these times
+/// follow the positions within a piece.
 #[test]
 fn current_changes_the_speed_only_within_its_stretch() {
     let mut flow = Flow::default();

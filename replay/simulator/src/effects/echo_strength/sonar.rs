@@ -20,7 +20,7 @@ const HEARD_PULSE_S: f64 = 540e-6;
 /// threshold if the absorption setting matches the water's absorption.
 const ABOVE_THRESHOLD_DB: f64 = 20.0;
 const USUAL_GAIN_DB: f64 = 20.0;
-/// Ratio of the density of silt (quartz) to that of water.
+/// Density of silt (quartz) divided by the density of water.
 const GRAIN_DENSITY: f64 = 2.65;
 /// Kinematic viscosity of water at 10 degrees, m^2/s.
 const VISCOSITY_M2PS: f64 = 1.307e-6;
@@ -100,7 +100,8 @@ fn heard_db() -> f64 {
         - 2.0 * HEARD_DBPM * HEARD_M
 }
 
-/// Frequency of a head whose beam has this full width, kHz. The width is 2.4 degrees at 600 kHz and 1.4 at 1 MHz.
+/// Frequency of a head whose beam has the full width `beam_rad`, kHz. The width is 2.4 degrees at 600 kHz and 1.4 at 1
+/// MHz.
 ///
 /// Source: the 881L's data sheet, beam widths.
 pub(crate) fn frequency_of_khz(beam_rad: f64) -> f64 {

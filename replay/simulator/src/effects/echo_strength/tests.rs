@@ -23,8 +23,7 @@ fn water_absorption_matches_measurements() {
     assert!((water_absorption_dbpm(1000.0, 10.0) / water_absorption_dbpm(500.0, 10.0) - 4.0).abs() < 1e-12);
 }
 
-/// Compares the absorption with the energy lost by a grain in oscillating water, whose motion is integrated step by
-/// step.
+/// Compares the absorption with the energy lost by a grain in oscillating water. Its motion is integrated in steps.
 ///
 /// The drag is that on an oscillating sphere (Landau and Lifshitz, "Fluid mechanics", §24, problem 5). The sound loses
 /// the work done by the drag.

@@ -127,8 +127,7 @@ mod tests {
             assert_eq!(foreseen.at, made.at);
             assert!((foreseen.direction + -made.direction).norm() < 1e-12);
         }
-        // The later pings around `at` are extrapolated, so the result is the same if the simulated pings after `at` are
-        // missing.
+        // Pings after `at` are extrapolated, so the result is the same if the simulated pings after `at` are missing.
         let short = Pings(pings.0[..51].to_vec());
         assert!(short.around(at, -0.05, 0.05).eq(pings.around(at, -0.05, 0.05)));
     }

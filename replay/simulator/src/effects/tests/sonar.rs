@@ -56,7 +56,7 @@ fn adding_a_head_keeps_the_random_numbers_of_the_first_head() {
         let ranges_m = dive.dive(&effects).ranges_m(0);
         ranges_m.into_iter().map(|range_m| range_m.map(f64::to_bits)).collect::<Vec<_>>()
     };
-    // The scene has no planned speed, so adding a second head doesn't change the ping settings of the first head.
+    // The scene has no planned speed, so the ping settings of the first head don't change if a second head is added.
     let one = Dive::with_heads(&[[0.0, 0.4, 0.0]]);
     assert_eq!(bits(&one), bits(&pair()));
 }

@@ -71,7 +71,7 @@ fn cast(environment: &Environment, origin: V3, direction: V3) -> Option<Hit> {
     environment.cast(to_point(origin), to_vec(direction), FARTHEST_M)
 }
 
-/// Range from inside to the circle of this radius about the tunnel's axis.
+/// Range from a point inside the tunnel to the circle with radius `radius_m` about the tunnel's axis.
 fn to_circle(radius_m: f64, origin: V3, direction: V3) -> f64 {
     let [_, dy, dz] = direction;
     let (y, z) = (origin[1], origin[2] - RADIUS_M);
