@@ -356,7 +356,7 @@ struct Measured {
     /// Delays of messages until the end of the tick for the driver, and until the end of a pass of the empty loop for
     /// the reference, for each sensor.
     ends: Vec<[Vec<DurNs>; 2]>,
-    /// CPU time of the threads that serve ports, s. `loop_s` and `bare_s` are the times of the loop and of the bare
+    /// CPU time of the threads that serve ports, s. `loop_s` is the CPU time of the loop, and `bare_s` that of the bare
     /// read loops.
     ports_s: f64,
     loop_s: f64,
@@ -519,7 +519,7 @@ fn latency(measured: Duration) {
     println!();
 }
 
-/// Measures the time from a return's last byte to the display of its flag at the end of the tick.
+/// Measures the time from the last byte of a return until the flag that it causes is displayed at the end of the tick.
 fn flags(measured: Duration) {
     println!("Last byte of a head's return written to the end of its tick, us: p50, p99, p99.9, max\n");
     println!("| cores | returns | ours | an empty loop | ours above it |\n|---|---|---|---|---|");

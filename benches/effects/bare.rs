@@ -85,7 +85,8 @@ fn dive(mut simulation: Simulation) -> Said {
 
 type Head = Box<dyn Emulator<Sounding>>;
 
-/// Heads in a straight tunnel, second by second, without systems, components or extension points for effects.
+/// The hand-written program: heads in a straight tunnel, second by second, without systems or extension points for
+/// effects.
 struct ByHand<'a> {
     profile: &'a Profile,
     heads: Vec<(Head, Mount)>,

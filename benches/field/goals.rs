@@ -100,7 +100,7 @@ impl Missed {
     }
 }
 
-/// Ratio of the advised speed to the largest speed that the paper's Eq. 16 gives.
+/// Ratio of the median advised speed to the largest speed that the paper's Eq. 16 gives.
 pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
     figures.advised_mps() / cell.vehicle.edge_mps
 }

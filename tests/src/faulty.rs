@@ -99,7 +99,7 @@ impl End {
         self.link.is_some()
     }
 
-    /// Returns the same end of the line, with the device not plugged in yet.
+    /// Returns the same end of the line, but the device isn't plugged in yet.
     #[must_use]
     pub fn absent(mut self) -> Self {
         self.unplug();

@@ -85,7 +85,8 @@ pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
 
 /// Settings that match the field scene's sensor effects.
 ///
-/// In this scene the echosounders' beams are rays, not cones. The rounding of cable and depth is stated as noise.
+/// In this scene the echosounders' beams are rays, not cones. The settings state the rounding of cable and depth as
+/// noise.
 pub const SETTINGS: &str = "[navigation]
 gyro_noise_degps_rthz = 0.007
 accel_noise_mps2_rthz = 0.001

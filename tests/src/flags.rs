@@ -54,7 +54,7 @@ pub fn reached(dive: &Dive) -> Vec<Reached> {
     all
 }
 
-/// Chainage from which on all heads pass every place, m. It depends on where the heads started.
+/// Chainage from which on all heads pass every place, m. The places where the heads started determine it.
 pub fn all_passed_from_m(reached: &[Reached]) -> f64 {
     reached.iter().map(|reached| reached.front_m).fold(f64::INFINITY, f64::min)
 }
@@ -189,7 +189,8 @@ impl Journey {
         let section = report.sections.iter().find(|section| section.start_m >= flag.start_m);
         let Some((section, raised_s)) = section.zip(flag.raised_s) else { return false };
         let raised = MonoNs(math::round_to_i64(raised_s * 1e9).unsigned_abs());
-        // The maximum reach over several pings is used, because estimated positions and attitudes are noisy.
+        // The largest reach of several pings around the flag is used, because estimated positions and attitudes are
+        // noisy.
         let near = |ping: &&Ping| raised.since(ping.received).0.abs() <= EVERY.0;
         let poses = dive.pings.iter().filter(near).filter_map(|ping| ping.pose);
         let rear_m = poses.map(|pose| ends_m(dive, &pose)[0]).fold(f64::MIN, f64::max);

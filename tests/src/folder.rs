@@ -14,8 +14,8 @@ const LONG_S: u32 = 100;
 
 /// The program under test, ready for arguments.
 pub fn program() -> Command {
-    // Cargo passes the path to the tests that it runs. A test that runs without Cargo, as in `tests/vm`, searches
-    // Cargo's target folder.
+    // Cargo passes the program's path to tests. A test that runs without Cargo, as in `tests/vm`, searches the target
+    // folder.
     Command::new(std::env::var_os("CARGO_BIN_EXE_headrace_under_test").map_or_else(built, PathBuf::from))
 }
 

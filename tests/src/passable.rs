@@ -31,7 +31,7 @@ const FAILING: usize = 20;
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
 
-/// A vehicle with its mode, target and effects in a dive.
+/// A dive to simulate: a vehicle with its mode, target and effects.
 #[derive(Debug, Clone)]
 pub struct Outing {
     /// The vehicle of the field table, with its layout of heads and its vehicle file.

@@ -62,7 +62,7 @@ impl Screen {
         let (to, coming) = channel();
         thread::spawn(move || {
             let mut bytes = [0; 4096];
-            // On Linux, reading fails if no process has the terminal open.
+            // On Linux, reading fails once no process has the terminal open, which ends this loop.
             while let Ok(count @ 1..) = reading.read(&mut bytes) {
                 if to.send(bytes[..count].to_vec()).is_err() {
                     return;

@@ -38,7 +38,7 @@ struct Step {
 }
 
 impl Step {
-    /// Chainage at which the step passes over an arc length.
+    /// Chainage at which the step passes over the arc length `arc_m`; `None` if it doesn't.
     fn x_at(&self, arc_m: f64, perimeter_m: f64, with_ends: bool) -> Option<f64> {
         let along_m = math::wrap_signed(arc_m - self.from[1], perimeter_m);
         let share = along_m / self.by[1];

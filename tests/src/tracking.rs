@@ -120,7 +120,8 @@ impl Navigation for Truth {
 
 impl Transparent for Truth {}
 
-/// Simulates a scene and replays it with every sample at its true place.
+/// Simulates a scene and replays it with a navigation that knows the true pose, so that every sample is at its true
+/// place.
 pub fn true_dive(scene: &Scene) -> Track {
     let simulation = Simulation::new(scene).unwrap();
     dive(scene, Truth(simulation.scenery().unwrap().clone()), Silence::default())
@@ -186,7 +187,7 @@ pub fn filter(scene: &Scene) -> FilterNavigation {
     FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings)
 }
 
-/// Simulates a scene and replays it with this navigation.
+/// Simulates a scene and replays it with the navigation `inner`, while some sources are silent.
 pub fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

@@ -63,7 +63,7 @@ pub struct Csv {
     header_passed: bool,
 }
 
-/// A sensor, and the table's columns with the sensor's values.
+/// A sensor, and the columns of the table that have the sensor's values.
 struct Target {
     sensor: EmulatedSensor,
     /// For each of the sensor's values, its column in the table, and the factor that converts its unit to SI; `None`
@@ -79,7 +79,7 @@ impl Csv {
     pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
-        // Spreadsheets may begin a file with a byte order mark.
+        // A byte order mark, which spreadsheets may write, isn't part of the header.
         let header = header.trim_start_matches('\u{feff}');
         let names: Vec<&str> = header.trim().split(separator).map(cell).collect();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];

@@ -27,7 +27,7 @@ pub(super) enum Value {
     Inertia(Rot<Level, Sensor>, [f64; 3], [f64; 3]),
     /// Velocity over ground from a velocity log, m/s.
     Velocity([f64; 3]),
-    /// Chainage from a cable counter, by paid-out cable length, m.
+    /// Chainage from a cable counter, computed from the length of cable paid out, m.
     Payout(f64),
 }
 

@@ -36,7 +36,7 @@ pub struct Import<S> {
 pub struct Imported {
     /// Number of entries in the foreign log.
     pub entries: u64,
-    /// Number of entries that belong to no sensor, because of their connection or content.
+    /// Number of entries for no sensor: their connection is unassigned, or no sensor takes their content.
     pub passed_over: u64,
     /// Number of messages written for each source of the log.
     pub messages: Vec<u64>,

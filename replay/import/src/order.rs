@@ -38,7 +38,8 @@ impl Order {
         Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }
     }
 
-    /// Adds an entry. If an entry with a later timestamp has already been returned, drops and counts the new entry.
+    /// Adds an entry. If an entry with a later timestamp has already been taken out, the new entry is dropped and
+    /// counted.
     pub(super) fn push(&mut self, entry: Entry) {
         if entry.stamp_ns < self.given_ns {
             self.late += 1;

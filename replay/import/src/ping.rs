@@ -88,7 +88,7 @@ fn number(rest: &mut &[u8]) -> Result<u32, Stop> {
 }
 
 fn sized<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Stop> {
-    // Qt writes `u32::MAX` as the length of a null string.
+    // Ping Viewer's library Qt writes `u32::MAX` as the length of a null string, which has no bytes.
     let len = match number(rest)? {
         u32::MAX => 0,
         len => usize::try_from(len).map_err(|_| Stop::Bad)?,

@@ -17,7 +17,8 @@ pub struct TlogFormat {
 /// Name of the only stream in a telemetry log: all frames belong to it.
 pub const STREAM: &str = "mavlink";
 
-/// Maximum difference between the times of two entries, µs. A larger difference after damage means a false match.
+/// Maximum difference between the times of two entries, µs. After damage, an entry with a larger difference is a false
+/// match.
 const DAY_US: u64 = 86_400_000_000;
 /// Latest valid time of an entry, in 2106, µs.
 const LATEST_US: u64 = 4_294_967_296_000_000;

@@ -23,15 +23,15 @@ pub struct Added {
     pub systems: Vec<(Stage, String)>,
     /// Names of the base systems that the effect replaces.
     pub replaces: Vec<&'static str>,
-    /// Components of the effect, each with the ids of the sensors that have the component.
+    /// Components that the effect adds, each with the ids of the sensors that get the component.
     pub components: Vec<(String, Vec<String>)>,
     /// Sources for which the effect draws random numbers during the dive.
     pub streams: Vec<String>,
-    /// The effect's change to the vehicle's trajectory before the dive begins, as text.
+    /// Text about the effect's change to the vehicle's trajectory; `None` if it changes nothing.
     pub trajectory: Option<String>,
 }
 
-/// Position of a system in the chain that the schedule runs.
+/// Position of a system in the sequence in which the schedule runs all systems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 struct Slot(usize);
 
@@ -177,7 +177,7 @@ impl<'a> Builder<'a> {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }
 
-    /// Begins an effect. Systems and components added from now on belong to this effect.
+    /// Begins the effect named `effect`. Systems and components added from now on belong to this effect.
     pub(crate) fn effect(&mut self, effect: &'static str) {
         self.current = Some(self.added.len());
         self.added.push(Added { effect, ..Added::default() });

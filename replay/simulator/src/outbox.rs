@@ -76,7 +76,7 @@ impl Outbox {
         self.front.is_some()
     }
 
-    /// Removes and returns the next message, once no earlier message can follow.
+    /// Removes and returns the next released message. No earlier message can follow it.
     pub(crate) fn next(&mut self) -> Option<Message<'_>> {
         let front = self.front?;
         let lane = self.lanes.get_mut(front)?;

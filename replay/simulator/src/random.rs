@@ -180,7 +180,7 @@ const FAR_TAIL: Rational = [
 mod tests {
     use super::*;
 
-    /// Known answers from the authors of the generator (Random123, kat_vectors).
+    /// Compares with known answers from the authors of the generator (Random123, kat_vectors).
     #[test]
     fn philox_gives_the_known_answers() {
         let all = u32::MAX;
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// Expected values have 16 digits and come from mpmath with 50 digits.
+    /// The expected values have 16 digits and were computed with mpmath at 50 digits.
     #[test]
     fn normal_quantiles_are_accurate_in_the_middle_and_tails() {
         for (p, x) in [
@@ -227,7 +227,7 @@ mod tests {
             below += stream.at(step).uniform().iter().filter(|u| **u < 0.3).count() as u64;
         }
         let n = 2.0 * count as f64;
-        // Tolerances are five standard deviations of each estimate.
+        // Each tolerance is five standard deviations of the estimate.
         assert!((sum / n).abs() < 5.0 / math::sqrt(n));
         assert!((squares / n - 1.0).abs() < 5.0 * math::sqrt(2.0 / n));
         assert!((fourth / n - 3.0).abs() < 5.0 * math::sqrt(96.0 / n));

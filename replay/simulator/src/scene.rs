@@ -148,7 +148,7 @@ impl Scene {
         self.trajectory.is_advised()
     }
 
-    /// Effects that the scene implies, each with whether and how it is simulated.
+    /// Effects that the scene implies. Each tells whether and how it is simulated.
     pub fn called(&self) -> &[Called] {
         &self.called
     }

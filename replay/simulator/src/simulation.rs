@@ -236,7 +236,7 @@ impl Simulation {
         hear::<GroundVelocity>(&mut self.world, entity, at, bytes);
     }
 
-    /// Starts the vehicle's movement at `at`. The dive ends at the end of the trajectory.
+    /// Starts the vehicle's movement at `at`. The dive then ends at the end of the trajectory.
     pub fn set_out(&mut self, at: MonoNs) {
         if let Some(mut scenery) = self.world.get_resource_mut::<Scenery>() {
             scenery.sets_out = Some(at);
@@ -367,7 +367,7 @@ impl Simulation {
     }
 }
 
-/// Passes bytes from a host to a device that measures `M`. An immediate reply is put on the device's line.
+/// Passes bytes from a host to a device that measures `M`. If the device replies at once, the reply is put on its line.
 fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[u8]) {
     let mut entity = world.entity_mut(entity);
     let Ok((mut device, mut line)) = entity.get_components_mut::<(&mut Device<M>, &mut Line)>() else {

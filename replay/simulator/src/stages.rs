@@ -219,7 +219,7 @@ pub(crate) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, 
 #[derive(Debug, Default, Component)]
 pub(crate) struct Frozen(Option<f64>);
 
-/// Frozen cable counters repeat their first count since they were frozen.
+/// Cable counters that are frozen repeat the first count after they were frozen.
 pub(crate) fn freeze(mut counters: Query<'_, '_, (&mut Samples<Payout>, &mut Frozen)>) {
     for (mut samples, mut frozen) in &mut counters {
         for payout in &mut samples.list {

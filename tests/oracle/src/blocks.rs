@@ -17,7 +17,7 @@ const WHOLE_M: f64 = 256.0;
 pub(crate) struct Blocks {
     /// Whole wall, for a short dive.
     whole: Option<Wall>,
-    /// Blocks of a long dive by block number, built on demand.
+    /// Blocks of a long dive. The key is the block's number. Blocks are built on demand.
     blocks: RefCell<BTreeMap<i64, Wall>>,
 }
 

@@ -9,7 +9,7 @@ use super::truth::Truth;
 use super::wall::Wall;
 use crate::error::TruthError;
 
-/// Stretches of chainage with at most this half length aren't halved again, m.
+/// Stretches of chainage whose half length is at most this aren't halved again, m.
 const FINEST_M: f64 = 2e-10;
 
 /// Hole diameter D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and

@@ -151,7 +151,7 @@ pub const CONDITIONS: [(&str, Condition); 19] = [
 /// Place at which a dive starts: name, and chainage in m.
 pub type Place = (&'static str, f64);
 
-/// Places at which dives start. Tunnels shorter than 7 km use a fraction of the chainage ([`Vehicle::far_share`]).
+/// Places at which dives start. In tunnels shorter than 7 km, the chainages are reduced ([`Vehicle::far_share`]).
 pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900.0)];
 
 /// Speed and manner in which the pilot drives during a dive.
@@ -269,7 +269,7 @@ impl Cell {
         self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
 
-    /// Broken device and its fault, in the dive with this seed and length.
+    /// The device that is broken in the dive with this seed and length, and its fault.
     pub fn broken(&self, seed: u64, length_m: f64) -> DeviceFault {
         let plain = self.plain(seed, length_m);
         let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
@@ -409,7 +409,7 @@ impl Cell {
         )
     }
 
-    /// Bulges and hollows around the whole wall, two per metre of tunnel.
+    /// Bulges and hollows at random places all around the wall, two per metre of tunnel.
     fn as_built(&self, seed: u64, length_m: f64) -> String {
         let most_m = self.aside_m(OFF_DESIGN_M);
         let mut draw = Draw::new(seed ^ 0xb17);
@@ -582,7 +582,7 @@ fn quoted(ids: &[String]) -> String {
     format!("{ids:?}")
 }
 
-/// Turns one head in a vehicle file by 3 degrees about the vertical.
+/// Changes a vehicle file: turns one head by 3 degrees about the vertical.
 fn turned(file: &str, head: &str) -> String {
     let mut within = false;
     let mut lines = Vec::new();

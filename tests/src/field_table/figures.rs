@@ -23,7 +23,7 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
 const END_M: f64 = 2.0;
 /// A hole belongs to a section if its centre is at least this far from both bounds of the section, m.
 const FLANK_M: f64 = 0.005;
-/// A section counts as entered if the vehicle reaches at least this far into it, m.
+/// A section counts as entered if the vehicle drives at least this far into it, m.
 const TOUCH_M: f64 = 0.02;
 
 /// A section that passed although its true hole exceeds the target.

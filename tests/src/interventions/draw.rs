@@ -1,4 +1,4 @@
-//! Dives with injected causes, drawn from a seed. Writes their vehicle and scene files with any of the causes
+//! Dives with injected causes, drawn from a seed. Their vehicle and scene files can be written with any of the causes
 //! removed.
 
 use std::f64::consts::TAU;
@@ -14,7 +14,7 @@ pub(super) const START_M: f64 = 3.0;
 /// Distance that a vehicle drives beyond the far end of the dive, m. A vehicle that turns back too early stops this far
 /// before the far end.
 const ON_M: f64 = 4.5;
-/// Distance over which the vehicle rolls to its new roll angle before a rolled pass, m.
+/// Before a pass in a rolled attitude, the vehicle rolls over this distance, m.
 const ROLLS_OVER_M: f64 = 1.0;
 
 /// Tables of the sensors that determine the vehicle's position. No part of the hull blocks their beams.

@@ -72,7 +72,7 @@ pub struct Stretch<'a> {
 }
 
 impl Stretch<'_> {
-    /// Causes that are displayed for most sections of the stretch.
+    /// The set of causes that is displayed for more of the stretch's sections than any other set.
     pub fn told(&self) -> &[Cause] {
         let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
         self.sections

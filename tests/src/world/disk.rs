@@ -24,7 +24,7 @@ enum Done {
     Created(PathBuf),
     Wrote(PathBuf, Vec<u8>),
     Synced(PathBuf),
-    /// A failed sync, after which unsynced data reads as zeros.
+    /// A sync of this file failed. Data that wasn't synced before reads as zeros from then on.
     Lost(PathBuf),
     Removed(PathBuf),
 }

@@ -275,7 +275,7 @@ impl World {
     /// Lets the recorder write until its queue is empty or the disk has an operation to complete.
     ///
     /// Without a disk failure, packets are synced by a sync that begins half a second and one step after the recorder
-    /// took them, or earlier. They count as certainly recorded when that sync is complete.
+    /// took them, or earlier. When this sync is complete, they count as certainly recorded.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
         let (failures, syncs) = (self.disk.failures(), self.disk.syncs());

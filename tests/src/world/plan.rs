@@ -168,7 +168,7 @@ pub enum Fault {
     Disk(Window<DiskFault>),
     /// A change of the recording's files.
     Log(LogChange),
-    /// An end of the dive that isn't regular, and its time.
+    /// An end of the dive by a kill or a power cut, and its time.
     Ending(Ending, MonoNs),
 }
 

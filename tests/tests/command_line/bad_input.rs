@@ -301,7 +301,7 @@ fn truncated_log_is_used_up_to_the_cut_and_the_rest_reported_lost() {
             let last_s = (messages[read - 1].log_time - messages[0].log_time) as f64 * 1e-9;
             assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
 
-            // The readable part gives the same results as an undamaged log that has only the readable messages.
+            // The readable part of the damaged log gives the same results as an intact log with only these messages.
             write_log(&folder.path("short.mcap"), WriteOptions::new(), Some(VEHICLE), &messages[..read]);
             let (_, short) = folder.replay("short.mcap", &[]);
             assert_eq!(report["digest"], short["digest"], "{log} {tenths}");

@@ -109,7 +109,7 @@ fn commands_longer_than_2_s_show_the_remaining_time() {
     quiet.end();
 }
 
-/// Another process that shares stdout may have made stdout non-blocking.
+/// The report must be complete even if another process that shares stdout has made it non-blocking.
 #[cfg(target_os = "linux")]
 #[test]
 fn report_is_complete_on_a_non_blocking_pipe() {

@@ -33,7 +33,8 @@ fn said(datagram: &[u8]) -> Said {
     assert_eq!((datagram[0], datagram[2], datagram.len()), (0xfd, 0, 12 + length), "{datagram:?}");
     assert_eq!(datagram[5..7], [7, 191], "system and component");
     let id = u32::from_le_bytes([datagram[7], datagram[8], datagram[9], 0]);
-    // CRC_EXTRA (checksum seed) of a MAVLink message. Only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT may occur.
+    // CRC_EXTRA (checksum seed) of the message, by message id. Only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT may
+    // occur.
     let extra =
         *BTreeMap::from([(0, 50), (251, 170), (253, 83)]).get(&id).unwrap_or_else(|| panic!("message {id}"));
     let summed = datagram[1..10 + length].iter().copied().chain([extra]);

@@ -106,7 +106,7 @@ fn json_and_csv_have_the_same_figures() {
     }
 }
 
-/// Slightly above v_max, the spacing T still meets the target, but without a margin for position errors.
+/// At a speed slightly above v_max, the spacing T still meets the target, but leaves no margin for position errors.
 #[test]
 fn speed_above_v_max_misses_the_target_even_if_t_meets_it() {
     let folder = Folder::new();
@@ -265,8 +265,8 @@ fn pictures_are_identical_in_every_run() {
     }
 }
 
-/// The documents must show the pictures that the command draws now. After an intended change, the command in
-/// docs/how-to/plan/README.md draws them again.
+/// The documents must show the pictures that the command draws now. If a change is intended, draw them again with the
+/// command in docs/how-to/plan/README.md.
 #[test]
 fn pages_show_the_pictures_of_the_current_program() {
     let folder = Folder::new();

@@ -192,7 +192,7 @@ fn summary_and_indexes_match_a_full_read() {
     assert_eq!(stats.attachment_count as usize, summary.attachment_indexes.len());
     assert_eq!(stats.metadata_count as usize, summary.metadata_indexes.len());
     let mut indexed: BTreeMap<u16, u64> = BTreeMap::new();
-    // The first chunk contains channel definitions, but no message.
+    // The first chunk is skipped, because it contains channel definitions, but no message.
     for chunk in summary.chunk_indexes.iter().filter(|chunk| !chunk.message_index_offsets.is_empty()) {
         let indexes: Vec<_> = summary.read_message_indexes(&log, chunk).unwrap().into_iter().collect();
         for (channel, entries) in indexes {

@@ -280,7 +280,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
 
 #[test]
 fn stretch_without_a_position_fails_once_the_vehicle_has_left_it() {
-    // Some seconds after the cable counter falls silent, the filter has no fix any more.
+    // Some seconds after the cable counter falls silent at 25 s, the filter has no fix any more.
     let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
     accounted_for("outage", &report);
     let lost = |s: &&SectionRow| s.cause.is_some_and(|evidence| evidence.cause.as_str() == "position_lost");

@@ -113,7 +113,8 @@ fn flag_is_raised_within_25_cm_of_the_point_of_no_return() {
         let flags =
             if direct(judged) { &judged.by_two_sigma } else { &judged.journey.flags(judged.dive, 3.0) };
         for flag in flags {
-            // Standard deviations shrink while the estimate converges, but the report contains only the final ones.
+            // While the estimate converges, standard deviations shrink, but the report has only the final ones. Such
+            // early flags don't count.
             let settles = !direct(judged) && flag.due_s.is_some_and(|due_s| due_s < SETTLED_S);
             let is_late = flag.late_m.filter(|_| !settles).map(|late_m| late_m > LATE_M);
             on_time += u32::from(is_late == Some(false));

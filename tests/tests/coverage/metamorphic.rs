@@ -117,7 +117,7 @@ fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     text
 }
 
-/// The vehicle is slow enough at first, then too fast, and then goes back over a part of its path.
+/// Trajectory of a vehicle that is slow enough at first, then too fast, and then goes back over a part of its path.
 fn legs(start_m: f64, place_m: [f64; 2]) -> String {
     let mut text = format!(
         "vehicle = \"vehicle.toml\"\n[effects]\nmotion_within_turn = {{}}\n[trajectory]\nstart_m = {start_m}\nplace_m = {place_m:?}\n"

@@ -117,7 +117,7 @@ fn verdicts_follow_from_hole_size_its_sd_and_the_target() {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let (hole_m, target_m, twice_m) =
             (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sd_m);
-        // A section stays open if driving on could still fill its hole.
+        // A section must stay open if driving on could still fill its hole.
         let reached = reached(dive);
         let (rear_m, passed_m) = (reached.last()?.rear_m, all_passed_from_m(&reached));
         let radius_m = f64::midpoint(target_m, twice_m);
@@ -225,7 +225,7 @@ fn spacings_of_every_section_match_their_definitions() {
     assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without end points of series");
 }
 
-// Places in rows and columns, for tests of the oracle itself. `at` returns the place of a row and column.
+// Samples in rows and columns, for tests of the oracle itself. `at` returns the place of a row and column.
 
 fn lattice(rows: u32, columns: u32, at: impl Fn(f64, f64) -> Place) -> Vec<Place> {
     let row = |i| (0..columns).map(move |j| (f64::from(i), f64::from(j)));
@@ -246,7 +246,7 @@ fn holes_of_sample_lattices_match_exact_values() {
     let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0).unwrap();
     holds(&squares, 1.0, 1.25, 0.25 * diagonal_m);
     holds(&squares, 1.0, 1.05, 2.0 * math::hypot(0.05, 0.125));
-    // Rows that are offset by half a step form triangles with sides of 0.4 m.
+    // Every other row is offset by half a step, so that the samples form triangles with sides of 0.4 m.
     let height_m = 0.2 * math::sqrt(3.0);
     let triangles =
         Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0).unwrap();

@@ -73,8 +73,8 @@ fn true_holes_match_a_fine_grid() {
         };
         let grid_m = (0..=along).flat_map(|i| (0..around).map(move |j| place(i, j)));
         let grid_m = grid_m.map(|at| 2.0 * strips.clear_m(at)).fold(0.0, f64::max);
-        // Between grid points, the diameter of an empty circle changes by no more than twice the distance to the
-        // nearest grid point.
+        // From a point to the nearest grid point, the diameter of the empty circle changes by at most twice the
+        // distance.
         let off_m =
             math::hypot((to_m - from_m) / f64::from(along), dive.truth.perimeter_m / f64::from(around));
         let short_m = section.true_hole_m - grid_m;

@@ -115,7 +115,8 @@ fn no_section_passes_with_a_head_stuck_at_one_range() {
     assert!(sound.report.summary.pass_m > 5.0, "{:?}", sound.report.summary);
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
-    // A constant range at the centre of a round pipe could be the wall of a pipe with another radius.
+    // A constant range from the centre of a round pipe could be true in a pipe with another radius, so only the profile
+    // is doubted.
     let kinds: Vec<_> = observed(&alone.report).into_iter().map(|alert| alert.kind).collect();
     assert_eq!(kinds, ["profile_contradicted"]);
 }
@@ -167,7 +168,7 @@ fn recovered_head_is_used_again() {
         .map(|ping| ping.received.since(dive.pings[0].received).as_secs_f64())
         .collect();
     assert!(doubtful.len() > 2000 && doubtful[0] > 58.0, "{} from {}", doubtful.len(), doubtful[0]);
-    // The loop accepts the head again after some turns over new wall.
+    // After some turns over new wall, the loop accepts the head's returns again.
     assert!(doubtful.last().unwrap() < &145.0, "{:?}", doubtful.last());
 }
 
@@ -188,7 +189,7 @@ fn head_with_random_ranges_passes_no_section_and_is_reported() {
     assert_eq!(named(&alone, "sonar_0")[0].kind, "head_scattered");
     let causes = alone.report.sections.iter().filter_map(|section| section.cause);
     let causes: Vec<&str> = causes.map(|evidence| evidence.cause.as_str()).collect();
-    // A head counts as silent if all of its returns are rejected.
+    // A head counts as silent if all of its returns are rejected, so the cause is `head_silent`.
     let silent = causes.iter().filter(|cause| **cause == "head_silent").count();
     assert!(causes.len() > 10 && 10 * silent >= 9 * causes.len(), "{causes:?}");
     let one_of_two = dive(2, &effects("sonar_1"));

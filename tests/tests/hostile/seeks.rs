@@ -1,4 +1,4 @@
-//! Seeks in odd logs. After a seek, the reader must not know definitions that come later in the log.
+//! Seeks in odd logs. After a seek back, the reader must not know channels that are only defined later in the log.
 
 use std::io::Cursor;
 

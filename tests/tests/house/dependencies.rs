@@ -115,7 +115,7 @@ fn crates_come_from_the_registry_or_this_tree() {
     }
 }
 
-/// With an old lock file, builds of `lab/` with `--locked` fail, and builds without `--locked` change the file.
+/// If the lock file of `lab/` is out of date, builds with `--locked` fail, and builds without it change the file.
 #[test]
 fn lock_file_of_the_lab_lists_the_dependencies_of_the_product() {
     let lab = locked_dependencies("lab/Cargo.lock");

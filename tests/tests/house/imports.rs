@@ -42,7 +42,7 @@ pub(crate) struct Imports {
 pub(crate) fn imports(text: &str) -> Imports {
     let tokens = tokens(text);
     let mut found = Imports::default();
-    // Enclosing inline modules, each with the brace depth outside the module.
+    // The inline modules around the current token, each with the brace depth outside it.
     let mut around: Vec<(&str, usize)> = Vec::new();
     let (mut depth, mut at) = (0_usize, 0);
     while at < tokens.len() {

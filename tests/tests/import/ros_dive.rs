@@ -54,7 +54,7 @@ impl Cdr {
     }
 }
 
-/// Topic, type and CDR of the ROS message for a device's message; `None` if the device's message needs none.
+/// Topic, type and content of the ROS message that a device's message becomes; `None` if it becomes none.
 type Written = Option<(String, &'static str, Cdr)>;
 
 struct Translator {

@@ -305,8 +305,8 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", longer);
     assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
-        // Changes the number of the first connection definition inside a chunk. The definition at the end of the file
-        // remains.
+        // Changes the number of the first connection definition inside a chunk, but not in its copy at the end of the
+        // file.
         let chunk = find(bytes, b"compression=", 0);
         let at = find(bytes, b"conn=", chunk);
         bytes[at + 5] = 99;

@@ -214,13 +214,13 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };
-    // The alert for the dead head is raised 2 s after the head's last reading, plus one update. No latch time is
+    // The alert for the dead head is raised 2 s after the head's last reading, at the next update. No latch time is
     // configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
     let head = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
     assert_eq!(head.state, AlertState::Rectified, "the head returned, and the alert is unacknowledged");
-    // The missed stretch has one alert, although a later pass has filled a part of it.
+    // The missed stretch has a single alert, although a later pass has filled a part of the stretch.
     let missed = raised(ListKind::Missed);
     let runs = dive.view().coverage().sections.runs().all();
     assert!(missed.len() <= runs.len() && !missed.is_empty(), "{missed:?}, {} runs", runs.len());
@@ -253,7 +253,7 @@ fn silence_of_all_sensors_raises_one_alert_in_time() {
     assert_eq!(dive.view().span().unwrap().1, last, "operator input counts as a sensor");
 }
 
-/// A command from another thread gets its timestamp from the dive's clock.
+/// If another thread gives a command, the command gets its timestamp from the dive's clock.
 #[test]
 fn commands_from_any_thread_reach_the_loop() {
     let scene = scenes::scene(SCENE);
@@ -344,8 +344,7 @@ fn recorded_acknowledgements_are_equal_in_replay_and_verify() {
     assert_eq!((&last["left"]["battery_pct"], &last["alerts_hidden"]), (&19.5.into(), &0.into()));
 }
 
-/// A dive of 20 s with a velocity log, whose reports are sent 15 s after their measurements, and an inertial unit on
-/// a CAN bus.
+/// A dive of 20 s with a velocity log and an inertial unit on a CAN bus. `change` changes the bytes of each packet.
 fn withheld_dive(change: fn(&str, &mut Vec<u8>)) -> (Scene, Vec<Packet>) {
     let log = "\n[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\nconnect = \"tcp:127.0.0.1:9\"\n";
     let load = |name: &str| {

@@ -282,7 +282,8 @@ fn damage_seen_before_seeking_back_is_reported_at_the_end() {
         "pause\nseek 1h\nback 10s\nback 1h\nend\n",
         "pause\nseek 19s\nseek 1s\ngo\n",
     ] {
-        // Only the number of losses is compared, because their times may be known more exactly at the end of the log.
+        // Only the number of losses is compared. Their times may be known more exactly after the whole log has been
+        // read.
         let (code, told) = losses(lines);
         assert_eq!((code, told.as_array().unwrap().len()), (Some(3), 3), "{lines}: {told}");
     }

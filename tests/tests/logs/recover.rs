@@ -90,7 +90,7 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
                 assert!(report["log"]["losses"][0].is_string(), "case {case}");
                 lost += 1;
             }
-            // Exit code 2: the vehicle file in the log is damaged, or the cut removes it.
+            // Exit code 2 is right if the vehicle file in the log is damaged or cut off.
             Some(2) => assert!(answer.stderr.contains("no vehicle file"), "case {case}: {}", answer.stderr),
             code => panic!("case {case}: {code:?}: {}", answer.stderr),
         }

@@ -68,7 +68,7 @@ fn with_ports(scene: &Scene) -> Loop {
     app.arm(scene.vehicle.navigation()).unwrap()
 }
 
-/// An interrupted dive, with the expected results of the whole dive.
+/// A dive that was interrupted, with the expected results of the whole dive.
 struct Interrupted {
     scene: Scene,
     log: PathBuf,

@@ -164,7 +164,7 @@ fn part_named_twice_is_read_once() {
     let folder = Folder::with_dive();
     record(&folder, &["--record", "a.mcap", "--rotate", "5s"]);
     let digest = folder.digest("a.mcap", &[]);
-    // If writing a part fails, the first part may have the plain name of the recording.
+    // After a failed write, the first part may have the plain name of the recording.
     std::fs::rename(folder.path("a.part001.mcap"), folder.path("a.mcap")).unwrap();
     let mut names: Vec<String> = std::fs::read_dir(folder.path(""))
         .unwrap()

@@ -151,7 +151,8 @@ fn consistent_estimates(all: &[Dives]) {
         bound(-1.96),
         bound(1.96)
     );
-    // The estimate is slightly overconfident, because the filter learns noise from the same data.
+    // The mean may exceed 6, because the filter learns noise from the same data and is therefore slightly
+    // overconfident.
     assert!(within > 0.75 && mean < 6.9, "{within}, {mean}");
 }
 
@@ -235,8 +236,8 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
 }
 
-/// Each sensor is silent for a while in some dives, and until the end in another dive. The errors must stay within
-/// their reported bounds.
+/// In some dives a sensor is silent for a while, and in another one until the end. The errors must stay within their
+/// reported bounds.
 #[test]
 fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
     for (name, sources) in [

@@ -158,7 +158,7 @@ fn smoothing_increases_no_error_of_the_shipped_vehicle() {
     }
 }
 
-/// Root mean square of an error between two times, and the largest ratio of the error to its standard deviation.
+/// Root mean square of one component of the error between two times, and its largest ratio to its standard deviation.
 fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64) {
     let inside = epochs.iter().filter(|epoch| {
         let at_s = epoch.at.since(START).as_secs_f64();

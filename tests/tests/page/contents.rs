@@ -147,7 +147,7 @@ fn dive_is_compared_with_a_second_target() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed_with(&folder, &["--target", "0.5,0.2"]);
     assert_eq!(viewer.hello["compared_m"], 0.2);
-    // Sections behind a moving vehicle must be judged at once, not only at the end.
+    // For the second target too, sections behind a moving vehicle must be judged at once, not only at the end.
     let judged =
         |viewer: &Viewer| viewer.sections.values().filter(|section| section.compared == Some(2)).count();
     assert!(judged(&viewer) > 3, "{:?}", viewer.sections);
@@ -189,7 +189,7 @@ fn resumed_viewer_shows_the_same_as_a_new_viewer() {
     // A seek back restarts the dive, which then has fewer sections. The viewer's connection is lost after that, while
     // the dive goes on.
     let [from_s, to_s] = span_s(&lost);
-    // The seek leads to a time late in the dive, when a part of the tunnel has final verdicts.
+    // The seek leads to a late time in the dive, at which a part of the tunnel already has final verdicts.
     let middle_s = to_s - 0.1 * (to_s - from_s);
     lost.send(&json!({"do": "play", "command": "pause"}));
     lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));

@@ -61,7 +61,7 @@ fn drawn(seed: u64) -> Vec<Group> {
 }
 
 impl Group {
-    /// Returns the bytes that a client sends, with this URL query.
+    /// Returns the bytes that a client of this group sends. `query` is the URL query of its request.
     fn request(self, query: &str) -> String {
         match self.client {
             Client::Silent => String::new(),

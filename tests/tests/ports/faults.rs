@@ -197,8 +197,7 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // The frame headers in the garbage announce an echosounder profile of 1200 strengths and a head's return of 500
-    // points.
+    // The garbage announces long frames: an echosounder profile of 1200 strengths, and a head's return of 500 points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),

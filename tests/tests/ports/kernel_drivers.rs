@@ -205,7 +205,7 @@ impl Rehearsal {
         }
     }
 
-    /// Sends messages to a sensor's driver until one arrives. Messages sent before the line is open are lost.
+    /// Sends messages to a sensor's driver until the loop gets one. Messages sent before the line is open are lost.
     #[track_caller]
     fn call(&mut self, source: usize, stand: &mut EmulatedPort) {
         let before = self.settle(source);
@@ -365,8 +365,8 @@ fn every_frame_is_read_after_a_can_interface_was_down() {
             Phase::Closed,
             "opening vcan3: the interface is down; sudo ip link set vcan3 up",
         );
-        // During the outage, messages of the inertial unit are lost. The second outage is longer than the silence
-        // timeout.
+        // Messages that the inertial unit sends during the outage are lost. The second outage is longer than the
+        // silence timeout.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
         if round == 1 {

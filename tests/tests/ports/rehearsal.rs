@@ -209,7 +209,7 @@ fn rehearse(distance_m: f64, keeps_time: bool) {
     let different = differences(&ours, &theirs);
     assert!(different.is_empty() || !keeps_time, "{different:#?}");
     assert!(!ours.is_empty(), "no section was judged");
-    // The replay of the recording must give the displayed results.
+    // The replay of the live dive's recording must give the same results as the live dive.
     let (again_code, again) = replay(&folder, &folder.path("live.mcap"), "again.json");
     assert_eq!((again_code, &again["digest"]), (code, &live["digest"]));
     assert_eq!(again["sections"], live["sections"]);

@@ -22,7 +22,7 @@ fn wall_clock() -> Instant {
     Instant::now()
 }
 
-/// Element `n` of a fixed sequence of pseudorandom numbers.
+/// The pseudorandom number `n` of a fixed sequence.
 fn random(n: u64) -> u64 {
     let word = (n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use crate::rehearsal::Running;
 
-/// Sensors with invalid addresses. Each address has a different fault.
+/// Sensors with invalid addresses. Each address is wrong in another way.
 const WRONG: [(&str, &str, &str); 7] = [
     ("no_colon", HEAD, "192.168.0.5"),
     ("no_port", HEAD, "tcp:192.168.0.5"),

@@ -1,5 +1,5 @@
-//! Random steps on a factored covariance. It stays a valid covariance, and each measurement changes it by the scalar
-//! formula.
+//! Random steps on a factored covariance. The covariance must stay valid, and each measurement must change its
+//! variances as the formula for scalars says.
 
 use headrace_fusion::filter::factors::Factors;
 use headrace_geometry::math;

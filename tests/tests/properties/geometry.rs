@@ -1,4 +1,4 @@
-//! Hits of rays on the walls of random cross-sections, compared with the formula for each edge.
+//! Hits of rays on the walls of random cross-sections, compared with a formula that is applied to each edge.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};

@@ -237,8 +237,8 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
                 ));
             }
         }
-        // In the cases below `NEAR`, holes are smaller than predicted, and fewer sections fail. In no case may a hole
-        // be larger than predicted.
+        // In cases with smaller holes (below `NEAR`), fewer sections fail. In no case may a hole be larger than
+        // predicted.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -341,7 +341,7 @@ fn advice_compensates_lost_returns() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // Lost returns that are isolated have little effect on the advice.
+    // Returns that are lost singly, not in runs, have little effect on the advice.
     let few = Case { effects: "missing_returns = { share = 0.05 }\n", ..VITA1 };
     let [sound_mps, mps] = [VITA1, few].map(|case| case.dive(0.1, 0.1).median(v_max_mps));
     assert!((0.85..0.99).contains(&(mps / sound_mps)), "{mps} of {sound_mps}");
@@ -410,7 +410,7 @@ fn advice_in_the_field_changes_slowly_enough_to_read() {
     );
     assert!(jumps <= 1.0 && reasons <= 0.2, "{jumps} and {reasons}");
     assert!(crossings > 10.0 && forecasts < 0.5 * crossings, "{forecasts} of {crossings}");
-    // A forecast is displayed for at least a second before it is withdrawn.
+    // Once displayed, a forecast must stay for at least a second.
     let mut since = None;
     for (k, beat) in beats.iter().enumerate() {
         match (beat.advice.will_exceed, since) {

@@ -196,7 +196,7 @@ impl Dive {
             let angle = TAU * (k as f64 + share) / heads as f64;
             let mut own = self.tracks[k].passes(angle);
             if [0.0, 1.0].contains(&share) {
-                // Where a head turns back, two of its passes coincide.
+                // At the ends of its sector the head turns back, so two of its passes coincide.
                 own = own.iter().flat_map(|&m| [m, m]).collect();
             } else {
                 let by = |track: &&Track| !track.passes(angle).is_empty();
@@ -220,7 +220,7 @@ fn gaps(passes: &[f64]) -> Vec<f64> {
     passes.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// Hulls with all heads at one place, with evenly spaced heads, and with unevenly spaced heads in mixed order.
+/// Hulls with all heads at one place, with evenly spaced heads, and with unevenly spaced heads that aren't in order.
 fn hulls(heads: usize) -> [Vec<f64>; 3] {
     let uneven = [0.4, -0.71, 1.102, 0.05, -0.33, 0.62];
     [vec![0.3; heads], (0..heads).map(|k| -0.3 * k as f64).collect(), uneven[..heads].to_vec()]

@@ -233,7 +233,7 @@ fn beam_wall_hits_match_the_oracle() {
     for row in rows(&["cast_x", "cast_y", "cast_z", "cast_sigma"]) {
         let profile = shape(row.i(1));
         let hit = sounding(&profile, &row, row.i(6));
-        // At oblique incidence, the rounding of a beam's direction moves its end along the wall by a larger factor.
+        // The more oblique the incidence, the farther the rounding of a beam's direction moves its end along the wall.
         let tolerance = 64.0 * ULP * (3.0 + hit.range_m()) / hit.squareness;
         match row.case.as_str() {
             "cast_x" => row.near(hit.beam.x(), tolerance),

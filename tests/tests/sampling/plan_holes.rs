@@ -92,8 +92,8 @@ const VEHICLE_M: f64 = 1.6;
 fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
     let (spec, _) = &inspection.heads[number];
     let from = spec.mount.position;
-    // Angle 0 points down, and angles grow clockwise as seen from behind the head. A head that faces aft is turned
-    // about the vertical.
+    // Angle 0 points down, and angles grow clockwise as seen from behind the head. The mount of a head that faces aft
+    // is turned about the vertical.
     let (sine, cosine) = math::sin_cos(angle_rad);
     let towards = spec.mount.rotation * Vec3::new(0.0, sine, -cosine);
     let others = || inspection.heads.iter().enumerate().filter(|(other, _)| *other != number);

@@ -133,8 +133,8 @@ fn only_named_effects_have_systems_components_and_streams() {
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));
 }
 
-/// Effects that a scene's conditions imply are listed with their reasons. They are simulated only if the scene requests
-/// them.
+/// Effects that a scene's descriptions imply are listed with their reasons. They are simulated only if the scene
+/// requests them.
 #[test]
 fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
     let folder = folder();

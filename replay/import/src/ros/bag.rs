@@ -201,7 +201,7 @@ impl Format for Bag {
                 // the end of the file.
                 if end { Step::Lost(1, NO_RECORD) } else { Step::More }
             }
-            // A chunk that is cut off by the end of the file may still contain whole messages.
+            // Even if the end of the file cuts off a chunk, the rest of the chunk may contain whole messages.
             Err(Stop::More(Some((fields, data)))) if end && fields.u8(b"op") == Some(5) => {
                 match fields.get(b"compression") {
                     Some(packing) => self.open(fields, data, packing, front.len(), true),
@@ -307,7 +307,7 @@ impl Bag {
             3 => self.stated = Some(Self::bag_header(fields)?),
             5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
             7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
-            // Records of an index hold no messages, and records of unknown kinds may be ignored.
+            // Other records are ignored. They belong to an index, which holds no messages, or are of an unknown kind.
             _ => (),
         }
         Some(Accepted::Read)
@@ -377,7 +377,8 @@ impl Bag {
     }
 }
 
-/// Maximum unpacked size of a chunk, bytes. Recorders make chunks of less than a megabyte plus one message.
+/// Maximum unpacked size of a chunk, bytes. Recorders make far smaller chunks, of less than a megabyte plus one
+/// message.
 const MOST_UNPACKED: usize = 64 << 20;
 
 /// Result of unpacking a chunk of the bag.

@@ -33,7 +33,7 @@ impl Feeds {
         &self.matched
     }
 
-    /// Returns the greatest age that values may have when their message is recorded, ns.
+    /// Returns how old values can be when their message is recorded, ns.
     ///
     /// One message may contain the beams of a head's whole turn.
     pub(super) fn reach_ns(&self) -> u64 {

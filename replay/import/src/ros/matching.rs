@@ -88,7 +88,7 @@ impl Feeds {
         Ok(feeds)
     }
 
-    /// Assigns topics by a mapping alone.
+    /// Assigns topics to sensors only as a mapping says.
     ///
     /// Errors: a key has an invalid value, a sensor or topic is unknown, or a topic doesn't fit its sensor's kind.
     pub fn mapped(

@@ -83,7 +83,7 @@ struct BeamCone {
     cone: Cone,
     form: Form,
     bins: Bins,
-    /// Hits of the rays within the cone of the current ping.
+    /// Hits of all rays of the current ping's cone.
     hits: Vec<Option<Hit>>,
 }
 
@@ -209,7 +209,7 @@ impl BeamCone {
         }
     }
 
-    /// Range of the surface as Jorge et al. 2021 define it.
+    /// Range of the wall's surface as Jorge et al. 2021 define it, m.
     ///
     /// Each ray's echo, weighted by beam strength and incidence, is shared between the two nearest range bins. The
     /// surface is in the bin with the largest sum.

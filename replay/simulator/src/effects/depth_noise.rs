@@ -174,7 +174,7 @@ mod tests {
         let squares = offsets.iter().map(|pa| pa * pa / 1e6);
         let (second, fourth) = (squares.clone().sum::<f64>() / n, squares.map(|of| of * of).sum::<f64>() / n);
         assert!((second - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{second}");
-        // For standard normal values, the fourth moment is 3. The variance of its estimate from n values is 96 / n.
+        // Standard normal values have a fourth moment of 3. Its estimate from n values has a variance of 96 / n.
         assert!((fourth - 3.0).abs() < 5.0 * math::sqrt(96.0 / n) && fourth > 1.5, "{fourth}");
     }
 

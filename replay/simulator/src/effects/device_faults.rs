@@ -137,7 +137,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Makes a sensor repeat the value that it had before the fault.
+/// Makes a sensor repeat the last value that it had before the fault.
 #[derive(Component)]
 struct Stuck<M: Measurement> {
     span: Span,
@@ -187,7 +187,8 @@ impl Sticking for Payout {
     }
 }
 
-/// Repeats the last value before the fault. A device that is stuck from the dive's start repeats its first value.
+/// Makes stuck devices repeat their last value before the fault. A device that is stuck from the dive's start repeats
+/// its first value.
 fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &mut Stuck<M>)>) {
     for (mut samples, mut stuck) in &mut devices {
         for measured in &mut samples.list {

@@ -89,7 +89,7 @@ impl Stalls {
         Self { stream, chance, seconds: parameters.seconds, next_step: 0, until: START }
     }
 
-    /// Whether the head stalls at this time. Must be called in order of time.
+    /// Whether the head is stalled at this time. The times of successive calls must not decrease.
     fn at(&mut self, at: MonoNs) -> bool {
         let step = at.since(START).0.max(0).unsigned_abs() / STEP.0.unsigned_abs();
         while self.next_step <= step {

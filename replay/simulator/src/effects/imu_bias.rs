@@ -20,7 +20,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step number that is reserved for drawing the constant parts. No sample has this number.
+/// Step number that is reserved for drawing the constant biases. No sample has this number.
 const CONSTANT: u64 = u64::MAX;
 /// Block of random numbers for the tilt, after the blocks for the biases.
 const TILT: u64 = 3;
@@ -225,8 +225,8 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Over many seeds, the variance at the first sample and much later equals the given one, and the correlation
-    /// between the two samples is exp(-t / tau).
+    /// Over many seeds, the variance at the first sample and at a much later one equals the given one, and the
+    /// correlation between the two samples is exp(-t / tau).
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);

@@ -92,7 +92,7 @@ fn bump(mut units: Query<'_, '_, (&mut Samples<Inertia>, &ImuBumps)>) {
 }
 
 impl ImuBumps {
-    /// Velocity that bumps give the vehicle between two times, m/s; `None` without a bump.
+    /// Change of the vehicle's velocity by bumps between two times, m/s; `None` without a bump.
     fn gained_mps(&self, [from_s, until_s]: [f64; 2]) -> Option<Vec3<Sensor>> {
         let last = math::floor_to_i64(until_s / SPAN_S);
         let first = math::floor_to_i64((from_s - self.parameters.seconds) / SPAN_S).max(0);
@@ -168,7 +168,7 @@ mod tests {
         assert!(single * 4 > bumps.len() * 3);
     }
 
-    /// Velocities gained in the bumps of `spans` time spans.
+    /// Velocities that the bumps of the first `spans` time spans give the vehicle.
     fn bumps(spans: u64) -> Vec<Vec3<Sensor>> {
         let parameters = Parameters { chance: 0.5, speed_mps: [0.05, 0.2], seconds: 0.3 };
         let bumps = ImuBumps { parameters, stream: Stream::new(5, "imu_bumps", "vehicle") };

@@ -246,7 +246,7 @@ impl Ear<'_> {
 impl Hears {
     /// Upper bound of the distance to a wall that still reflects this head's sound audibly, m.
     fn rings_m(&self) -> f64 {
-        // The factor of 1.5 is larger than any ratio of two speeds of sound.
+        // The factor 1.5 is larger than the ratio of any two speeds of sound in water.
         self.spec.range_m[1] * 1.5
     }
 }

@@ -54,7 +54,7 @@ struct Ramp {
 struct MissingReturns {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the previous ping was lost as part of a run; `None` before the first ping.
+    /// Whether the previous ping was lost in a run of lost pings; `None` before the first ping.
     in_run: Option<bool>,
 }
 

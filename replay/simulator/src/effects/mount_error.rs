@@ -1,4 +1,4 @@
-//! Differences of sensors' mounts from the vehicle file.
+//! Mounts of sensors that differ from the vehicle file.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Vec3};

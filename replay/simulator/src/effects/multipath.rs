@@ -39,7 +39,7 @@ use crate::stages::Stage;
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
 pub(super) struct MultipathKind;
 
-/// Distance from the wall at which reflected rays begin, m.
+/// Reflected rays begin at this distance from the wall, m, so that they don't hit it again at once.
 const OFF_WALL_M: f64 = 1e-6;
 
 #[derive(Debug, Clone, Copy)]

@@ -80,7 +80,7 @@ impl<P> Places<P> {
         Places(self.0.iter().map(|(stretch, parameters)| (*stretch, how(parameters))).collect())
     }
 
-    /// Parameters of the effect in all stretches, in the order of the scene.
+    /// Parameters of the effect in each stretch, in the order of the scene.
     pub(super) fn all(&self) -> impl Iterator<Item = &P> {
         self.0.iter().map(|(_, parameters)| parameters)
     }

@@ -37,7 +37,7 @@ struct TetherLag {
 
 impl EffectKind for TetherLagKind {
     fn name(&self) -> &'static str {
-        // This name is the effect's key in scenes and the name of its random stream.
+        // Scenes use this name for the effect, although the module has another name.
         "late_winding"
     }
 

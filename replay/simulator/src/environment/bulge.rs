@@ -34,7 +34,7 @@ impl Bulge {
         self.chainage_m + self.half_length_m
     }
 
-    /// Displacement of the wall by the patch at a point on a profile with this perimeter, inwards positive, m.
+    /// Displacement of the wall by the patch at the point `at` of a profile with this perimeter, inwards positive, m.
     pub(super) fn displacement_m(&self, at: WallPoint, perimeter_m: f64) -> f64 {
         let along = (at.x_m - self.chainage_m) / self.half_length_m;
         if along.abs() >= 1.0 {

@@ -74,7 +74,7 @@ impl Features {
     }
 }
 
-/// Returns the hollow if it opens from the tube's wall.
+/// Returns the hollow `hollow` if it opens from the tube's wall.
 ///
 /// Errors: the hollow opens from a mesh.
 fn opening(

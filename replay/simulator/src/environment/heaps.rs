@@ -20,7 +20,7 @@ const DEEPEST_ASPECT: f64 = 1.0;
 const LOOSENING: f64 = 1.5;
 /// Ratio of the length of the fallen heap to the length of its cavity.
 const SPREADING: f64 = 1.5;
-/// Number of points along a patch at which the distance to the wall is evaluated.
+/// Number of points across a displaced patch at which the wall's distance is evaluated.
 const PLACES: u32 = 64;
 
 /// Area over which the boulders of a heap are scattered.

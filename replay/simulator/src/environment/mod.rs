@@ -191,7 +191,8 @@ impl Environment {
         })
     }
 
-    /// Chainages between which each body lies, m. Bodies are boulders, pieces of heaps and other solids.
+    /// Chainages between which all bodies lie, m; `None` without bodies. Bodies are boulders, pieces of heaps and other
+    /// solids.
     pub(crate) fn rubble_m(&self) -> Option<[f64; 2]> {
         let spans = self.solids.iter().map(|solid| solid.span_m);
         spans.fold(None, |all: Option<[f64; 2]>, (from_m, to_m)| {
@@ -312,8 +313,7 @@ impl Environment {
         self.names.get(usize::from(index)).map_or("", String::as_str)
     }
 
-    /// Stretch of water along the ray, at most to `far_m`, and the obstacle at its end; `None` if the ray starts
-    /// outside the water.
+    /// Stretch of water along the ray, up to an obstacle or to `far_m`; `None` if the ray starts outside the water.
     fn reach(&self, ray: &Ray, far_m: f64) -> Option<Reach> {
         let far_m = far_m.min(FARTHEST_M);
         let mut reach = match self.tube.leave(ray, 0.0, far_m) {
@@ -334,7 +334,7 @@ impl Environment {
                 reach.stop = Some(Stop::Solid { normal, feature: solid.feature });
             }
         }
-        // A range of zero means that the ray starts inside the solid.
+        // A range of zero means that the ray starts inside a solid.
         let in_solid = reach.t_m <= 0.0 && matches!(reach.stop, Some(Stop::Solid { .. }));
         (!in_solid).then_some(reach)
     }
@@ -360,7 +360,7 @@ impl Environment {
             if reach.stop.is_none() {
                 return;
             }
-            // A hollow may end on the wall itself. The tube then starts `SKIN_M` farther on.
+            // A hollow may end on the tube's wall itself. The search for the tube therefore starts `SKIN_M` farther on.
             if let Some(passage) = self.tube.leave(ray, reach.t_m + SKIN_M, far_m)
                 && passage.t_m > reach.t_m + PROGRESS_M
             {
@@ -380,7 +380,7 @@ impl Environment {
     /// hollow's end, the normal there, and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
-        // The index lists hollows by the chainage of their openings. Deeper in the rock, a hollow may meet any other
+        // The index lists hollows by the chainage of their openings. Deeper in the rock, a ray may pass into any other
         // hollow.
         let (near, all) = if on_wall {
             (self.hollows_by_chainage.near(reach.from_m, reach.to_m), &[][..])

@@ -12,7 +12,7 @@ use super::widths::flat_floor_m;
 const BULKHEAD_SHARE: f64 = 0.6;
 /// Largest angle between a side tunnel and the perpendicular to the tunnel.
 const SLANT_DEG: f64 = 60.0;
-/// Distance from the upper edges of a rock trap at which the height of the floor is measured, m.
+/// The height of the floor is measured at this distance inside the upper edges of a rock trap, m.
 const INSIDE_M: f64 = 1e-6;
 /// Step along a hollow at which the hollow's length is sampled, m.
 const STEP_M: f64 = 0.5;
@@ -151,7 +151,7 @@ pub(super) fn gate(
         scale: enlarged,
     };
     let span_m = ground.span_m(chainage_m, width_m / 2.0);
-    // The bulkhead is at least as large as the slot. No ray reaches the part in the rock.
+    // The bulkhead may reach into the rock, because no ray gets there. It must be at least as large as the slot.
     let reach_m = enlarged * profile.farthest_m(profile.reference());
     let bulkhead = closed.then(|| Placed {
         shape: Solid::Block(

@@ -44,7 +44,8 @@ pub(super) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// Frame of the axis at `chainage_m`: along the tunnel, left, up. The origin is point (y, z) of the section.
+    /// Frame of the axis at `chainage_m`: along the tunnel, left, up. The origin is the point (y, z) of the
+    /// cross-section.
     pub(super) fn frame(&self, chainage_m: f64, [y, z]: [f64; 2]) -> Frame {
         Frame::across(self.tube.axis().station(chainage_m), [y, z])
     }

@@ -71,7 +71,7 @@ impl Roughness {
         let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else {
             return 0.0;
         };
-        // A bump of the rough wall reaches at most halfway to the sonar.
+        // The limit keeps a bump of the rough wall from reaching more than halfway to the sonar.
         (heights.at_m(point) / cosine.max(LEAST_COSINE)).max(-range_m / 2.0)
     }
 }

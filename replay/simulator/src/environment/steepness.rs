@@ -8,7 +8,7 @@ use super::bulge::Bulge;
 
 /// Number of directions in which a profile's wall is sampled.
 const DIRECTIONS: u32 = 2_000;
-/// Safety factor on the slope of the gauge, for directions between the samples.
+/// Safety factor on the slope of the gauge, which may be steeper between the sampled directions.
 const MARGIN: f64 = 1.05;
 /// Largest ratio of a point's change of chainage to the distance that the point moves. It occurs at the inner wall of
 /// the tightest allowed bend, which has a radius of twice the tunnel's half-width.
@@ -29,7 +29,7 @@ struct View {
     arc_m: f64,
     /// Distance from the reference point to the wall in this direction, m.
     radius_m: f64,
-    /// Distance from the reference point to the wall's tangent, m.
+    /// Distance from the reference point to the tangent of the wall in this direction, m.
     tangent_m: f64,
 }
 

@@ -37,7 +37,7 @@ const NORMAL_STEP_M: f64 = 1e-5;
 pub(super) struct Tube {
     axis: Axis,
     profile: Profile,
-    /// Centre of the floor, about which the profile is scaled.
+    /// Centre of the floor. The profile is scaled about this point.
     floor: Yz,
     scales: Scales,
     bulges: Vec<Bulge>,
@@ -299,8 +299,8 @@ impl Tube {
         left.map(|t_m| (t_m, None))
     }
 
-    /// Face of the plane between two stretches where the ray arrives at `t_m`; `None` if there is water beyond the
-    /// plane.
+    /// Face of the plane between two stretches, if the plane is wall where the ray meets it at `t_m`; `None` if water
+    /// is beyond.
     ///
     /// Only the end planes of a mesh can be wall.
     fn end_wall(&self, from: &Stretch, to: usize, ray: &Ray, t_m: f64) -> Option<Face> {

@@ -18,7 +18,7 @@ pub struct Called {
 pub enum Fate {
     /// The effect is simulated with its implied tables.
     Taken,
-    /// The effect is simulated with the tables in the scene.
+    /// The effect is simulated with tables that the scene itself has.
     Named,
     /// The effect isn't simulated: the scene asks only for the effects that it names itself.
     NotTaken,

@@ -124,7 +124,7 @@ impl Ray {
 }
 
 impl Parts {
-    /// Depth along the last axis at which the ray meets the triangle's plane.
+    /// Coordinate along the last axis at which the ray meets the triangle's plane.
     fn depth(&self) -> Option<f64> {
         let [u, v, w] = self.areas;
         let [a, b, c] = self.corners;

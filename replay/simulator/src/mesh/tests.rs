@@ -69,7 +69,7 @@ pub(super) fn cuboid(half: [f64; 3]) -> Triangles {
     Triangles { vertices: (0..8).map(corner).collect(), faces }
 }
 
-/// An icosahedron with each face split in four `levels` times. A function gives the radius of each vertex.
+/// An icosahedron with each face split in four `levels` times. `radius_m` is called for the radius of each vertex.
 pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let g = f64::midpoint(1.0, math::sqrt(5.0));
     let mut vertices: Vec<[f64; 3]> = Vec::new();
@@ -115,7 +115,7 @@ pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Tri
     Triangles { vertices, faces }
 }
 
-/// A tube about the x-axis with open ends. A function gives the radius of each vertex.
+/// A tube about the x-axis with open ends. `radius_m` is called for the radius of each vertex.
 pub(super) fn tube(rings: u32, around: u32, length_m: f64, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let mut triangles = Triangles::default();
     for i in 0..=rings {

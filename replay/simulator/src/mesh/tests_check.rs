@@ -76,7 +76,7 @@ fn body_with_holes_is_refused() {
     while t.faces[middle].iter().any(|corner| t.faces[0].contains(corner)) {
         middle += 1;
     }
-    // Removes all faces around one vertex that is not a corner of the icosahedron.
+    // Removes all faces around vertex 100, which is not a corner of the icosahedron.
     t.faces.retain(|face| !face.contains(&100));
     let expected =
         "the mesh has 2 hole(s) where it must be closed; the largest has 6 edges, one of them at (";

@@ -20,9 +20,9 @@ const KNOTS_AHEAD: i64 = 3;
 const BACK_MPS: f64 = 0.2;
 /// Distance of a missed stretch behind the vehicle, m. From this distance on, the pilot goes back for the stretch.
 const BEHIND_M: f64 = 3.0;
-/// Run-up before the second pass over a missed stretch, m.
+/// Distance before a missed stretch from which the pilot passes it a second time, m.
 const RUN_UP_M: f64 = 2.5;
-/// Period over which the ratio of driven to advised speed varies, s.
+/// Period of the variation of the driven speed relative to the advised speed, s.
 const HOLD_S: f64 = 20.0;
 /// Maximum total time that the pilot keeps the vehicle stationary because of advice, s.
 const MOST_STOOD_S: f64 = 120.0;
@@ -102,7 +102,7 @@ pub(super) struct Advised {
     farthest_m: f64,
     /// Missed stretches that the pilot has gone back for, each extended by 1 m at both ends.
     tried_m: Vec<[f64; 2]>,
-    /// Number of the next knot of the trajectory to decide.
+    /// Number of the next knot of the trajectory that the pilot decides.
     next: i64,
     ended_s: Option<f64>,
     /// Total time that the pilot has kept the vehicle stationary because of advice, s.

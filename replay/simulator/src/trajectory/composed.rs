@@ -65,7 +65,7 @@ impl Trajectory {
         self.duration_s
     }
 
-    /// Position `after_s` seconds after the start. The motion continues before the start and after the end.
+    /// Position `after_s` seconds after the start. Before the start and after the end, the motion continues.
     pub fn place(&self, after_s: f64) -> Place {
         let mut place = match &self.base {
             Base::Legs(legs) => legs.place(after_s),
@@ -79,7 +79,7 @@ impl Trajectory {
         place
     }
 
-    /// Adds a motion to the trajectory. The duration stays the same.
+    /// Adds the motion `knots` to the trajectory. The duration stays the same.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }

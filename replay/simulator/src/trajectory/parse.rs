@@ -15,7 +15,7 @@ use super::recorded;
 use super::waypoints::{self, Waypoint};
 use crate::random::Stream;
 
-/// Largest distance outside the tunnel at which a dive may start or end, m.
+/// A dive may start or end outside the tunnel, up to this distance, m.
 const OUTSIDE_M: f64 = 20.0;
 const CHAINAGE_M: RangeInclusive<f64> = -OUTSIDE_M..=1.0e6;
 const ACROSS_M: RangeInclusive<f64> = -200.0..=200.0;

@@ -115,7 +115,8 @@ fn pilot_goes_back_the_given_distance() {
         backs += gone.windows(2).filter(|w| w[0] >= 0.0 && w[1] < 0.0).count() as f64;
         lost_m += trajectory.duration_s() - 190.0;
     }
-    // Each reversal costs three seconds to go back and three seconds to make up for the distance. Starting costs 1.5 s.
+    // Each reversal costs three seconds for going back and three for driving the same distance again. The start of a
+    // dive costs 1.5 s.
     let each_s = (lost_m - 50.0 * 1.5) / backs;
     assert!((each_s - 6.0).abs() < 0.3, "{each_s} of {backs}");
 }
@@ -215,7 +216,8 @@ fn spline_acceleration_has_no_jumps() {
         let (before_s, behind_s) = (knot_s - 2.0 * step_s, knot_s + 2.0 * step_s);
         assert!((at(behind_s) - at(before_s)).abs() < 0.01);
         assert!((speed(behind_s) - speed(before_s)).abs() < 0.02);
-        // The third derivative is at most 8 times the largest coordinate, divided by 0.7^3.
+        // The third derivative is at most 8 times the largest coordinate divided by 0.7^3, so the acceleration changes
+        // little here.
         assert!((acceleration(behind_s) - acceleration(before_s)).abs() < 0.05, "{knot_s}");
     }
     for (end_s, sign) in [(0.0, -1.0), (43.0 * 0.7, 1.0)] {

@@ -111,7 +111,7 @@ fn detected_share_matches_the_sonar_equation() {
     }
 }
 
-/// The vehicle's own parts are detected even if no wall is detected.
+/// Parts of the vehicle are detected even if the wall's echoes are too weak.
 #[test]
 fn echoes_of_vehicle_parts_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";

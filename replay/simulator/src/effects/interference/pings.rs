@@ -20,7 +20,7 @@ pub(super) struct Ping {
     pub(super) origin: Point3<Tunnel>,
     pub(super) direction: Vec3<Tunnel>,
     pub(super) wall: Option<Point3<Tunnel>>,
-    /// Whether the ping is extrapolated and its `wall` is not yet computed.
+    /// Whether the ping is extrapolated, and its `wall` isn't computed yet.
     foreseen: bool,
 }
 

@@ -78,7 +78,8 @@ fn apparent_ranges_of_reflected_and_direct_pings_follow_from_time_and_path() {
         let expected_m = (way_m - earlier_ms / 1000.0 * SOUND_MPS) / 2.0;
         assert!((heard(-inwards, inwards, -earlier_ms).unwrap() - expected_m).abs() < 1e-6);
     }
-    // An even earlier ping arrives before this head's own ping, or within the least range.
+    // An even earlier ping of the other head arrives before this head's own ping or within its least range, so it isn't
+    // heard.
     assert_eq!(heard(-inwards, inwards, -3.4), None);
     // The other head now looks at a point of the wall outside this head's beam, so its ping isn't heard.
     assert_eq!(heard(-inwards, inwards + 0.1, -1.0), None);

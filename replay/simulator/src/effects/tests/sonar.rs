@@ -22,8 +22,8 @@ fn pair() -> Dive {
     Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]])
 }
 
-/// For each measurement of the dive, the values before and after its change by an effect; `None` if unchanged.
-/// `effect` is the effect's index in the scene.
+/// For each measurement of the dive, its values before and after an effect changes it; `None` if unchanged. `effect` is
+/// the effect's index in the scene.
 fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
     let of = |row: &TruthRow| {
         let cause = row.causes.iter().find(|cause| cause.effect == effect)?;

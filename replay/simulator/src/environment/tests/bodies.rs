@@ -1,4 +1,4 @@
-//! Features compared with an independent model and closed forms, and the index compared with a full search.
+//! Features compared with an independent model and closed forms, and the index of objects compared with a full search.
 
 use super::oracle::{Oracle, Shape, ellipsoid, upright};
 use super::*;
@@ -15,7 +15,7 @@ fn boulder_is_an_ellipsoid_sunk_into_the_floor() {
     let environment = parse(&text, &CERAN.profile());
     let hit = cast(&environment, [10.0, 0.0, 5.0], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (5.0 - 0.6)).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // Rays at the height of the centre, 0.2 m above the floor, along the tunnel and from the side.
+    // Rays at the height of the boulder's centre, 0.2 m above the floor: one along the tunnel, one from the side.
     let hit = cast(&environment, [5.0, 0.0, 0.2], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 4.0).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     let hit = cast(&environment, [10.0, 4.0, 0.2], [0.0, -1.0, 0.0]).unwrap();

@@ -125,7 +125,7 @@ fn mesh_of_the_profile_gives_the_ranges_of_the_profile() {
     assert!(into > 1_000 && out > 1_000 && through > 300, "{into} {out} {through}");
     let far = environment.cast(to_point([45.0, 0.0, 3.0]), to_vec([0.0, 1.0, 0.0]), 2.9);
     assert!(far.is_none());
-    // A ray along the axis meets no wall. A point outside the tunnel is not in water.
+    // A ray along the axis meets no wall. The second ray starts outside the tunnel, where there is no water.
     assert!(cast(&environment, [20.0, 0.1, 3.0], [1.0, 0.0, 0.0]).is_none());
     assert!(cast(&environment, [45.0, 3.1, 3.0], [0.0, 1.0, 0.0]).is_none());
 }
@@ -240,7 +240,7 @@ fn box_of_triangles_equals_a_solid_block() {
         let Some(hit) = hit else { continue };
         let wall_m = cast(&bare, ray.origin, ray.direction).map_or(f64::INFINITY, |hit| hit.range_m);
         let wanted_m = block.meet(&ray).map_or(wall_m, |(t_m, _)| t_m.min(wall_m));
-        // A ray that runs along a side of the box may hit the box or miss it.
+        // Only a ray that runs along a side of the box may hit or miss it.
         assert!((hit.range_m - wanted_m).abs() < 1e-9, "{ray:?} {hit:?} {wanted_m}");
         met += usize::from(hit.what == What::Feature(0));
     }

@@ -184,7 +184,8 @@ impl Oracle {
             && !self.solids.iter().any(|test| test(p, chart))
     }
 
-    /// Range of the first point along the ray that is not in water, searched in steps from range `from`.
+    /// Range of the first point along the ray that is not in water. The search goes in steps of `step` from range
+    /// `from` to `far`.
     pub(super) fn range(&self, ray: &Ray, from: f64, far: f64, step: f64) -> Option<f64> {
         let mut chart = self.search(ray.at(from));
         let mut t = from;
