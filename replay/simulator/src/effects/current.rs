@@ -15,8 +15,8 @@ use crate::trajectory::{Flow, Ground, Knots, Trajectory};
 const NAME: &str = "current";
 /// Number of random speeds drawn in each correlation time of the gusts.
 const STEPS: f64 = 8.0;
-/// Largest distance beyond an end of the tunnel to which a current may carry the vehicle, m. It equals that of
-/// trajectories.
+/// Largest distance beyond the tunnel's ends to which a current may carry the vehicle, m. Trajectories have this limit
+/// too.
 const OUTSIDE_M: f64 = 20.0;
 /// Interval at which the trajectory is checked against [`OUTSIDE_M`], s.
 const LOOK_S: f64 = 5.0;

@@ -142,7 +142,7 @@ impl Named {
         self.0.iter().any(|(kind, _)| kind.name() == name)
     }
 
-    /// Adds the effects from the `[effects]` tables of the TOML text `tables`. No effect may be present already.
+    /// Adds the effects from the `[effects]` tables of the TOML text `tables`. None of them may be present already.
     ///
     /// Errors: see [`EffectKind::read`].
     pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {
