@@ -1,5 +1,5 @@
-//! Compares the advised speed with the largest speed at which sections truly pass, found by simulated dives. Prints
-//! Markdown.
+//! Compares the advised speed with the largest speed at which sections truly pass. Simulated dives find the latter.
+//! Prints Markdown.
 //!
 //! `cargo bench -p headrace_tests --bench advice` runs all parts; `-- truth`, `-- sweep` or `-- planned` runs one part:
 //! - truth: ratio of the advised speed to the largest passing speed, over `--dives N` (100) steady and swaying dives
@@ -17,8 +17,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::{Compared, Outcome, Outing};
 
-/// Smallest allowed ratio of the advised speed to the largest passing speed: a tenth too slow. `MOST` is the largest:
-/// never too fast. Both allow for rounding, because the search for the passing speed uses steps of 2 %.
+/// Smallest allowed ratio of the advised speed to the largest passing speed. The advice may be up to a tenth too slow.
+/// `MOST` is the largest allowed ratio, because the advice may never be too fast. Both allow for rounding, because the
+/// search for the passing speed uses steps of 2 %.
 const LEAST: f64 = 0.899;
 const MOST: f64 = 1.005;
 
@@ -49,7 +50,7 @@ fn main() {
     }
 }
 
-/// Results of the work for all items, in the order of the items, computed on all cores.
+/// Runs the work for all items on all cores. Returns the results in the order of the items.
 fn all<T: Sync, R: Send>(of: &[T], run: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let work = || {

@@ -5,7 +5,7 @@
 //! - `wrong`: lists the stretches with a wrong cause;
 //! - `sections`: lists all sections;
 //! - `remedies`: also simulates the displayed remedy of each missed stretch;
-//! - `knowing`: prints how often a reference is right if it knows everything about a dive except its noise.
+//! - `knowing`: prints how often a reference is right that knows everything about a dive except its noise.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_tests::interventions::{Judged, Matrix, UpperBound, intervene, kinds, remedies};
 
-/// Ratio of the hole's diameter to the target after one injected cause is removed, for each cause: median and maximum
-/// over the stretch.
+/// For each injected cause, the ratio of the hole's diameter to the target without this cause: median, and in brackets
+/// the maximum, over the sections of a stretch.
 fn over_target(sections: &[Judged], target_m: f64) -> String {
     let of_cause = |k: usize| {
         let mut over: Vec<f64> =

@@ -3,9 +3,9 @@
 //!
 //! `cargo bench -p headrace_tests --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory`
 //! runs only the memory part. Absolute times drift on shared machines, but the ratios hold. The tree of the crate
-//! `kiddo` and the hash map answer queries at given points only. On a grid of points their D is accurate to some
-//! centimetres, while headrace and the triangulation are exact. kiddo before version 6 panicked if more than 32
-//! samples shared a coordinate; ideal heads produce only a few.
+//! `kiddo` and the hash map answer queries at given points only. They are queried on a grid of points, so their hole
+//! diameters D are only accurate to some centimetres. headrace and the triangulation are exact. kiddo before version 6
+//! panicked if more than 32 samples had a coordinate in common, but ideal heads produce only a few such samples.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::disallowed_types, reason = "std's hash map is a reference here")]
@@ -56,7 +56,7 @@ fn main() {
     memory();
 }
 
-/// Samples of ideal heads in time order; all heads are at the centre of a circular tunnel.
+/// Samples of ideal heads in time order. All heads are at the centre of a circular tunnel.
 fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -129,8 +129,7 @@ fn covering(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// Finds the holes of all sections with each method. The printed times are divided by the number of samples in these
-/// sections.
+/// Finds the holes of all sections with each method. The printed times are per sample in the sections.
 fn holes(what: &str, samples: &[WallSample]) {
     let store = covered(samples);
     let sections = || (0..SECTIONS).map(|k| 7.0 + SECTION_M * k as f64);
@@ -145,12 +144,12 @@ fn holes(what: &str, samples: &[WallSample]) {
     let (to_a_centimetre, _) =
         best(|| sections().map(|x| tolerant.largest(&store, x, x + SECTION_M).most_m).sum::<f64>());
     row(&what, per_sample(ours), "ours, to 1 cm", per_sample(to_a_centimetre));
-    // Search radius of the methods other than headrace's, m.
+    // Search radius of all methods except headrace's, m.
     let reach_m = exact.iter().copied().fold(0.0, f64::max) / 2.0 + 0.05;
     let around = |x: f64| {
         let window = (x - reach_m)..(x + SECTION_M + reach_m);
         let near = samples.iter().filter(move |s| window.contains(&s.x_m));
-        // Samples near the seam of the unrolled wall get an image on the seam's other side.
+        // Samples near an edge of the unrolled wall are copied to the other side, because arc length is cyclic.
         near.flat_map(move |s| [-perimeter_m(), 0.0, perimeter_m()].map(|turn| [s.x_m, s.arc_m + turn]))
             .filter(move |s| s[1] > -reach_m - 0.1 && s[1] < perimeter_m() + reach_m + 0.1)
             .collect::<Vec<_>>()
@@ -261,8 +260,8 @@ fn resident() -> f64 {
     pages.split(' ').nth(1).and_then(|pages| pages.parse::<f64>().ok()).unwrap_or(f64::NAN) * 4096.0
 }
 
-/// Measures the memory for ten hours of four heads in FAST mode, over 7 km and while parked. Each head sends 49 pings a
-/// second, with noise of some centimetres.
+/// Measures the memory that the samples of four heads in mode FAST need in ten hours, over 7 km and while parked. Each
+/// head sends 49 pings a second, with noise of some centimetres.
 fn memory() {
     for (what, length_m) in [("7 km in ten hours", 7_000.0), ("parked for ten hours", 0.0)] {
         let (before, perimeter_m) = (resident(), perimeter_m());

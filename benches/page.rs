@@ -2,11 +2,11 @@
 //! Markdown.
 //!
 //! It compares four cases: without a page, with a page and no viewer, with ten viewers (one never reads and one
-//! floods), and without a page beside two busy threads. The last case is the reference, because a flood and its
-//! server keep two cores busy. `cargo bench -p headrace_tests --bench page` takes about four minutes; `-- 20` makes
-//! each dive last twenty seconds. Ticks come every 20 ms by the clock. The viewers are threads of this process on the
-//! same cores. Absolute times drift on shared machines, mostly in the tails. The bench panics if the results of the
-//! four dives differ.
+//! floods), and without a page beside two busy threads. The last case is the reference for the third one, because a
+//! flooding viewer and its server keep two cores busy. `cargo bench -p headrace_tests --bench page` takes about four
+//! minutes; `-- 20` makes each dive last twenty seconds. Ticks come every 20 ms by the clock. The viewers are threads
+//! of this process on the same cores. Absolute times drift on shared machines, mostly the longest ones. The bench
+//! panics if the results of the four dives differ.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
@@ -154,7 +154,7 @@ fn messages_of(scene: &Scene, seconds: u64) -> Vec<Kept> {
     panic!("the scene lasts less than {seconds} s");
 }
 
-/// End of a tick in the dive's time; the first tick has number 1.
+/// Time of the dive at the end of a tick. The first tick has number 1.
 fn tick_end(number: u64) -> MonoNs {
     START + DurNs(TICK.0 * i64::try_from(number).unwrap())
 }
@@ -165,7 +165,7 @@ struct Measured {
     ticks: Vec<Duration>,
     /// Durations of the work that the page's collector does after each tick.
     collecting: Vec<Duration>,
-    /// Times from a tick's due time to the end of both the tick and the collector's work after it.
+    /// For each tick, the time from its due time until both the tick and the collector's work after the tick are done.
     ends: Vec<Duration>,
     samples: u64,
     digest: u64,
@@ -201,7 +201,7 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     }
     is_over.store(true, Ordering::Relaxed);
     if let Some(page) = page {
-        // This message follows the feed's schema, but its summary is empty.
+        // The last message to viewers follows the feed's schema, but its summary is empty.
         let digest = format!("{:016x}", armed.view().digest());
         page.end(Some(json!({"type": "end", "digest": digest, "exit": 0, "summary": {}, "way": null})));
     }
@@ -368,7 +368,7 @@ fn counts(page: &Page) -> String {
     )
 }
 
-/// The ten viewers of a dive; one of them never reads, and one floods.
+/// The ten viewers of a dive. One of them never reads, and one floods the page.
 struct Viewers {
     /// Number of samples that each viewer received, and whether it received the end.
     reading: Vec<JoinHandle<(u64, bool)>>,
@@ -399,7 +399,7 @@ impl Viewers {
         Self { reading, _never_reads: never_reads, flooding }
     }
 
-    /// Waits for the viewers' threads to end; the page's server must have ended before.
+    /// Waits for the viewers' threads to end. The page's server must have ended already.
     fn end(self) -> String {
         let seen: Vec<_> = self.reading.into_iter().map(|viewer| viewer.join().unwrap()).collect();
         let ended = seen.iter().filter(|(_, has_ended)| *has_ended).count();

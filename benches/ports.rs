@@ -1,11 +1,11 @@
 //! Delay of bytes on their way from a device to the loop's ring, and the CPU time of serving ports. Prints Markdown.
 //!
-//! Each figure is compared with that of a bare read loop, which runs at the same time on another port of the same
-//! kind. `cargo bench -p headrace_tests --bench ports` takes about two minutes; `-- 20` makes each part last twenty
-//! seconds. The parts are `-- latency`, `-- flag` and `-- cpu`. `flag` measures the time from the last byte of a
-//! return to the display of its flag at the end of the tick. It does so on idle and on busy cores. A thread of this
-//! process emulates the devices at their own rates. CAN (vcan0, up) and HID (`/dev/uhid`) are measured only where
-//! available, for instance in `tests/vm`. Absolute times drift on shared machines, mostly in the tails.
+//! Each figure is compared with that of a bare read loop, which runs at the same time on another port of the same kind.
+//! `cargo bench -p headrace_tests --bench ports` takes about two minutes; `-- 20` makes each part last twenty seconds.
+//! The parts are `-- latency`, `-- flag` and `-- cpu`. `flag` measures the time from the last byte of a return to the
+//! display of its flag at the end of the tick. It does so on idle and on busy cores. A thread of this process emulates
+//! the devices at their own rates. CAN (vcan0, up) and HID (`/dev/uhid`) are measured only where available, for
+//! instance in `tests/vm`. Absolute times drift on shared machines, mostly the longest ones.
 
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 #![expect(clippy::panic, reason = "the same")]
@@ -106,7 +106,8 @@ fn answer(program: &str, arguments: &[&str]) -> String {
     said.ok().filter(|said| !said.is_empty()).unwrap_or_else(|| format!("unknown ({program} doesn't say)"))
 }
 
-/// Messages on their way from a device to the loop with their send times, and the delays measured so far.
+/// Messages that are on their way from a device to the loop, with their send times. Also the delays that have been
+/// measured so far.
 #[derive(Clone, Default)]
 struct Course {
     sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
@@ -128,7 +129,8 @@ impl Finish {
         Self { course: course.clone(), waiting: VecDeque::new() }
     }
 
-    /// Returns the send time of a received message. Messages sent earlier and still waiting count as lost.
+    /// Returns the send time of a received message. Messages that were sent earlier, but haven't been received yet,
+    /// count as lost.
     fn sent(&mut self, bytes: &[u8]) -> Option<MonoNs> {
         self.look();
         let position = self.waiting.iter().position(|(_, message)| message == bytes)?;
@@ -170,7 +172,7 @@ impl Wire for TimedWire<'_> {
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
         let sent = self.finish.sent(bytes);
         // The send time is recorded before the loop can see the message. Data that was never sent gets its delivery
-        // time instead; sound lines carry no such data.
+        // time instead, but lines without faults carry no such data.
         self.finish.course.to_consume.push(sent.unwrap_or_else(now));
         self.wire.deliver(received, bytes);
         if let Some(sent) = sent {
@@ -219,7 +221,7 @@ impl Driver for Timed {
     }
 }
 
-/// The bare read loop, which is the reference: reads data as it arrives and records the delay.
+/// The bare read loop, which is the reference. It reads data as it arrives and records the delays.
 fn bare(connect: &Connect, finish: Finish) {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => {
@@ -261,7 +263,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     loop {
         let count = read(&mut buffer);
         let at = now();
-        // A count of zero means end of file: the device's end is closed at the end of the measurement.
+        // A count of zero means end of file, because the device's end of the line is closed after the measurement.
         if count == 0 {
             return;
         }
@@ -291,8 +293,8 @@ fn empty_loop(course: &Course) -> thread::Thread {
     empty.thread().clone()
 }
 
-/// The device's ends of one sensor's two ports. One port belongs to the driver and one to the reference. On a bus,
-/// both receive from the same port.
+/// The device's ends of the two ports of a sensor. One port belongs to the driver, the other one to the reference. On a
+/// bus, driver and reference receive from the same port.
 struct Ends {
     ours: EmulatedPort,
     twin: Option<EmulatedPort>,
@@ -320,7 +322,7 @@ impl Ends {
         self.twin.as_ref().map_or_else(|| self.ours.connect().clone(), |twin| twin.connect().clone())
     }
 
-    /// Writes a message to both ports and alternates which port is first.
+    /// Writes a message to both ports. `ours_first` tells whether the driver's port is first.
     fn write(&mut self, bytes: &[u8], ours_first: bool) {
         let [ours, twin] = &self.courses;
         let write = |stand: &mut EmulatedPort, courses: &[&Course]| {
@@ -351,9 +353,10 @@ impl Ends {
 struct Measured {
     /// Delays of messages through the driver and through the bare read loop, for each sensor.
     delays: Vec<[Vec<DurNs>; 2]>,
-    /// Delays of the driver to the end of the tick, and of the reference to the end of a pass of the empty loop.
+    /// Delays of messages until the end of the tick for the driver, and until the end of a pass of the empty loop for
+    /// the reference, for each sensor.
     ends: Vec<[Vec<DurNs>; 2]>,
-    /// CPU time of the threads that serve ports, s. `loop_s` and `bare_s` are the times of the loop and of the bare
+    /// CPU time of the threads that serve ports, s. `loop_s` is the CPU time of the loop, and `bare_s` that of the bare
     /// read loops.
     ports_s: f64,
     loop_s: f64,
@@ -362,7 +365,7 @@ struct Measured {
     took_s: f64,
 }
 
-/// Serves the sensors of a scene on these ends and measures for this duration.
+/// Serves the sensors of a scene on the ports `ends`, and measures for the duration `measured`.
 fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -432,7 +435,8 @@ fn named<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'stati
     thread::Builder::new().name(name.to_owned()).spawn(work).unwrap()
 }
 
-/// CPU time of this process's threads with this name prefix, s. Source: Linux, /proc/PID/task/TID/schedstat.
+/// CPU time of those threads of this process whose name begins with `beginning`, s. Source: Linux,
+/// /proc/PID/task/TID/schedstat.
 fn run_s(beginning: &str) -> f64 {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
     let of = |task: std::fs::DirEntry| {
@@ -443,7 +447,7 @@ fn run_s(beginning: &str) -> f64 {
     tasks.flatten().map(of).sum()
 }
 
-/// Emulates the devices: passes requests of hosts to the simulation, and the simulation's messages to both ports.
+/// Emulates the devices. Passes hosts' requests to the simulation, and its messages to both ports of each device.
 fn emulate(mut simulation: Simulation, mut ends: Vec<Ends>, ending: &AtomicBool) {
     let origin = now();
     let mut is_ours_first = false;
@@ -515,7 +519,7 @@ fn latency(measured: Duration) {
     println!();
 }
 
-/// Measures the time from a return's last byte to the display of its flag at the end of the tick.
+/// Measures the time from the last byte of a return until the flag that it causes is displayed at the end of the tick.
 fn flags(measured: Duration) {
     println!("Last byte of a head's return written to the end of its tick, us: p50, p99, p99.9, max\n");
     println!("| cores | returns | ours | an empty loop | ours above it |\n|---|---|---|---|---|");

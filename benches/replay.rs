@@ -102,7 +102,7 @@ fn replayed(log: &Path, report: &Path, threads: usize) -> Replayed {
     Replayed { took: started.elapsed(), own_mib, file_mib }
 }
 
-/// A memory figure of a process as the system reports it, MiB; zero if unavailable.
+/// One of the memory figures that the system reports for a process, MiB; zero if it isn't available.
 fn mib_of(child: &Child, key: &str) -> f64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
     let words = status.lines().find_map(|line| line.strip_prefix(key)).unwrap_or("0");

@@ -108,7 +108,7 @@ impl Decoder for Nothing {
 #[derive(Resource, Clone)]
 struct Ends(Arc<Mutex<Vec<(String, Instant)>>>);
 
-/// Adds a system after each stage of a world. The system records the stage's end.
+/// Adds a system after each stage of a part of the loop. The system records the stage's end.
 fn note_stages<S: Stage>(part: &mut Part<S>, ends: &Ends) {
     part.insert_resource(ends.clone());
     for stage in S::ALL {
@@ -119,7 +119,7 @@ fn note_stages<S: Stage>(part: &mut Part<S>, ends: &Ends) {
     }
 }
 
-/// Records when the alerter has finished and the outlets are next.
+/// An outlet that records when the alerter has finished, because outlets run directly after it.
 struct Alerted(Ends);
 
 impl Outlet for Alerted {
@@ -254,15 +254,15 @@ fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
     (data_s, messages)
 }
 
-/// Duration of each stage in each tick of a dive, us, and the loop after the dive.
+/// Returns the loop after a dive, and the duration of each stage in each tick, us.
 ///
-/// The first duration also contains all work before the first stage: filling rings, merging, and starting the
-/// schedule. Stages that run several times in a tick have the sum of their durations.
+/// The duration of the first stage also contains all work before it: filling rings, merging, and starting the schedule.
+/// If a stage runs several times in a tick, its durations are added up.
 fn spans(scene: &Scene) -> (Loop, Vec<(String, Vec<f64>)>) {
     let (_, messages) = messages_of(scene);
     let ends = Ends(Arc::default());
     let mut dive = noting(scene, &ends);
-    // Arming a loop runs a tick, too.
+    // The ends recorded so far are dropped, because arming a loop also runs a tick.
     ends.0.lock().unwrap().clear();
     let mut begins = Vec::new();
     run_noting(&mut dive, &messages, &mut begins);
@@ -346,7 +346,7 @@ fn idle_tick() {
     let mut world = World::new();
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());
-    // A schedule with as many chained systems as the loop has.
+    // The reference is a schedule with as many chained systems as the loop has.
     schedule.add_systems((|| nothing(), || nothing(), || nothing(), || nothing(), || nothing()).chain());
     let bare = best(|| {
         let started = Instant::now();
@@ -363,7 +363,7 @@ fn idle_tick() {
     );
 }
 
-/// Samples of ideal heads in time order; all heads are at the centre of a circular tunnel.
+/// Samples of ideal heads in time order. All heads are at the centre of a circular tunnel.
 fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -389,8 +389,8 @@ fn store(length_m: f64, capacity: usize) -> SampleStore {
     })
 }
 
-/// Stores all samples as the cover stage does: finds the nearest pass, stores the sample, and marks the touched
-/// sections.
+/// Stores all samples as the loop's cover stage does. For each sample, finds the nearest pass, stores the sample, and
+/// marks the sections that it touches.
 fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
     let mut coverage = Coverage {
         store: store(length_m, samples.len()),

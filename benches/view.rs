@@ -17,7 +17,7 @@ use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 
 const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_under_test");
-/// Number of timed passes over the log; the fastest pass counts.
+/// Number of timed passes over the log. The fastest pass counts.
 const PASSES: u32 = 5;
 
 /// A message that the loop puts into the recorder's queue.

@@ -36,7 +36,7 @@ impl Said {
     }
 }
 
-/// Prints the schedule's overhead in a scene whose only sensors are heads.
+/// Prints the overhead of the simulator's schedule in a scene whose only sensors are heads.
 pub(crate) fn bare() {
     let text = text(LENGTH_M, "phase_shift", "");
     let scene = scenes::scene_from(&text, &|name| scenes::vehicle_file(name).map(heads_alone));
@@ -66,7 +66,7 @@ pub(crate) fn bare() {
     println!("| over the hand-written program, percent | {:+.1} |", 100.0 * (whole_s / hand_s - 1.0));
 }
 
-/// The part of a vehicle file that describes the heads; it comes before all other sensors.
+/// The part of a vehicle file up to the last head. The heads come before all other sensors in the file.
 fn heads_alone(mut vehicle: Vec<u8>) -> Vec<u8> {
     let next = b"[[sensors]]\nid = \"ping_left\"";
     let heads = vehicle.windows(next.len()).position(|window| window == next);
@@ -85,13 +85,14 @@ fn dive(mut simulation: Simulation) -> Said {
 
 type Head = Box<dyn Emulator<Sounding>>;
 
-/// Heads in a straight tunnel, second by second, without systems, components or extension points for effects.
+/// The hand-written program: heads in a straight tunnel, second by second, without systems or extension points for
+/// effects.
 struct ByHand<'a> {
     profile: &'a Profile,
     heads: Vec<(Head, Mount)>,
     end: MonoNs,
     due: Vec<Sounding>,
-    /// Messages that haven't been sent yet: time, source, and start and end in `bytes`.
+    /// Messages that haven't been sent yet: time, source, and the start and end of the message in `bytes`.
     waiting: Vec<(MonoNs, usize, usize, usize)>,
     bytes: Vec<u8>,
 }

@@ -1,4 +1,4 @@
-//! Measures the time saved by simulating only the effects that a scene calls for, instead of every effect.
+//! Measures the time saved by simulating only the effects that a scene calls for, instead of all effects.
 //!
 //! `headrace simulate --explain=worth` measures the influence of effects.
 
@@ -7,7 +7,7 @@ use headrace_tests::scenes;
 
 use crate::workload::{EFFECTS, best, simulate};
 
-/// Shipped scenes on which the bench runs; each dive lasts some minutes.
+/// Shipped scenes that the bench simulates. Their dives last some minutes each.
 const SCENES: [&str; 6] = ["rehearsal", "steel", "collapse", "drop-outs", "leak-current", "small-pipe"];
 /// Effects that simulate broken devices. The bench never adds them to a scene.
 const FAULTS: [&str; 2] = ["stuck_range", "device_faults"];
@@ -37,16 +37,15 @@ fn scene(text: &str, seed: Option<u64>) -> Scene {
     scenes::seeded(text, &load, seed)
 }
 
-/// Compares the time to simulate the effects that a scene calls for with the time for every effect. The additional
-/// effects use this bench's parameters.
+/// Compares the time to simulate the effects that a scene calls for with the time for every effect. The effects that
+/// the scene doesn't call for get the parameters in this bench's own list.
 fn against_all(name: &str, text: &str, called: &Scene) {
     let mut all = text.to_owned();
     let mut count = called.simulated().len();
     let others =
         EFFECTS.iter().filter(|(name, _)| !FAULTS.contains(name) && !called.simulated().contains(name));
     for (name, keys) in others {
-        // Keys that name sensors of another vehicle are dropped; the effect then acts on every sensor that it
-        // supports.
+        // Keys that name sensors of another vehicle are dropped. The effect then acts on all sensors that it supports.
         let keys: Vec<&str> = keys.lines().filter(|line| !line.starts_with("sensors")).collect();
         let with = format!("{all}\n[effects.{name}]\n{}\n", keys.join("\n"));
         // The bench leaves out effects that are impossible in this scene.

@@ -65,7 +65,7 @@ fn cost() {
                 simulate(&all)
             }],
         );
-        // A current changes the dive's duration, so times are scaled to equal durations.
+        // A current changes the duration of the dive. CPU times are therefore scaled to equal durations.
         let scale = |scene: &Scene| {
             Simulation::new(scene).map_or(1.0, |simulation| LENGTH_M / SPEED_MPS / simulation.duration_s())
         };
@@ -78,7 +78,7 @@ fn cost() {
     }
 }
 
-/// Simulates the whole tunnel with all effects.
+/// Measures the time to simulate a dive through the whole tunnel with all effects.
 fn seven_kilometres() {
     let all = scene(6990.0, "sector_offset", &named(&EFFECTS));
     let duration_s = Simulation::new(&all).unwrap().duration_s();

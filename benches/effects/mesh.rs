@@ -12,7 +12,7 @@ const EFFECTS: [(&str, &str); 2] = [
     ("occlusion, and a beam of 16 rays", "motion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\n"),
 ];
 const WALL: &str = "[[tunnel.features]]\nkind = \"mesh\"\nfile = \"rock.ply\"\nrole = \"wall\"\n";
-/// Number of points around the profile. `RINGS` is the number along the tunnel. They give a million triangles in 150 m.
+/// Number of points around the profile. `RINGS` is the number along the tunnel. In 150 m they give a million triangles.
 const SIDES: u32 = 400;
 const RINGS: u32 = 1_250;
 const LENGTH_M: f64 = 150.0;
@@ -51,7 +51,7 @@ fn rough(profile: &Profile) -> Vec<u8> {
     bytes
 }
 
-/// Prints the speed of simulated dives along both walls.
+/// Prints the speed of simulated dives along the wall of triangles and along the profile.
 pub(crate) fn mesh() {
     let scene = |effects: &str, tunnel: &str, rock: &[u8]| {
         let text = format!(

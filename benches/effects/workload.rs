@@ -1,4 +1,4 @@
-//! Effects and scenes that the parts measure, and the measurement itself.
+//! Effects and scenes that the parts of the bench measure, and functions for measuring.
 
 use headrace_oracle::timed;
 use headrace_simulator::{Scene, Simulation};
@@ -62,7 +62,7 @@ pub(crate) fn simulate(scene: &Scene) -> f64 {
     timed(|| while simulation.advance() {}).1
 }
 
-/// Minimum time that each piece of work takes over all rounds, s. Each round runs every piece once.
+/// Shortest time that each piece of work takes in any of the rounds, s. Each round runs every piece once.
 pub(crate) fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut least = [f64::INFINITY; N];
     for _ in 0..rounds {

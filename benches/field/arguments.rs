@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use headrace_tests::field_table::PLACES;
 
-/// Number of dives of a cell, in a full run and with `--quick`. A full run takes a quarter of an hour on two cores.
+/// Number of dives of each cell: first in a full run, then with `--quick`. A full run takes a quarter of an hour on two
+/// cores.
 const SEEDS: [u64; 2] = [2, 1];
 /// Vehicles that dive in a run with `--quick`. Such a run also leaves out the place in the middle of the tunnel.
 const QUICK_VEHICLES: [&str; 2] = ["vita1", "vita2-4"];
@@ -13,17 +14,17 @@ const QUICK_VEHICLES: [&str; 2] = ["vita1", "vita2-4"];
 pub(crate) struct Arguments {
     /// Whether to run only a tenth of the dives.
     pub(crate) quick: bool,
-    /// Selected parts of a cell's name; `*` matches any part.
+    /// Parts of the names of the selected cells. `*` matches any part.
     pub(crate) cell: Vec<String>,
     /// Number of dives of each cell.
     pub(crate) seeds: u64,
     /// Seed of the first dive of each cell.
     pub(crate) from_seed: u64,
-    /// Length of each dive, m; it overrides the vehicle's own length.
+    /// Length of each dive, m. It overrides the default length of the vehicle's dives.
     pub(crate) metres: Option<f64>,
     /// JSON file to which the figures of all cells are written.
     pub(crate) json: PathBuf,
-    /// CSV file for the table in which each row combines all places; `None` writes no table.
+    /// CSV file for the table in which each row combines all places. If it is `None`, the table isn't written.
     pub(crate) csv: Option<PathBuf>,
 }
 
@@ -73,7 +74,7 @@ impl Arguments {
         !skipped && name.iter().zip(&self.cell).all(named)
     }
 
-    /// Place that the arguments select by its chainage, if the table doesn't contain it.
+    /// Place that the arguments select by its chainage, if it isn't one of the table's places.
     pub(crate) fn own_place_m(&self) -> Option<(&str, f64)> {
         let place = self.cell.get(2).filter(|place| PLACES.iter().all(|(known, _)| known != place))?;
         Some((place, place.parse().ok()?))

@@ -2,8 +2,9 @@
 
 use headrace_tests::field_table::{Cell, Condition, Driven, Figures, KINDS_OF_SOURCES};
 
-/// Bounds of a cell's figures. They are the largest share of false fails among sections with a true hole below 0.9
-/// times the target, the largest undecided share of the length, and the smallest passed share of the passable length.
+/// Bounds of a cell's figures. The first is the largest share of false fails among the sections with a true hole below
+/// 0.9 times the target. The second is the largest undecided share of the length. The third is the smallest passed
+/// share of the passable length.
 struct Bounds {
     false_fails: f64,
     cannot_say: f64,
@@ -49,8 +50,8 @@ impl Missed {
         let first_go =
             matches!(cell.driven, Driven::Planned | Driven::Stood | Driven::Swung | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
-        // The holes D and D_true are comparable only after a single visit: D is the best of several visits, but D_true
-        // combines all visits. In the `Lively` condition, the pilot also goes back.
+        // The holes D and D_true are comparable only if there was a single visit. After several visits, D is that of
+        // the best visit, but D_true combines all visits. In the `Lively` condition, the pilot also goes back.
         let once = match cell.driven {
             Driven::Back => false,
             Driven::Planned | Driven::Stood | Driven::Swung | Driven::Times(_) => {
@@ -99,7 +100,7 @@ impl Missed {
     }
 }
 
-/// Ratio of the advised speed to the largest speed that the paper's Eq. 16 gives.
+/// Ratio of the median advised speed to the largest speed that the paper's Eq. 16 gives.
 pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
     figures.advised_mps() / cell.vehicle.edge_mps
 }

@@ -49,7 +49,7 @@ fn run(cells: &[NamedCell], arguments: &Arguments) -> Vec<Figures> {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(NamedCell { cell, .. }) = cells.get(number) else { return done };
-            // A dive of several hours runs with one seed only.
+            // A dive of several hours is simulated with one seed only.
             let count = if cell.let_in_m.is_some() { 1 } else { arguments.seeds };
             let seeds = arguments.from_seed..arguments.from_seed + count;
             let length_m = arguments.metres.unwrap_or(cell.vehicle.length_m);

@@ -41,13 +41,13 @@ pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
             }
         }
     }
-    // The longest dives run first. If they ran last, one core would be idle at the end.
+    // The longest dives run first. Otherwise, one core is idle while the other one finishes them.
     cells.sort_by_key(|named| named.cell.let_in_m.is_none());
     cells
 }
 
-/// Whether the table contains a cell. Cells with wrong settings or broken devices run at one place only, unless
-/// they are selected. A single vehicle drives from the launch to the far place.
+/// Whether the table contains a cell. Unless the arguments select them, cells with wrong settings or broken devices are
+/// in the table at one place only. Only one vehicle drives from the launch to the far place.
 fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, speed]: [&str; 2]) -> bool {
     if place == DRIVEN_THERE.0 {
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";
@@ -61,14 +61,14 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if speed == "swung" && !of_mounts.contains(&condition) && arguments.cell.is_empty() {
         return false;
     }
-    // The middle place runs for few cells, because it only shows that results don't depend on the place.
-    let is_covered_elsewhere = place != "3000"
+    // Few cells have the middle place, because it only shows that results don't depend on the place.
+    let told_apart = place != "3000"
         || ["vita1", "vita2-4"].contains(&vehicle.name) && ["planned", "advised"].contains(&speed);
     if !is_covered_elsewhere && arguments.cell.is_empty() {
         return false;
     }
-    // Results under these conditions don't depend on the place.
-    let anywhere = [Condition::Declared, Condition::AsBuilt, Condition::Altered];
+    // Cells with these conditions are near the portal only, because their results don't depend on the place.
+    let anywhere = [Condition::Told, Condition::AsBuilt, Condition::Altered];
     if anywhere.contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);
     }
@@ -116,8 +116,7 @@ pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
     cells.iter().zip(figures).map(of_cell).collect()
 }
 
-/// Cells for the documented table, each with the dives of all places combined. The printed table keeps places
-/// separate.
+/// Cells for the documented table. Each cell combines the dives of all places, which the printed table keeps separate.
 pub(crate) fn pooled(cells: &[NamedCell], figures: &[Figures]) -> (Vec<NamedCell>, Vec<Figures>) {
     let mut pools: Vec<(NamedCell, Figures)> = Vec::new();
     for (NamedCell { name: [vehicle, condition, _, speed], cell }, figures) in cells.iter().zip(figures) {

@@ -12,7 +12,7 @@ use nalgebra_of_peers as peers;
 
 use crate::dive::Dive;
 
-/// Indices of the measured states: the three attitude errors.
+/// Indices of the states that a reading measures: the three attitude errors.
 const MEASURED: [usize; 3] = [6, 7, 8];
 const NOISE: f64 = 1e-3;
 const INNOVATION: f64 = 1e-3;
@@ -28,7 +28,7 @@ pub(crate) fn factors<const N: usize>() -> Factors<N> {
     factors
 }
 
-/// Element (i, j) of an epoch's transition matrix; filters with fewer states use its upper left part.
+/// Transition matrix of an epoch. Filters with fewer states use its upper left part.
 fn transition() -> [[f64; ERRORS]; ERRORS] {
     let transition = Dive::under_way().leg().transition(&Settings::default());
     let columns: [[f64; ERRORS]; ERRORS] = core::array::from_fn(|j| {
@@ -39,7 +39,7 @@ fn transition() -> [[f64; ERRORS]; ERRORS] {
     core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]))
 }
 
-/// Hand-written filter on nalgebra's matrices of fixed size; its update uses Joseph's form.
+/// Hand-written filter on nalgebra's matrices of fixed size. Its update uses Joseph's form.
 #[derive(Clone)]
 pub(crate) struct Dense<const N: usize> {
     x: SVector<f64, N>,

@@ -1,4 +1,4 @@
-//! A stationary vehicle in the middle of a tunnel; all sensors have ideal readings, so that nothing is gated.
+//! A stationary vehicle in the middle of a tunnel. All sensors have ideal readings, so that the filter rejects none.
 
 use headrace_fusion::filter::clones::ErrorClones;
 use headrace_fusion::filter::context::Context;
@@ -23,7 +23,7 @@ pub(crate) const GRAVITY_MPS2: f64 = 9.806_65;
 pub(crate) const SAMPLE_S: f64 = 0.01;
 const SAMPLE: DurNs = DurNs(10_000_000);
 const SAMPLES: usize = 10;
-/// Number of epochs in two minutes, enough to fill all clones.
+/// Number of epochs before the measurement: about two minutes, enough to fill all clones of past poses.
 const EPOCHS_BEFORE: usize = 1300;
 /// The echosounders look left, right and up.
 const YAWS_AND_PITCHES: [(f64, f64); 3] =
@@ -104,7 +104,7 @@ impl Dive {
         self.window.forget(at);
     }
 
-    /// Checks that all readings have been used, since otherwise the figures are meaningless.
+    /// Checks that the filter has used all readings, because the figures are meaningless otherwise.
     fn check(&self) {
         assert!(self.running.is_sound());
         for source in self.sources.iter().flatten() {
@@ -126,7 +126,7 @@ impl Dive {
         self.running.factors
     }
 
-    /// The filter's clones of past poses, and the time of the last epoch, which bounds the time of the last clone.
+    /// The filter's clones of past poses, and the time of the last epoch. No clone is later.
     pub(crate) fn clones(&self) -> (ErrorClones, MonoNs) {
         (self.running.clones.clone(), self.running.at)
     }

@@ -1,8 +1,8 @@
 //! Speed of the navigation filter's parts, each compared in the same run with a dense filter that has the same number
 //! of states. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench fusion` runs on one core in some seconds. The measured parts alternate, and
-//! the best round of each one counts. Absolute times drift on shared machines, but the ratios hold.
+//! `cargo bench -p headrace_tests --bench fusion` runs on one core in some seconds. The measured parts take turns, and
+//! the best round of each part counts. Absolute times drift on shared machines, but the ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
@@ -26,10 +26,10 @@ use dense::{Dense, Published};
 use dive::{Dive, GRAVITY_MPS2, SAMPLE_S};
 
 const ROUNDS: usize = 200;
-/// Runs per round: long enough for the clock's resolution, and short enough to avoid disturbances on a shared
-/// machine.
+/// Number of runs in each round. A round is long enough for the clock's resolution, and short enough to be often
+/// undisturbed on a shared machine.
 const RUNS: u32 = 500;
-/// Runs before restarting from the initial state, so that repetition doesn't make the state diverge.
+/// Number of runs after which the initial state is restored, so that repetition doesn't make the state diverge.
 const RUNS_FROM_ONE_START: u32 = 20;
 const BETWEEN_CLONES: DurNs = DurNs(2_000_000_000);
 

@@ -49,7 +49,7 @@ pub struct Advised {
     pub digest: u64,
 }
 
-/// Simulates a scene and replays it with this tick length. The source with the id `dumb` sends nothing.
+/// Simulates a scene and replays it with ticks of length `tick`. The source with the id `dumb` sends nothing.
 pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

@@ -32,7 +32,7 @@ pub trait Fault: Send {
         bytes
     }
 
-    /// Hook that runs in every cycle between the device's frames.
+    /// Hook that runs in every cycle of the device's thread, between frames.
     fn meanwhile(&mut self, line: &mut Wire) {
         let _ = line;
     }
@@ -46,7 +46,7 @@ impl Fault for Healthy {}
 /// The device's end of a line, which can be unplugged and plugged in again at the same place.
 pub struct End {
     connect: Connect,
-    /// Stable name of a serial port, a link to the system's name; `None` for other ports.
+    /// Stable name of a serial port: a symbolic link to the port's name in the system. `None` for other ports.
     link: Option<PathBuf>,
     stand: Option<EmulatedPort>,
     /// Whether the device shares the line of the previous sensor.
@@ -54,7 +54,8 @@ pub struct End {
 }
 
 impl End {
-    /// Creates the end of a serial port with a stable name in `folder`, like udev's links by identity.
+    /// Creates the end of a serial port. The port has a stable name in `folder`, like the links that udev makes by a
+    /// device's identity.
     pub fn serial(folder: &std::path::Path, name: &str) -> Self {
         let link = folder.join(name);
         let port = SerialPort::Path(link.display().to_string());
@@ -83,7 +84,7 @@ impl End {
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
-    /// A device's end that shares the line of the previous sensor; `other` is that sensor's end.
+    /// The end of a device on a line that it shares with another sensor. `other` is the end of that sensor.
     pub fn beside(other: &Self) -> Self {
         Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
     }
@@ -98,7 +99,7 @@ impl End {
         self.link.is_some()
     }
 
-    /// Returns the same end of the line, with the device not plugged in yet.
+    /// Returns the same end of the line, but the device isn't plugged in yet.
     #[must_use]
     pub fn absent(mut self) -> Self {
         self.unplug();
@@ -142,7 +143,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// Unplugs the device when the next request arrives.
+    /// Unplugs the device as soon as the next request from the host arrives.
     pub fn unplug(&self) {
         self.unplugged.store(true, Ordering::SeqCst);
     }
@@ -191,14 +192,14 @@ impl Wire {
         self.control.whole.fetch_add(u64::from(called), Ordering::SeqCst);
     }
 
-    /// Sends bytes to the host that aren't a whole frame, so they aren't counted.
+    /// Sends bytes to the host that aren't a whole frame. They aren't counted.
     pub fn part(&mut self, bytes: &[u8]) {
         if let Some(stand) = &mut self.end.stand {
             stand.write(bytes).unwrap();
         }
     }
 
-    /// Counts this number of frames as sent whole. They were sent without [`Wire::whole`].
+    /// Counts frames as sent whole that were sent without [`Wire::whole`].
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }
@@ -285,8 +286,8 @@ impl Life {
         self.step(None);
         let out = std::mem::take(&mut self.out);
         if unplugging && asked {
-            // A new request shows that the host has read all earlier answers. Before the unplugging, the host gets
-            // half of the answer to this request.
+            // A new request shows that the host has read all earlier answers. The host gets half of the answer to this
+            // request, and then the device is unplugged.
             if let Some(frame) = out.first() {
                 self.wire.part(&frame[..frame.len() / 2]);
             }
@@ -317,7 +318,7 @@ impl Life {
     }
 }
 
-/// Passes received bytes to a device and lets it measure; the measured values are constant.
+/// Passes received bytes to a device and lets it measure. The measured values are always the same.
 fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
     match device {
         Emulated::Head(device) | Emulated::Echosounder(device) => {
@@ -334,7 +335,7 @@ fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<
     }
 }
 
-/// Passes received bytes to a device and lets it measure the values from `feel`.
+/// Passes received bytes to a device and lets it measure. The values that it measures come from `feel`.
 pub(crate) fn step<M: Measurement>(
     device: &mut dyn Emulator<M>,
     heard: Option<&[u8]>,

@@ -22,7 +22,7 @@ pub struct Figures {
     pub up_m: f64,
     /// Chainage error, m.
     pub along_m: f64,
-    /// Error of the vehicle's displacement during one turn of a head, m.
+    /// Error of the estimated displacement of the vehicle during one turn of a head, m.
     pub turn_m: f64,
     /// Reported standard deviation of the displacement during one turn of a head, m.
     pub turn_arc_m: f64,
@@ -65,7 +65,8 @@ pub fn figures(track: &Track) -> Figures {
     }
 }
 
-/// Errors of the vehicle's displacement during one turn of a head, with their reported standard deviations.
+/// Errors, along the tunnel, of the vehicle's estimated displacement during one turn of a head, m. Each error comes
+/// with its reported standard deviation.
 pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
     let mut before = 0;
     let mut turns = Vec::new();
@@ -84,7 +85,8 @@ pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
 
 /// Settings that match the field scene's sensor effects.
 ///
-/// In this scene the echosounders' beams are rays, not cones. The rounding of cable and depth is stated as noise.
+/// In this scene the echosounders' beams are rays, not cones. The settings state the rounding of cable and depth as
+/// noise.
 pub const SETTINGS: &str = "[navigation]
 gyro_noise_degps_rthz = 0.007
 accel_noise_mps2_rthz = 0.001
@@ -106,7 +108,7 @@ return_sd_m = 0.011
 
 [heads]";
 
-/// The field scene with this length.
+/// The scene `vita1-field`, shortened to `length_m`.
 pub fn field(seed: u64, length_m: f64) -> Scene {
     field_with(seed, length_m, SETTINGS, "")
 }

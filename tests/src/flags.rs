@@ -1,10 +1,10 @@
 //! Finds the moment from which driving on can no longer undo the fail of a section. It uses the poses and samples of a
 //! dive.
 //!
-//! A place has failed for good at the first moment when both of these conditions hold. First, an empty circle about
-//! the place is larger than the target plus an allowance for position errors. Second, the reach of all heads lies
-//! beyond this circle, so that no head on a vehicle in forward motion can put a sample into it. The reach of a head
-//! is the wall that rays in the head's plane meet at its present attitude.
+//! A place has failed for good at the first moment when both of these conditions hold. First, an empty circle about the
+//! place is larger than the target plus an allowance for position errors. Second, the reach of all heads lies beyond
+//! this circle. While the vehicle moves forwards, no head can put a sample into it any more. The reach of a head is the
+//! wall that the head can hit from its present position and attitude.
 
 use std::ops::Range;
 
@@ -20,10 +20,10 @@ use headrace_oracle::wall::Wall;
 pub const EVERY: DurNs = DurNs(100_000_000);
 /// Number of rays cast in all directions round a head.
 const RAYS: u32 = 48;
-/// Number of parts into which a section is divided for the search for the section's earliest fail.
+/// Number of parts into which a section is divided when its earliest fail is searched for.
 pub const PARTS: u32 = 16;
-/// Tolerance of the chainage from which all heads have passed the wall, m. The program updates this chainage five times
-/// a second, and takes the farthest wall as the reach of a tilted head.
+/// Tolerance of the chainage from which all heads have passed the wall, m. The program's own value may differ by this
+/// much. It is updated five times a second, and uses the farthest wall as the reach of a tilted head.
 pub const NEAR_M: f64 = 0.12;
 /// Distance below which a backward motion of the vehicle counts as sway, m.
 const WAY_BACK_M: f64 = 0.05;
@@ -39,7 +39,7 @@ pub struct Reached {
     pub front_m: f64,
 }
 
-/// Computes the reach of the heads at intervals during a dive.
+/// Computes the reach of the heads at intervals of [`EVERY`] during a dive.
 pub fn reached(dive: &Dive) -> Vec<Reached> {
     let mut all: Vec<Reached> = Vec::new();
     for (index, ping) in dive.pings.iter().enumerate() {
@@ -54,7 +54,7 @@ pub fn reached(dive: &Dive) -> Vec<Reached> {
     all
 }
 
-/// Chainage from which on all heads pass every place, m. It depends on where the heads started.
+/// Chainage from which on all heads pass every place, m. The places where the heads started determine it.
 pub fn all_passed_from_m(reached: &[Reached]) -> f64 {
     reached.iter().map(|reached| reached.front_m).fold(f64::INFINITY, f64::min)
 }
@@ -76,10 +76,10 @@ fn ends_m(dive: &Dive, pose: &Pose) -> [f64; 2] {
     [rear_m, front_m]
 }
 
-/// In a section, smallest chainage of the centre of an empty circle that has this radius and lies wholly beyond
-/// `passed_m`.
+/// Smallest chainage, within a section, at which the centre of an empty circle can lie. The circle's radius is over
+/// `radius_m`, and all of the circle lies beyond `passed_m`.
 ///
-/// The resolution is one part of the section ([`PARTS`]), and the result is never too small.
+/// The result is never too small. It is too large by at most one part of the section ([`PARTS`]).
 pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, passed_m: f64) -> Option<f64> {
     let from_m = from_m.max(passed_m + radius_m);
     if from_m >= to_m { None } else { first_in_m(wall, [from_m, to_m], radius_m, PARTS) }
@@ -107,14 +107,14 @@ pub fn wall_until(dive: &Dive, until: MonoNs) -> Wall {
     Wall::new(samples.map(|sample| sample.place), dive.profile.perimeter_m()).unwrap()
 }
 
-/// The flag of a section: when it was due, and when the loop raised and cleared it.
+/// The flag of a section, with the times at which the flag was due and at which the loop raised and cleared it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flag {
     /// Chainage of the section's start, m.
     pub start_m: f64,
     /// First moment after which forward motion can't undo the fail, seconds.
     pub due_s: Option<f64>,
-    /// Earliest possible value of `due_s`, given the resolution of one part of a section, seconds.
+    /// Earliest possible value of `due_s`, seconds. It allows for the resolution of the search, one part of a section.
     pub may_s: Option<f64>,
     /// End of the dive, seconds.
     pub end_s: f64,
@@ -122,7 +122,7 @@ pub struct Flag {
     pub raised_s: Option<f64>,
     /// Time at which the loop cleared the flag, seconds.
     pub cleared_s: Option<f64>,
-    /// Distance that the heads' reach moved between the due moment and the raising of the flag, m.
+    /// Distance by which the heads' reach moved on between the due moment and the raising of the flag, m.
     pub late_m: Option<f64>,
     /// Whether the section fails in the end, with all samples of the dive.
     pub fails: bool,
@@ -143,8 +143,8 @@ impl Flag {
 /// Trajectory and samples of a dive that goes out, and perhaps back and forward again.
 pub struct Journey {
     reached: Vec<Reached>,
-    /// Indices of the longest backward motion in `reached`; an empty range at the end if the vehicle never turned
-    /// back.
+    /// Range of `reached` during the longest backward motion; an empty range at the end of `reached` if the vehicle
+    /// never turned back.
     back: Range<usize>,
     /// Samples on the wall at the end of the dive. `turned` has the samples at the moment when the vehicle turned back.
     whole: Wall,
@@ -183,13 +183,14 @@ impl Journey {
 
     /// Whether a flagged section had already failed for good when the flag was raised.
     ///
-    /// Only samples up to that moment count. A vehicle that sways back may fill the circle later.
+    /// Only samples up to the moment of the flag count, because a vehicle that sways back may fill the circle later.
     pub fn was_due(&self, dive: &Dive, flag: &Flag, sd: f64) -> bool {
         let report = &dive.report;
         let section = report.sections.iter().find(|section| section.start_m >= flag.start_m);
         let Some((section, raised_s)) = section.zip(flag.raised_s) else { return false };
         let raised = MonoNs(math::round_to_i64(raised_s * 1e9).unsigned_abs());
-        // The maximum reach over several pings is used, because estimated positions and attitudes are noisy.
+        // The largest reach of several pings around the flag is used, because estimated positions and attitudes are
+        // noisy.
         let near = |ping: &&Ping| raised.since(ping.received).0.abs() <= EVERY.0;
         let poses = dive.pings.iter().filter(near).filter_map(|ping| ping.pose);
         let rear_m = poses.map(|pose| ends_m(dive, &pose)[0]).fold(f64::MIN, f64::max);
@@ -212,7 +213,7 @@ impl Journey {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due_m = |wall: &Wall, early_m: f64| {
-            // In the search for the earliest due moment, the tolerance `NEAR_M` has the opposite sign.
+            // For the earliest possible due moment, the tolerance `NEAR_M` counts the other way.
             let near_m = if early_m > 0.0 { -NEAR_M } else { NEAR_M };
             let passed_m = all_passed_from_m(&self.reached) + near_m;
             Some(first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)
@@ -229,8 +230,8 @@ impl Journey {
         let late_m = || {
             let raised_s = section.flagged_s?;
             let before = |reached: &&Reached| reached.at.as_secs_f64() <= raised_s;
-            // Right after a jump of the reach or the standard deviation, the tick limits how early the flag can be
-            // raised.
+            // If the reach or the standard deviation jumps, the flag can be raised at the next tick at the earliest.
+            // Such a short delay isn't late.
             let soon_s = 2.0 * EVERY.as_secs_f64();
             first(0.0).filter(|due_s| raised_s > due_s + soon_s)?;
             Some(self.reached.iter().take_while(before).last()?.rear_m - due_m(&self.whole, 0.0)?)

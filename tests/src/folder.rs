@@ -8,13 +8,14 @@ use serde_json::Value;
 
 use crate::short_dive::{SCENE, VEHICLE};
 
-/// A test repeats a live dive until its report is as expected. The dive then lasts at most this long, s.
+/// A test repeats a live dive, each time four times as long, until its report is as expected. The first dive that is
+/// longer than this is the last, s.
 const LONG_S: u32 = 100;
 
 /// The program under test, ready for arguments.
 pub fn program() -> Command {
-    // Cargo passes the path to the tests that it runs. A test that runs without Cargo, as in `tests/vm`, searches
-    // Cargo's target folder.
+    // Cargo passes the program's path to tests. A test that runs without Cargo, as in `tests/vm`, searches the target
+    // folder.
     Command::new(std::env::var_os("CARGO_BIN_EXE_headrace_under_test").map_or_else(built, PathBuf::from))
 }
 
@@ -24,8 +25,8 @@ fn built() -> PathBuf {
     folder.join(format!("headrace_under_test{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// A new folder for one test, removed with its content. Commands run in this folder, so that their messages contain
-/// bare file names.
+/// A new folder for one test. The folder is removed with its content after the test. Commands run in this folder, so
+/// that their messages contain bare file names.
 pub struct Folder(PathBuf);
 
 /// Result of a run of the program.
@@ -81,8 +82,8 @@ impl Folder {
 
     /// Repeats a live dive with these arguments of `run` until `is_enough` accepts its report.
     ///
-    /// A dive takes 3 s, and longer on a busy machine. The log is `dive.mcap`. Returns the last answer and the last
-    /// report.
+    /// The first dive takes 3 s, and each further dive takes four times as long as the previous one, for busy machines.
+    /// The log is `dive.mcap`. Returns the last answer and the last report.
     pub fn dive_until(&self, arguments: &[&str], is_enough: impl Fn(&Value) -> bool) -> (Answer, Value) {
         let mut seconds = 3;
         loop {
@@ -113,7 +114,7 @@ impl Folder {
         answer
     }
 
-    /// Checks that `scene.toml` is refused with exit code 2 and these words, and that no log is written.
+    /// Checks that `scene.toml` is refused with exit code 2 and these words on stderr, and that no log is written.
     #[track_caller]
     pub fn refuses_scene(&self, words: &[&str]) {
         let answer = self.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
@@ -124,7 +125,7 @@ impl Folder {
         assert!(!self.path("dive.mcap").exists(), "a refused scene leaves no log");
     }
 
-    /// Runs `replay LOG --json` with more arguments; returns exit code and report.
+    /// Runs `replay LOG --json` with the arguments `further`. Returns exit code and report.
     pub fn replay(&self, log: &str, further: &[&str]) -> (Option<i32>, Value) {
         let answer = self.headrace(&[&["replay", log, "--json"], further].concat());
         let report = serde_json::from_str(&answer.stdout)

@@ -26,7 +26,7 @@ fn counted(codec: &mut impl Codec, bytes: &[u8]) -> u64 {
     codec.counts().good_frames
 }
 
-/// A fault that changes bytes in transit. Some changes are undetectable, because returns of heads have no checksum.
+/// A fault that changes bytes in transit. Some go undetected, because heads' returns have no checksum.
 pub struct Garbled {
     random: Random,
     change: fn(&mut Random, &[u8]) -> Vec<u8>,
@@ -67,7 +67,7 @@ pub fn thinned(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     bytes.iter().copied().filter(|_| !random.one_in(100)).collect()
 }
 
-/// A line fault made from a function, which is called with the number and the bytes of each frame.
+/// A line fault that a function causes. The function is called for each frame, with the frame's number and bytes.
 pub struct EachFrame<F>(pub F);
 
 impl<F: FnMut(u64, &[u8], &mut Wire) + Send> Fault for EachFrame<F> {

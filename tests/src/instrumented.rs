@@ -1,4 +1,4 @@
-//! Dives whose georeferenced pings are copied out of the loop, as input of coverage oracles.
+//! Dives whose georeferenced pings are copied out of the loop. They are the input of tests that recompute the coverage.
 
 use headrace_geometry::frames::{Mount, Pose};
 use headrace_geometry::math::TAU;
@@ -77,14 +77,14 @@ impl Dive {
 #[derive(Default)]
 struct Seen {
     pings: Vec<Ping>,
-    /// Place of every return. The loop may decide later whether the return is from the wall or doubtful.
+    /// Place of every return. The loop may decide only later whether a return comes from the wall or is doubtful.
     placed: Vec<Option<[f64; 3]>>,
     /// Source (number of the sensor) of each ping.
     sources: Vec<SourceId>,
 }
 
 impl Seen {
-    /// Copies the pings of the loop's last tick, and the returns classified in it.
+    /// Copies the pings of the loop's last tick, and the returns that were classified in this tick.
     fn note(&mut self, dive: &Loop) {
         for ping in dive.view().placed().pings() {
             self.placed.push(match ping.outcome {
@@ -112,7 +112,7 @@ impl Seen {
         }
     }
 
-    /// Stores a return with its ping, after the loop has classified the return.
+    /// Stores a return that the loop has classified with its ping. `words` is the digest's record of the return.
     fn note_return(&mut self, words: &[u64], is_wall: bool) {
         let [received, source, _, place @ ..] = words else { panic!("a ping's words") };
         let [x_m, y_m, z_m, arc_m] = [0, 1, 2, 3].map(|k| f64::from_bits(place[k]));
@@ -129,7 +129,7 @@ impl Seen {
     }
 }
 
-/// Simulates the scene of these two files and replays it in ticks of 20 ms.
+/// Simulates the scene in the files `vehicle` and `scene`, and replays it in ticks of 20 ms.
 pub fn dive(vehicle: &str, scene: &str) -> Dive {
     dive_in_ticks(vehicle, scene, Pace::default().tick)
 }
@@ -146,7 +146,8 @@ pub fn dive_with_profile(vehicle: &str, scene: &str, profile: Profile) -> Dive {
     watched(&scene, &scene.vehicle, Mission { profile, ..scene.vehicle.mission() }, Pace::default())
 }
 
-/// Simulates a scene with one vehicle and one polygon. The loop uses another vehicle file and another polygon.
+/// Simulates a scene with one vehicle and one polygon. The loop uses another vehicle file and another polygon, the
+/// second of each pair.
 ///
 /// A polygon has one corner `y_m,z_m` per line.
 pub fn dive_believing(vehicle: [&str; 2], polygon: [&str; 2], scene: &str) -> Dive {

@@ -1,5 +1,5 @@
-//! Fixtures of tests and benches: the program in its own folder, scenes, instrumented dives, oracles, and devices on
-//! real ports.
+//! Fixtures of tests and benches: the program in its own folder, scenes, instrumented dives, independent models to
+//! compare with, and devices on real ports.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

@@ -6,13 +6,13 @@ use std::path::Path;
 
 use mcap::{Attachment, Message, MessageStream, WriteOptions};
 
-/// Messages with the devices' raw data, in the order of the log file.
+/// Messages that contain the devices' raw data, in the order of the log file.
 pub fn raw_messages(log: &[u8]) -> Vec<Message<'_>> {
     let all = MessageStream::new(log).unwrap().map(Result::unwrap);
     all.filter(|message| message.channel.topic.starts_with("/raw/")).collect()
 }
 
-/// Writes a log with the `mcap` crate's own writer: these messages in this order, and the vehicle file if given.
+/// Writes a log with the `mcap` crate's own writer. It contains `messages` in order, and the vehicle file if given.
 pub fn write_log(path: &Path, options: WriteOptions, vehicle: Option<&str>, messages: &[Message<'_>]) {
     let mut writer = options.create(BufWriter::new(File::create(path).unwrap())).unwrap();
     if let Some(vehicle) = vehicle {

@@ -133,7 +133,7 @@ fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[
         format!("Host: {address}\r\n")
     };
     let further = headers.iter().fold(String::new(), |all, header| all + header + "\r\n");
-    // A test may give a length in its headers that differs from the body's length.
+    // If a test states a body length in its headers, even a wrong one, no other length is added.
     let states =
         headers.iter().any(|header| header.starts_with("Content-Length:") || header.contains("chunked"));
     let length = if states { String::new() } else { format!("Content-Length: {}\r\n", body.len()) };
@@ -168,11 +168,11 @@ pub struct Viewer {
     pub sections: BTreeMap<i32, SeenSection>,
     /// Number of wall samples received.
     pub samples: u64,
-    /// Number of section frames received, and number of sections in these frames.
+    /// Number of WebSocket frames with sections received, and number of sections in all of them.
     pub section_frames: (u64, u64),
     /// Last live state received.
     pub state: Value,
-    /// Last list of alerts, updated by all later changes.
+    /// Last list of alerts received, updated by all changes received since.
     pub alerts: BTreeMap<u64, Value>,
     /// Operator's notes received.
     pub notes: Vec<Value>,
@@ -184,7 +184,7 @@ pub struct Viewer {
     schema: Value,
 }
 
-/// Returns how a text message violates the schema of its type.
+/// Returns the ways in which a text message violates the schema of its type.
 fn faults(schema: &Value, text: &Value) -> Vec<String> {
     let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
         let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();
@@ -197,7 +197,7 @@ fn faults(schema: &Value, text: &Value) -> Vec<String> {
 }
 
 impl Viewer {
-    /// Connects to the page with this URL query, which begins with `?` or is empty.
+    /// Connects to the page. The URL query `query` is empty or begins with `?`.
     pub fn connect(
         serving: &Serving,
         query: &str,
@@ -252,7 +252,7 @@ impl Viewer {
         }
     }
 
-    /// Reads messages until one of this type arrives.
+    /// Reads messages until a message of type `kind` arrives.
     pub fn until_type(&mut self, kind: &str) -> Value {
         let before = self.others.len();
         self.until(kind, |viewer| viewer.others[before..].iter().any(|other| other["type"] == kind));
@@ -272,7 +272,7 @@ impl Viewer {
         }
     }
 
-    /// Reads messages until the dive has begun; before that, a replay can't be controlled.
+    /// Reads messages until the dive has begun. Before the beginning, a replay can't be controlled.
     pub fn until_begun(&mut self) {
         self.until("a state", |viewer| !viewer.state.is_null());
     }

@@ -1,4 +1,4 @@
-//! Finds the largest speed at which a vehicle's sections truly pass, to compare it with the advised and planned
+//! Finds the largest speed at which a vehicle's sections truly pass, for comparison with the advised and planned
 //! speeds.
 //!
 //! A dive passes if nearly all of its sections have the verdict "pass", and if no circle without true samples
@@ -17,21 +17,21 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// This time at the start of a dive isn't evaluated, s. The filter then learns the biases of the inertial unit.
+/// This time at the start of a dive isn't evaluated, s. During it, the filter learns the biases of the inertial unit.
 const SETTLES_S: f64 = 100.0;
 /// Length of the evaluated part of a dive, m.
 const JUDGED_M: f64 = 8.0;
-/// Fraction of the evaluated sections that must pass, as in a dive at the planned speed. None of them may pass although
+/// Fraction of the evaluated sections that must pass, as in a dive at the planned speed. No section may pass although
 /// its true hole exceeds the target.
 const PASSING: f64 = 0.95;
 /// One evaluated section out of this many may fail.
 const FAILING: usize = 20;
-/// Speeds above the first speed tried in the search for the largest passing speed, as multiples of the first speed.
-/// `BELOW` has the speeds below it.
+/// Speeds that are tried in the search for the largest passing speed, as multiples of the first speed. `ABOVE` has
+/// speeds above the first speed, `BELOW` has speeds below it.
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
 
-/// A vehicle with its mode, target and effects in a dive.
+/// A dive to simulate: a vehicle with its mode, target and effects.
 #[derive(Debug, Clone)]
 pub struct Outing {
     /// The vehicle of the field table, with its layout of heads and its vehicle file.
@@ -46,8 +46,8 @@ pub struct Outing {
     pub seed: u64,
     /// Chainage at which the dive starts, m.
     pub start_m: f64,
-    /// Fraction of the planned speed. The heads are in phase for this reduced speed, and the vehicle drives at this
-    /// speed before the first advice.
+    /// Fraction of the planned speed at which the vehicle drives before the first advice. The heads are in phase for
+    /// this reduced speed.
     pub planned_share: f64,
 }
 
@@ -111,18 +111,18 @@ impl Outcome {
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
-    /// Largest constant speed that exceeds the advice seldom enough, m/s. The fraction of updates in which this speed
-    /// exceeds the advice equals the fraction of sections that may fail.
+    /// Largest constant speed that exceeds the advice seldom enough, m/s. It may exceed the advice in the same fraction
+    /// of updates as the fraction of sections that may fail.
     ///
-    /// A swaying vehicle temporarily gets lower advice, which a constant speed can't follow.
-    pub fn advised_mps(&self) -> f64 {
-        let mut all: Vec<f64> = self.entries.iter().map(|entry| entry.advice.v_max_mps).collect();
+    /// Some excess is allowed, because a swaying vehicle gets lower advice for short times.
+    pub fn told_mps(&self) -> f64 {
+        let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }
 
-    /// Number of changes of the displayed advised speed per minute. A dive shorter than half a minute counts as half a
-    /// minute long, so that a single change doesn't give a high rate.
+    /// Number of times per minute that the displayed advised speed or its reason changes. A dive shorter than half a
+    /// minute counts as half a minute long, so that a single change doesn't give a high rate.
     pub fn changes_a_minute(&self) -> f64 {
         let changed = |pair: &[AdviceEntry]| {
             (pair[0].advice.v_max_mps - pair[1].advice.v_max_mps).abs() > 1e-6
@@ -147,8 +147,8 @@ impl Outing {
         }
     }
 
-    /// The vehicle and dive that belong to a seed. Consecutive seeds rotate through the vehicles. In every second
-    /// rotation the vehicles sway. All other values are drawn at random.
+    /// The vehicle and dive that belong to a seed. Consecutive seeds rotate through the vehicles. In every second round
+    /// through the vehicles, they sway. All other values are drawn at random.
     pub fn drawn(seed: u64) -> Self {
         let mut draw = Draw::new(seed ^ 0x5eed_ad71);
         let turn = usize::try_from(seed).unwrap();

@@ -1,7 +1,7 @@
 //! A driver with a longer silence timeout, for devices on a pseudoterminal.
 //!
-//! A kernel thread moves the bytes of a pseudoterminal. On a busy machine this thread can wait long for CPU time: up
-//! to 16 s with four busy loops on two cores.
+//! A kernel thread moves the bytes of a pseudoterminal. On a busy machine this thread can wait long for CPU time. The
+//! wait was up to 16 s with four busy loops on two cores.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
@@ -9,7 +9,7 @@ use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 /// Silence timeout that is longer than any stall of a pseudoterminal.
 const SILENCE_TIMEOUT: DurNs = DurNs::from_millis(120_000);
 
-/// A driver that differs from the driver that it wraps only in the silence timeout.
+/// A driver that wraps another driver, and differs from it only in the silence timeout.
 pub(crate) struct Patient(pub(crate) Box<dyn Driver>);
 
 impl Driver for Patient {

@@ -47,10 +47,10 @@ impl Terminal {
         }
     }
 
-    /// Fills the terminal's buffer until no more bytes are accepted. Later writes of the program block.
+    /// Fills the terminal's buffer until it accepts no more bytes, so that later writes of the program block.
     pub fn fill(&self) {
-        // The terminal's end is opened again, because non-blocking mode belongs to the open file and must not affect
-        // the program.
+        // The program's end of the terminal is opened again. Non-blocking mode belongs to one opening of a file, so the
+        // program isn't affected.
         let name = format!("/proc/self/fd/{}", self.end.as_raw_fd());
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK;
         let mut end = File::from(rustix::fs::open(name, flags, Mode::empty()).unwrap());
@@ -78,13 +78,13 @@ impl OnTerminal {
         command.env("TERM", "xterm").env_remove("NO_COLOR");
         command.stdin(slave.try_clone().unwrap()).stderr(slave.try_clone().unwrap()).stdout(slave);
         let child = command.spawn().unwrap();
-        // The `Command` value still holds copies of the terminal's end.
+        // The `Command` value still holds copies of the program's end of the terminal, which would keep it open.
         drop(command);
         let (sender, pieces) = sync_channel(1 << 10);
         let mut master = File::from(master);
         std::thread::spawn(move || {
             let mut bytes = [0; 4096];
-            // Reading fails as soon as no process has the other end open.
+            // Reading fails as soon as no process has the program's end open any more.
             while let Ok(read) = master.read(&mut bytes) {
                 if read == 0 || sender.send(bytes[..read].to_vec()).is_err() {
                     return;
@@ -135,7 +135,7 @@ impl Drop for OnTerminal {
     }
 }
 
-/// The lines as displayed, without colours. An overwritten line appears once for each of its versions.
+/// The lines as displayed, without colours. An overwritten line appears once for each displayed version.
 pub fn shown_lines(written: &str) -> Vec<String> {
     let mut plain = String::new();
     let mut rest = written;

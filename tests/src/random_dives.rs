@@ -83,8 +83,8 @@ pub struct Seeded {
     pub scene: String,
 }
 
-/// Three results: the tunnel's table, a range setting that reaches the walls, and the largest offset of a vehicle
-/// from the centre line, m.
+/// Draws a tunnel. Returns its table for the vehicle file, a range setting that reaches the walls, and the largest
+/// offset of a vehicle from the centre line, m.
 fn tunnel(kind: Kind, draw: &mut Draw) -> (String, u32, f64) {
     if kind == Kind::Wide {
         let width_m = draw.between(30.0, 36.0);
@@ -125,7 +125,7 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
         Kind::Sparse => draw.one_of(&["slow", "medium"]),
         _ => draw.one_of(&["medium", "fast", "faster", "fastest", "fastest"]),
     };
-    // Heads are at one place, one behind the other, or side by side. Some of the heads side by side face aft.
+    // Heads are all at one place, or one behind the other, or side by side. Side by side, some of them face aft.
     let places = if kind == Kind::Occluded { 2 } else { draw.below(3) };
     for head in 0..heads {
         let place = match places {
@@ -148,7 +148,7 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
     (text, aside_m)
 }
 
-/// Sensor tables for the vehicle's position.
+/// Tables of the sensors that determine the vehicle's position.
 pub const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"

@@ -40,7 +40,7 @@ radius_m = 3
 length_m = 20
 "#;
 
-/// A head with a turn time of some seconds.
+/// A head whose turns take some seconds.
 pub const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\n";
 /// An echosounder that is polled twenty times a second.
 pub const PING: &str = "plugin = \"ping1d\"\ninterval_ms = 50\n";
@@ -88,19 +88,20 @@ pub struct Rig {
 pub struct Ended {
     /// State of the dive at its end.
     pub view: View,
-    /// Counts of openings, losses and dropped packets of each line, and its last status.
+    /// For each line, its last status and the numbers of openings, losses and dropped packets.
     pub lines: Vec<LineHistory>,
     /// Report of the dive.
     pub report: Report,
 }
 
 impl Rig {
-    /// Starts the dive and the devices. All devices are plugged in at first, except those with an absent end.
+    /// Starts the dive and the devices. All devices are plugged in at first, except those whose end is absent
+    /// ([`End::absent`]).
     pub fn new(sensors: Vec<Sensor>) -> Self {
         Self::recorded(sensors, None)
     }
 
-    /// As [`Rig::new`]; records the dive to a new file.
+    /// As [`Rig::new`], and records the dive to the new file `log`, if given.
     pub fn recorded(sensors: Vec<Sensor>, log: Option<&Path>) -> Self {
         let places: Vec<String> = sensors.iter().map(|sensor| sensor.end.connect().to_string()).collect();
         let mut text = HEADING.to_owned();
@@ -172,7 +173,7 @@ impl Rig {
         view.clone()
     }
 
-    /// Runs the dive until the number of good frames of a sensor has grown by `more`.
+    /// Runs the dive until a sensor has `more` good frames more than now.
     #[track_caller]
     pub fn more(&mut self, number: usize, more: u64) -> View {
         let from = self.view.good[number];
@@ -193,8 +194,8 @@ impl Rig {
         self.end_but(None)
     }
 
-    /// As [`Rig::end`], but doesn't wait for the frames of the sensor `overrun`, which may have lost frames at a full
-    /// ring.
+    /// As [`Rig::end`], but doesn't wait for the frames of the sensor `overrun`, because a full ring may have dropped
+    /// some of them.
     #[track_caller]
     pub fn end_but(mut self, overrun: Option<usize>) -> Ended {
         for device in &self.devices {
@@ -237,7 +238,7 @@ impl Ended {
         assert_eq!((line.opened, line.lost, line.dropped), (1, 0, 0), "{line:?} {said:?}");
         assert_eq!(self.view.good[number], self.view.whole[number]);
         assert_eq!(self.report.sources[number].frames, self.view.whole[number]);
-        // On a busy machine, the first status may precede the first frame.
+        // On a busy machine, a status may be reported before the first frame arrives.
         let after_opening =
             said.strip_prefix(&["silent: the line is open, but no frame has arrived yet".to_owned()]);
         assert_eq!(after_opening.unwrap_or(said), ["running"], "the healthy sensor");
@@ -253,8 +254,8 @@ impl View {
         places: &[String],
     ) {
         let (devices, on) = devices;
-        // Sent frames are counted before received ones. So a frame that arrives in between never counts as sent but
-        // not received.
+        // Sent frames are counted before received ones. A frame that arrives between the two counts is therefore never
+        // counted as sent but not received.
         self.whole = on.iter().map(|line| devices[*line].control().whole()).collect();
         self.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         while let Some(status) = supervisor.next_status() {
@@ -314,7 +315,7 @@ pub fn emulated(text: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head, site: vehicle.site, polled: false })
 }
 
-/// Replays this log and returns its digest. The replay must report this number of dropped packets and no other loss.
+/// Replays the log `log` and returns the digest. The replay must report `dropped` dropped packets and no other loss.
 fn replayed(log: &Path, text: &str, dropped: u64) -> u64 {
     let document = Document::new("vehicle.toml", text);
     let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();

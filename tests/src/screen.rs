@@ -32,8 +32,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Runs the program in a folder on a terminal of `columns` columns. Its environment has these variables and
-    /// `TERM=xterm`.
+    /// Runs the program in a folder on a terminal of `columns` columns. It gets `TERM=xterm` and these variables.
     pub fn run(folder: &Folder, arguments: &[&str], columns: u16, variables: &[(&str, &str)]) -> Self {
         Self::sized(folder, arguments, (columns, 24), variables)
     }
@@ -57,13 +56,13 @@ impl Screen {
         command.envs(variables.iter().copied());
         command.stdin(end()).stdout(end()).stderr(end());
         let child = command.spawn().unwrap();
-        // As long as the `Command` value exists, it keeps the terminal open, even after the program's end.
+        // The `Command` value must be dropped, because it keeps the terminal open even after the program's end.
         drop(command);
         let mut reading = clone(&master);
         let (to, coming) = channel();
         thread::spawn(move || {
             let mut bytes = [0; 4096];
-            // On Linux, reading fails if no process has the terminal open.
+            // On Linux, reading fails once no process has the terminal open, which ends this loop.
             while let Ok(count @ 1..) = reading.read(&mut bytes) {
                 if to.send(bytes[..count].to_vec()).is_err() {
                     return;
@@ -102,14 +101,13 @@ impl Screen {
         terminal
     }
 
-    /// The page as text without trailing spaces, which the program writes or leaves out depending on the earlier
-    /// content.
+    /// The page as text without trailing spaces. The program may leave these out.
     pub fn page(&self) -> String {
         let page = self.terminal().screen().contents();
         page.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
     }
 
-    /// Waits until the page contains a text and no longer changes; returns the page.
+    /// Waits until the page contains a text and has stopped changing. Returns the page.
     #[track_caller]
     pub fn until_page(&self, text: &str) -> String {
         let mut before = String::new();

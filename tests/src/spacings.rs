@@ -3,9 +3,9 @@
 //!
 //! A *pass* over a place on the perimeter is one step of a head. Both pings of the step have a return, and the arc
 //! between them (the shorter way round) contains the place. The chainage of the pass is interpolated linearly on the
-//! unrolled wall. A step across pings without a return is no pass, because the places between its ends aren't
-//! sampled. A step is earlier than a sample if both of its ends are. The definitions don't say whether a series of
-//! steps includes its end points. Samples at such points therefore have two values.
+//! unrolled wall. A step across pings without a return is no pass, because the places between its ends aren't sampled.
+//! A step is earlier than a sample if both pings of the step are earlier. The definitions don't say whether a series of
+//! steps includes its end points. For samples at such points, both values are computed.
 
 use headrace_geometry::math;
 
@@ -19,25 +19,26 @@ const ROUNDING: f64 = 1e-9;
 pub struct Spacing {
     /// Chainage of the sample, m.
     pub x_m: f64,
-    /// T_x: distance in chainage to the nearest earlier pass. Two values: without and with the end points of series of
-    /// steps.
+    /// T_x: distance in chainage to the nearest earlier pass. It has two values: without and with the end points of
+    /// series of steps.
     pub t_x_m: [Option<f64>; 2],
     /// T_y: distance to the previous sample of the same head.
     pub t_y_m: Option<f64>,
-    /// Spacing T from T_x and T_y. Two values: without and with the end points of series of steps.
+    /// Spacing T, computed from T_x and T_y. It has two values, like T_x.
     pub t_m: [Option<f64>; 2],
 }
 
 struct Step {
     from: [f64; 2],
-    /// Step in chainage and arc length from `from`, the shorter way round the wall, m.
+    /// Change of chainage and arc length from `from` to the end of the step, m. The arc length changes along the
+    /// shorter way round the wall.
     by: [f64; 2],
-    /// Whether a step in the same direction precedes this step, and whether one follows it.
+    /// Whether a step in the same direction directly precedes this step, and whether one directly follows it.
     joined: [bool; 2],
 }
 
 impl Step {
-    /// Chainage at which the step passes over an arc length.
+    /// Chainage at which the step passes over the arc length `arc_m`; `None` if it doesn't.
     fn x_at(&self, arc_m: f64, perimeter_m: f64, with_ends: bool) -> Option<f64> {
         let along_m = math::wrap_signed(arc_m - self.from[1], perimeter_m);
         let share = along_m / self.by[1];

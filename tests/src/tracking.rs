@@ -21,7 +21,7 @@ use headrace_sensor::reading::Reading;
 use headrace_simulator::{START, Scene, Scenery, Simulation};
 use headrace_vehicle::NavigationConfig;
 
-/// Capacity for records of the navigation, more than a dive of an hour needs.
+/// Capacity of the queue for records of the navigation. A dive of an hour needs less.
 const MOST_SAID: usize = 1 << 20;
 
 /// A position fix that the loop requested, with the true pose at that time.
@@ -50,13 +50,14 @@ pub struct Track {
     pub fixes: Vec<Tracked>,
     /// Filter states at the ends of epochs, in time order.
     pub epochs: Vec<Epoch>,
-    /// Consistency statistics after each fused measurement: time of the last epoch, source, and statistics so far.
+    /// Consistency statistics after each fused measurement: time of the last epoch, number of the source, and
+    /// statistics up to this measurement.
     pub consistency: Vec<(MonoNs, usize, Consistency)>,
     /// Report of the dive.
     pub report: Report,
 }
 
-/// A time in which some sources are silent.
+/// A period of a dive in which some sources are silent.
 #[derive(Debug, Clone, Default)]
 pub struct Silence {
     /// Numbers of the silent sources.
@@ -119,7 +120,8 @@ impl Navigation for Truth {
 
 impl Transparent for Truth {}
 
-/// Simulates a scene and replays it with every sample at its true place.
+/// Simulates a scene and replays it with a navigation that knows the true pose, so that every sample is at its true
+/// place.
 pub fn true_dive(scene: &Scene) -> Track {
     let simulation = Simulation::new(scene).unwrap();
     dive(scene, Truth(simulation.scenery().unwrap().clone()), Silence::default())
@@ -133,7 +135,7 @@ struct RecordedNavigation<N> {
     said: SyncSender<Said>,
 }
 
-/// The recorded fixes and estimates are not part of a loop's snapshot.
+/// A loop's snapshot doesn't include the recorded fixes and estimates.
 impl<N: Transparent> Stateful for RecordedNavigation<N> {
     fn save(&self, to: &mut Saver) {
         self.inner.save(to);
@@ -186,7 +188,7 @@ pub fn filter(scene: &Scene) -> FilterNavigation {
     FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings)
 }
 
-/// Simulates a scene and replays it with this navigation.
+/// Simulates a scene and replays it with the navigation `inner`, while some sources are silent.
 pub fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

@@ -12,7 +12,7 @@ pub fn dive(scene: &Scene) -> JudgedDive {
     dive_believing(scene, &scene.vehicle)
 }
 
-/// Simulates a scene and replays it with another vehicle file, whose sensors must send the same bytes.
+/// Simulates a scene and replays it with another vehicle file, with sensors that send the same bytes.
 pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> JudgedDive {
     dive_noting(scene, believed, &mut |_| {})
 }

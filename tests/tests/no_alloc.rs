@@ -1,8 +1,8 @@
 //! The armed loop allocates nothing. The test runs a million packets of a four-head dive with recorder and notice
 //! outlet.
 //!
-//! The allocator counts calls on the loop's thread. clippy.toml bars lock types from the whole workspace, so this
-//! test doesn't check locks.
+//! The allocator counts calls on the loop's thread. This test doesn't check locks, because clippy.toml forbids lock
+//! types in the whole workspace.
 
 #![expect(clippy::unwrap_used, reason = "a failed step ends the test")]
 #![expect(
@@ -53,13 +53,13 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         count();
-        // SAFETY: as above.
+        // SAFETY: the caller upholds the allocator's contract.
         unsafe { System.dealloc(pointer, layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: as above.
+        // SAFETY: the caller upholds the allocator's contract.
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
@@ -122,7 +122,7 @@ fn million_packets_need_no_allocation() {
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
     app.add_plugin(&RecorderOutlet::new([port])).unwrap();
-    // Nobody empties the journal of the filter's steps either, so it also drops its oldest entries.
+    // Nobody empties the journal of the filter's steps either. It becomes full and drops its oldest entries.
     let (journal, steps) = Journal::new(1000);
     let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
     let profile = vehicle.tunnel.profile.clone();
@@ -152,7 +152,7 @@ fn million_packets_need_no_allocation() {
             allocated += allocations(|| consumed = dive.tick(until));
             packets += consumed;
             if consumed == 0 {
-                // The recorder falls behind, so the loop holds packets back. None of them is lost.
+                // The recorder has fallen behind, so the loop holds packets back and none is lost.
                 waited += 1;
                 std::thread::sleep(std::time::Duration::from_millis(1));
             }
@@ -171,7 +171,7 @@ fn million_packets_need_no_allocation() {
     assert!(written.messages >= packets as u64, "recorded input is never dropped");
 }
 
-/// The decoders get the bytes of these devices in pieces. Some of the bytes are damaged.
+/// The decoders get the bytes of their devices in pieces. Some of the bytes are damaged.
 #[test]
 fn decoders_of_other_vehicles_allocate_nothing() {
     let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };

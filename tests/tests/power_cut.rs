@@ -1,7 +1,7 @@
-//! `kill -9` at random moments. Every log is readable and loses the last second at most.
+//! `kill -9` at random moments. Every log is readable and loses at most the last second.
 //!
 //! The log contains everything that was displayed more than a second before the kill. The log's replay gives the same
-//! dive up to that moment, bit for bit.
+//! dive up to the log's end, bit for bit.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -19,7 +19,7 @@ const KILLS: usize = 200;
 const AT_ONCE: usize = 6;
 /// Longest time from the start of a dive to its kill, ms.
 const LONGEST_MS: u64 = 2200;
-/// Longest span of data that a power cut may lose.
+/// Longest span of data that a kill may lose.
 const MAY_COST: Duration = Duration::from_secs(1);
 
 /// A dive of a minute and a half. A part of it is too fast, so that there are flags to lose.
@@ -61,8 +61,8 @@ struct Count {
     lines: AtomicUsize,
     /// Number of recorded results that a replay of the log reproduced bit for bit.
     same: AtomicU64,
-    /// Longest time for which the test waited for this machine's disk or processor, ns. Other work may use both at the
-    /// same time.
+    /// Longest time for which the test waited for the machine's disk or processor, ns. It may wait because other work
+    /// uses them.
     late_ns: AtomicU64,
 }
 
@@ -89,8 +89,7 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // The second before the kill is counted from this moment, because the kill takes effect at some time after this
-    // moment.
+    // The kill takes effect a little later than this moment. The second before the kill is therefore counted from here.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();
@@ -100,7 +99,7 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
     (known.map(|(_, line)| line).collect(), ended)
 }
 
-/// Whether all these lines occur in `others`, in the same order.
+/// Whether all lines of `lines` occur in `others`, in the same order.
 fn is_subsequence(lines: &[String], others: &str) -> bool {
     let mut rest = others.lines();
     lines.iter().all(|line| rest.any(|other| other == line))
@@ -127,8 +126,8 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
     let which = format!("kill {number} after {after:?} ({arguments:?})");
 
     let answer = folder.headrace(&["verify", "--json", &log]);
-    let Ok(report) = serde_json::from_str::<Value>(&answer.stdout) else {
-        // The file or its header didn't exist yet, so the dive hadn't begun.
+    let Ok(told) = serde_json::from_str::<Value>(&answer.stdout) else {
+        // The log or its header didn't exist yet at the kill, so the dive hadn't begun.
         assert!(lines.is_empty(), "{which}: {}, but the pilot had read {lines:?}", answer.stderr);
         let early = ["could not open", "is not an MCAP file", "no vehicle file can be read"];
         assert!(early.iter().any(|words| answer.stderr.contains(words)), "{which}: {}", answer.stderr);

@@ -1,4 +1,4 @@
-//! Dives in a simulated world of faults. For every seed, they satisfy all invariants.
+//! Dives in a simulated world of faults. The dive of every seed must satisfy all invariants.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -16,7 +16,8 @@ const SEEDS: std::ops::Range<u64> = 0..300;
 /// detect the sabotage.
 const ENOUGH: u64 = 200;
 
-/// Runs a dive in the world of a seed, with all or some of its faults; returns its broken invariants and its results.
+/// Runs a dive in the world of a seed, with all or some of the world's faults. Returns the invariants that the dive
+/// breaks, and its results.
 fn lived(
     folder: &Folder,
     seed: u64,
@@ -28,7 +29,8 @@ fn lived(
     (broken(&lived, &replayed), lived)
 }
 
-/// Returns the fewest faults with which the world of a seed breaks an invariant, and the broken invariants, as text.
+/// Finds as few faults as possible with which the world of a seed breaks an invariant. Returns these faults and the
+/// broken invariants as text.
 fn reduced(folder: &Folder, seed: u64, sabotage: Option<Sabotage>, faults: &[Fault]) -> String {
     let left = fewest(faults, |faults| !lived(folder, seed, sabotage, Some(faults)).0.is_empty());
     let (broken, lived) = lived(folder, seed, sabotage, Some(&left));

@@ -41,7 +41,7 @@ impl Format for Candump {
                 out.extend(entry);
                 Step::Took(used)
             }
-            // At the end of the file, a line without a newline may be truncated anywhere.
+            // A last line without a newline may be truncated anywhere. If it can't be parsed, it counts as incomplete.
             Err(_) if newline.is_none() => Step::More,
             Err(why) => Step::Lost(used, why),
         }
@@ -78,7 +78,7 @@ fn nanoseconds(text: &str) -> Option<u64> {
     whole.checked_add(fraction.parse::<u64>().ok()? * scale)
 }
 
-/// Parses a frame such as `044#2A366C2B` or `12345678#R`. Eight digits are an extended identifier.
+/// Parses a frame such as `044#2A366C2B` or `12345678#R`. An identifier of eight digits is an extended one.
 fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let (id_text, data_text) = text.split_once('#').ok_or(NO_LINE)?;
     if data_text.starts_with('#') {
@@ -89,7 +89,7 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let id = match id_text.len() {
         3 if number <= STANDARD_IDS => number,
         8 if number <= EXTENDED_IDS => number | EXTENDED,
-        // In error frames of the CAN controller, the identifier contains the error flag, bit 29.
+        // Error frames of the CAN controller have the error flag, bit 29, in their identifier.
         8 if number >> 29 == 1 => number,
         _ => return Err(NO_LINE),
     };

@@ -1,7 +1,7 @@
 //! Tables of values (CSV) with one timestamp per row.
 //!
-//! Each sensor's emulator encodes its values as the bytes that the sensor would have sent. The ordinary decoder can
-//! then read them.
+//! The emulator of a sensor encodes the sensor's values as the bytes that the sensor would have sent, so that the
+//! ordinary decoder can read them.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::Rot;
@@ -52,7 +52,7 @@ fn quantities(sense: Sense) -> &'static [Quantity] {
     }
 }
 
-/// The CSV format of a table with a known header. Its streams are named after the sensors' ids.
+/// The CSV format of a table with a known header. Each stream has the id of its sensor as its name.
 pub struct Csv {
     separator: char,
     /// Number of cells in a row of the table.
@@ -63,10 +63,11 @@ pub struct Csv {
     header_passed: bool,
 }
 
-/// A sensor, and the table's columns with the sensor's values.
+/// A sensor, and the columns of the table that have the sensor's values.
 struct Target {
     sensor: EmulatedSensor,
-    /// For each of the sensor's values, its column in the table, and the factor of its unit.
+    /// For each of the sensor's values, its column in the table, and the factor that converts its unit to SI; `None`
+    /// for a value without a column.
     columns: [Option<(usize, f64)>; SLOTS],
 }
 
@@ -78,7 +79,7 @@ impl Csv {
     pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
-        // Spreadsheets may begin a file with a byte order mark.
+        // A byte order mark, which spreadsheets may write, isn't part of the header.
         let header = header.trim_start_matches('\u{feff}');
         let names: Vec<&str> = header.trim().split(separator).map(cell).collect();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];
@@ -151,7 +152,7 @@ impl Format for Csv {
             return Step::Took(used);
         }
         if !is_ended {
-            // The last number in the row may be truncated, and would then parse as another number.
+            // The last number in the row may be truncated. It could then be read as a wrong number.
             return Step::Lost(used, "a last row without a line end: it may be cut short, and is skipped");
         }
         let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that aren't UTF-8 text") };
@@ -188,8 +189,8 @@ impl Target {
         Ok(())
     }
 
-    /// Encodes a row's values for one sensor as the bytes that the sensor would have sent. If all cells for the
-    /// sensor are empty, there are no bytes.
+    /// Encodes a row's values for one sensor as the bytes that the sensor would have sent. If all of the sensor's cells
+    /// are empty, nothing is added.
     ///
     /// Errors: the reason, as text, if a cell can't be parsed or encoded.
     fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
@@ -237,8 +238,7 @@ fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<V
     })
 }
 
-/// Parses a decimal number of time units as nanoseconds. The conversion is exact except that the result is rounded
-/// down.
+/// Parses a decimal number of time units as nanoseconds. The result is exact, but cut off to whole nanoseconds.
 fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     if whole.is_empty() || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {
@@ -248,7 +248,7 @@ fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let scale = 10_u128.checked_pow(u32::try_from(fraction.len()).ok()?)?;
     let part = if fraction.is_empty() { 0 } else { fraction.parse::<u128>().ok()? };
     let ns = whole.parse::<u128>().ok()?.checked_mul(unit_ns)?.checked_add(part * unit_ns / scale)?;
-    // The limit on timestamps leaves room for the delays that emulators add.
+    // Timestamps are limited to 2^62 ns, because emulators add delays to them.
     u64::try_from(ns).ok().filter(|ns| *ns < 1 << 62)
 }
 

@@ -2,7 +2,7 @@
 
 /// First bytes of an ArduPilot dataflash log.
 pub const DATAFLASH: [u8; 2] = *b"\xA3\x95";
-/// Number of bytes from the start of a file that recognition needs.
+/// Number of bytes at the start of a file that are enough to recognise its kind.
 pub const ENOUGH_BYTES: usize = 64;
 
 /// Returns the probable kind of a file, as text; `None` if unknown.
@@ -38,8 +38,8 @@ pub fn looks_like(front: &[u8]) -> Option<&'static str> {
     if let Some((_, words)) = magic {
         return Some(words);
     }
-    // A telemetry log begins with a time in microseconds (eight bytes), then a frame. Times before 2106 begin with a
-    // zero byte.
+    // A telemetry log begins with a time in microseconds (eight bytes), then a MAVLink frame. The first byte of a time
+    // before the year 4253 is zero.
     if front.first() == Some(&0) && matches!(front.get(8), Some(0xFE | 0xFD)) {
         return Some("a telemetry log of MAVLink");
     }

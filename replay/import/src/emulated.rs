@@ -27,14 +27,14 @@ pub(super) enum Value {
     Inertia(Rot<Level, Sensor>, [f64; 3], [f64; 3]),
     /// Velocity over ground from a velocity log, m/s.
     Velocity([f64; 3]),
-    /// Chainage from a cable counter, by paid-out cable length, m.
+    /// Chainage from a cable counter, computed from the length of cable paid out, m.
     Payout(f64),
 }
 
 impl Value {
     /// Whether the measured value is possible, by limits far beyond the values in tunnels.
     ///
-    /// Larger values must be refused, because wire formats would wrap or clamp them to plausible values.
+    /// Larger values must be refused, because wire formats turn them into plausible values by wrapping or clamping.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
         // A NaN means "not measured", which is allowed.
@@ -51,7 +51,7 @@ impl Value {
     }
 }
 
-/// Remark in the import's report about ranges outside a head's range setting.
+/// Remark in the import's report, for ranges outside a head's range setting.
 pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
 /// A sensor of the vehicle file, with the emulator that encodes its values.
@@ -106,7 +106,7 @@ impl EmulatedSensor {
         self.reach_m.is_some()
     }
 
-    /// Returns a value that the sensor can report, and whether this value differs from the given one.
+    /// Returns the value that the sensor can report instead of `value`, and whether the two values differ.
     ///
     /// A beam whose range is outside the head's range setting becomes a beam without an echo.
     pub(super) fn within_reach(&self, value: Value) -> (Value, bool) {

@@ -14,13 +14,13 @@ pub struct Entry {
 /// Result of parsing the next bytes of a file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
-    /// This many bytes were parsed. They may hold no entry.
+    /// This many bytes were parsed. They gave any number of entries, even none.
     Took(usize),
     /// This many bytes were lost, for this reason.
     Lost(usize, &'static str),
     /// More bytes are needed. At the end of the file, this means that the last entry is truncated.
     More,
-    /// The same bytes contain more entries, so none of these bytes are consumed yet.
+    /// Entries were found, but the next bytes contain more. None of these bytes are consumed yet.
     Held,
 }
 

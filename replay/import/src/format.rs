@@ -16,8 +16,8 @@ pub trait Format {
         MOST_HELD
     }
 
-    /// Returns how far entries may be out of time order, ns. An entry may follow entries whose timestamps are later by
-    /// up to this time.
+    /// Returns how far entries may be out of time order, ns. An entry may come after entries whose timestamps are later
+    /// than its own by up to this time.
     fn reach_ns(&self) -> u64 {
         WINDOW_NS
     }
@@ -29,7 +29,7 @@ pub trait Format {
 
     /// Parses the next bytes of the file, `front`, and adds entries to `out`.
     ///
-    /// `end` means that no bytes follow after `front`.
+    /// `end` tells that the file has no bytes after `front`.
     fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step;
 }
 

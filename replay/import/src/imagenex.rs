@@ -39,7 +39,7 @@ impl Format for ImagenexFormat {
     }
 }
 
-/// Converts a date, as day, month and year, and a time of that day to nanoseconds since 1970.
+/// Converts a date (day, month, year) and a time of that day to nanoseconds since 1970.
 fn stamp_ns((day, month, year): (u8, u8, u16), time: DurNs) -> Option<u64> {
     const LENGTHS: [u64; 12] = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let leap = |year: u16| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));

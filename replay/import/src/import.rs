@@ -15,7 +15,7 @@ use crate::losses::Losses;
 use crate::order::Order;
 use crate::routing::Taker;
 
-/// Log time of a file's first entry. A simulated dive begins at the same log time.
+/// Log time of a file's first entry. Simulated dives begin at the same log time.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
 /// Longest plausible gap between timestamps of a file. A longer gap means that the clock was set, or the file has
@@ -36,7 +36,7 @@ pub struct Import<S> {
 pub struct Imported {
     /// Number of entries in the foreign log.
     pub entries: u64,
-    /// Number of entries that belong to no sensor, because of their connection or content.
+    /// Number of entries for no sensor: their connection is unassigned, or no sensor takes their content.
     pub passed_over: u64,
     /// Number of messages written for each source of the log.
     pub messages: Vec<u64>,
@@ -49,7 +49,7 @@ pub struct Imported {
 }
 
 impl<R: Read> Import<Input<R>> {
-    /// Opens a file, and reads until its start time is known. `what` is the name of its entries in error texts.
+    /// Opens a file, and reads until its start time is known. `what` names an entry of the file in error texts.
     ///
     /// Errors: the file can't be read, or has no entry.
     pub fn open(
@@ -63,8 +63,7 @@ impl<R: Read> Import<Input<R>> {
 }
 
 impl<S: Source> Import<S> {
-    /// Opens a source of entries, and reads until its start time is known. `what` is the name of its entries in error
-    /// texts.
+    /// Opens a source of entries, and reads until its start time is known. `what` names an entry in error texts.
     ///
     /// Errors: the source can't be read, or has no entry.
     pub fn of(mut input: S, what: &'static str) -> Result<Self, ImportError> {
@@ -98,7 +97,7 @@ impl<S: Source> Import<S> {
 
     /// Writes to the log everything that the sensors would have received.
     ///
-    /// Calls `beside` after each entry, with the number of entries so far.
+    /// Calls `beside` after each entry with the number of entries written so far.
     ///
     /// Errors: reading the file or writing the log fails.
     pub fn write<W: Write>(

@@ -11,7 +11,7 @@ use crate::order::Order;
 /// Number of bytes read from the file at once.
 pub(crate) const READ_BYTES: usize = 1 << 16;
 
-/// A source of entries: a file split by a [`Format`], or a file with a reader of its own.
+/// A source of entries: either a file that a [`Format`] splits into entries, or a file with a reader of its own.
 pub trait Source {
     /// Returns the name of the file.
     fn name(&self) -> &str;

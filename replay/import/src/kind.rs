@@ -35,7 +35,7 @@ impl FileKind {
     pub const ALL: [Self; 7] =
         [Self::Tlog, Self::Candump, Self::Imagenex, Self::Ping, Self::Csv, Self::Rosbag, Self::Mcap];
 
-    /// Recognises a kind of file by the extension of its name, in upper or lower case.
+    /// Recognises the kind of a file by the extension of its name, in upper or lower case.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
         match extension.as_str() {
@@ -90,7 +90,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the format of this kind, if it needs neither a vehicle file nor a mapping.
+    /// Returns the format of this kind of file; `None` if the format needs a vehicle file or a mapping.
     pub fn format(self) -> Option<Box<dyn Format>> {
         match self {
             Self::Tlog => Some(Box::<TlogFormat>::default()),
@@ -111,7 +111,7 @@ impl FileKind {
         matches!(self, Self::Imagenex | Self::Ping)
     }
 
-    /// Returns the plugin of the sensors whose bytes such files contain; empty if they contain values.
+    /// Returns the plugin of the sensors whose bytes are in files of this kind; empty if the files contain values.
     pub(crate) fn plugin(self) -> &'static str {
         match self {
             Self::Tlog => headrace_mavlink::MavlinkKind.name(),
@@ -122,7 +122,7 @@ impl FileKind {
         }
     }
 
-    /// Returns the name in the file of the connection that a sensor with this `connect` uses.
+    /// Returns the name that a file gives to a connection. `connect` is the connection's address in the vehicle file.
     pub(crate) fn usual_line(self, connect: &str) -> Option<String> {
         match self {
             Self::Candump => match Connect::parse(connect) {

@@ -8,12 +8,12 @@ use headrace_geometry::time::MonoNs;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Losses {
     kinds: BTreeMap<&'static str, Kind>,
-    /// End and reason of the latest loss. A single byte lost directly after it for the same reason belongs to the same
-    /// loss.
+    /// End and reason of the latest loss. If the byte directly after this end is lost for the same reason, it belongs
+    /// to the same loss.
     last: Option<(u64, &'static str)>,
     cut_off: Option<(u64, usize)>,
     late: u64,
-    /// Number of gaps between timestamps, then length and time of the first gap.
+    /// Number of long gaps between timestamps; length of the first gap, ns; and time of the first gap.
     gaps: Option<(u64, u64, MonoNs)>,
 }
 
@@ -38,7 +38,7 @@ impl Losses {
         self.cut_off = Some((at, bytes));
     }
 
-    /// Sets the number of entries dropped because they came too late in the file to be put in time order.
+    /// Sets the number of dropped entries. They came too late in the file to be put in time order.
     pub(super) fn late(&mut self, count: u64) {
         self.late = count;
     }

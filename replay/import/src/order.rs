@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::entry::Entry;
 
-/// An entry is held back until another entry is later by more than this time, ns. Until then, earlier entries may
-/// follow.
+/// An entry is held back until another entry's timestamp is later by more than this time, ns, because earlier entries
+/// may still follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
 /// Maximum number of entries held back for sorting, whatever their timestamps.
 const MOST_ENTRIES: usize = 1 << 15;
@@ -32,13 +32,14 @@ impl Default for Order {
 }
 
 impl Order {
-    /// Creates an empty order. An entry may follow entries whose timestamps are up to `window_ns` later.
+    /// Creates an empty order. An entry may come after entries with timestamps that are up to `window_ns` later.
     pub(super) fn reaching(window_ns: u64) -> Self {
         let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
         Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }
     }
 
-    /// Adds an entry. If an entry with a later timestamp has already been returned, drops and counts the new entry.
+    /// Adds an entry. If an entry with a later timestamp has already been taken out, the new entry is dropped and
+    /// counted.
     pub(super) fn push(&mut self, entry: Entry) {
         if entry.stamp_ns < self.given_ns {
             self.late += 1;

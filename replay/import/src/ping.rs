@@ -1,4 +1,4 @@
-//! Logs of Ping Viewer: a preface, then messages, each after its time of day.
+//! Logs of Ping Viewer: a preface, then messages. The time of day precedes each message.
 //!
 //! Source: Ping Viewer, docs, "Binary log file structure". Numbers are big-endian. A text is stored as its length in
 //! bytes, a u32, followed by UTF-16.
@@ -18,11 +18,11 @@ pub struct PingFormat {
 /// Name of the only stream in a Ping Viewer log: all messages belong to it.
 pub const STREAM: &str = "ping";
 
-/// Number of texts in the preface after the title and the version. Two numbers follow these texts.
+/// Number of texts in the preface after the title and the version. Two numbers follow them.
 const TEXTS: usize = 5;
 const TITLE: &str = "PingViewer sensor log file";
 const DAY_NS: u64 = 86_400_000_000_000;
-/// A step back in time by more than this means a new day. A smaller step means entries out of order.
+/// A step back in time by more than this means a new day. A smaller step back means that entries are out of order.
 const MIDNIGHT_NS: u64 = DAY_NS / 2;
 /// Upper bound on the length of a text or message in the log, bytes.
 const MOST_BYTES: usize = 1 << 16;
@@ -88,7 +88,7 @@ fn number(rest: &mut &[u8]) -> Result<u32, Stop> {
 }
 
 fn sized<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Stop> {
-    // Qt writes `u32::MAX` as the length of a null string.
+    // Ping Viewer's library Qt writes `u32::MAX` as the length of a null string, which has no bytes.
     let len = match number(rest)? {
         u32::MAX => 0,
         len => usize::try_from(len).map_err(|_| Stop::Bad)?,
@@ -107,7 +107,7 @@ fn text(rest: &mut &[u8]) -> Result<String, Stop> {
     String::from_utf16(&units).ok().filter(|_| odd.is_empty()).ok_or(Stop::Bad)
 }
 
-/// Parses a time of day, `hh:mm:ss.zzz`, which a zero character may follow.
+/// Parses a time of day, `hh:mm:ss.zzz`. A zero character may follow it.
 fn time_of_day_ns(text: &str) -> Option<u64> {
     let text = text.trim_end_matches('\0');
     let (clock, milliseconds) = text.split_once('.')?;

@@ -95,7 +95,7 @@ pub enum RoutingError {
         /// Form of a connection's name in this kind of log file.
         line: &'static str,
     },
-    /// An option names a connection, but the file contains values instead of the bytes of connections.
+    /// An option names a connection, but the file has no connections, because it contains values instead of bytes.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
         /// Kind of the file that contains values.
@@ -121,8 +121,8 @@ pub enum RoutingError {
 
 /// Returns the sensors that receive data: the sensors of the vehicle file, or the sensors in `explicit`.
 ///
-/// `explicit` has pairs of a sensor's id and the name of its connection. These connections replace those in the vehicle
-/// file.
+/// `explicit` has pairs of a sensor's id and the name of its connection. If `explicit` isn't empty, it replaces the
+/// connections in the vehicle file.
 ///
 /// Errors: see [`RoutingError`].
 pub fn takers(

@@ -17,7 +17,8 @@ pub struct TlogFormat {
 /// Name of the only stream in a telemetry log: all frames belong to it.
 pub const STREAM: &str = "mavlink";
 
-/// Maximum difference between the times of two entries, µs. A larger difference after damage means a false match.
+/// Maximum difference between the times of two entries, µs. After damage, an entry with a larger difference is a false
+/// match.
 const DAY_US: u64 = 86_400_000_000;
 /// Latest valid time of an entry, in 2106, µs.
 const LATEST_US: u64 = 4_294_967_296_000_000;
@@ -29,8 +30,8 @@ impl Format for TlogFormat {
 
     fn step(&mut self, front: &[u8], _: bool, out: &mut Vec<Entry>) -> Step {
         let logged = match Tlog::new(front).next() {
-            // After damage an entry that seems truncated is probably not an entry, but only the end of the file shows
-            // that.
+            // After damage, an entry that seems truncated is probably no entry at all. This is certain only at the end
+            // of the file.
             None | Some(Err(TlogError::Short { .. })) => return Step::More,
             Some(Err(_)) => return self.lost(),
             Some(Ok(logged)) => logged,

@@ -1,4 +1,4 @@
-//! Assembles a simulation. Effects add systems, components and random streams only here.
+//! Assembles a simulation. Effects add their systems, components and random streams through this module only.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
@@ -14,7 +14,7 @@ use crate::random::Stream;
 use crate::sensing::{Mounted, Scenery};
 use crate::stages::Stage;
 
-/// Systems, components and random streams that one effect adds to a simulation, for display.
+/// Systems, components and random streams that one effect adds to a simulation. They are shown to users.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
     /// Name of the effect, as used in scenes.
@@ -23,26 +23,26 @@ pub struct Added {
     pub systems: Vec<(Stage, String)>,
     /// Names of the base systems that the effect replaces.
     pub replaces: Vec<&'static str>,
-    /// Components of the effect, each with the ids of the sensors that have the component.
+    /// Components that the effect adds, each with the ids of the sensors that get the component.
     pub components: Vec<(String, Vec<String>)>,
     /// Sources for which the effect draws random numbers during the dive.
     pub streams: Vec<String>,
-    /// The effect's change to the vehicle's trajectory before the dive begins, as text.
+    /// Text about the effect's change to the vehicle's trajectory; `None` if it changes nothing.
     pub trajectory: Option<String>,
 }
 
-/// Position of a system in the chain that the schedule runs.
+/// Position of a system in the sequence in which the schedule runs all systems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 struct Slot(usize);
 
 type Configs = ScheduleConfigs<ScheduleSystem>;
 
-/// The heads' programs, which effects may change before the heads are switched on.
+/// Access to the heads' programs. Effects may change the programs before the heads are switched on.
 pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Pairs of an effect and a sensor: the effect drew random numbers for the sensor before the dive.
+    /// Effects that drew random numbers before the dive, each paired with the id of the sensor that it drew them for.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
@@ -118,7 +118,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Mount of a sensor on the vehicle, as changed by the effects so far.
+    /// Returns the mount of a sensor on the vehicle. The effects built so far may have changed it.
     pub fn mount(&self, source: usize) -> Option<Mount> {
         self.world.get::<Mounted>(*self.entities.get(source)?).map(|mounted| mounted.0)
     }
@@ -151,7 +151,8 @@ impl<'a> Builder<'a> {
         self.systems.push((stage, effect, system.into_configs()));
     }
 
-    /// The scene's tunnel and the vehicle's trajectory, for effects that change these. `what` describes the change.
+    /// The scene's tunnel and the vehicle's trajectory, for effects that change the tunnel or the trajectory. `what`
+    /// describes the change.
     pub fn scenery(&mut self, what: String) -> Option<bevy_ecs::change_detection::Mut<'_, Scenery>> {
         if let Some(now) = self.now() {
             now.trajectory = Some(what);
@@ -159,12 +160,12 @@ impl<'a> Builder<'a> {
         self.world.get_resource_mut::<Scenery>()
     }
 
-    /// Duration of the dive on the trajectory as changed by the effects so far, s.
+    /// Duration of the dive, s, on the trajectory that the effects built so far have left.
     pub fn duration_s(&self) -> f64 {
         self.world.get_resource::<Scenery>().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
 
-    /// Replaces a base system. The base system is then not added.
+    /// Replaces the base system named `base`. That system is then not added.
     pub fn replace(&mut self, base: &'static str) {
         if let Some(now) = self.now() {
             now.replaces.push(base);
@@ -176,13 +177,13 @@ impl<'a> Builder<'a> {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }
 
-    /// Begins an effect. Systems and components added from now on belong to this effect.
+    /// Begins the effect named `effect`. Systems and components added from now on belong to this effect.
     pub(crate) fn effect(&mut self, effect: &'static str) {
         self.current = Some(self.added.len());
         self.added.push(Added { effect, ..Added::default() });
     }
 
-    /// Makes all systems added from now on base systems, which belong to no effect.
+    /// Begins the base systems. Systems added from now on belong to no effect.
     pub(crate) fn base(&mut self) {
         self.current = None;
     }
@@ -193,7 +194,7 @@ impl<'a> Builder<'a> {
 
     /// Makes the schedule: all systems in one chain, by stage, with base systems first.
     ///
-    /// If `noting` is set, each system is followed by a system that records its changes.
+    /// If `noting` is set, a recorder follows each system and records what the system changed.
     pub(crate) fn schedule(self, noting: bool) -> (Schedule, Vec<Added>, Vec<(Stage, String)>) {
         let mut schedule = Schedule::default();
         schedule.set_executor(bevy_ecs::schedule::SingleThreadedExecutor::new());

@@ -7,19 +7,20 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Time at which every simulated dive starts.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// Number of parts into which a second is divided. A drift is a whole number of parts per second, so sums have no
-/// rounding errors.
+/// Number of parts into which a second is divided. A clock's drift is a whole number of these parts per second, so that
+/// sums have no rounding errors.
 const PARTS: i128 = 1_000_000_000_000;
 
 /// A clock that is correct at the start and drifts at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Clock {
-    /// Excess of a second of this clock over a true second, in parts; see [`PARTS`].
+    /// Length of a second of this clock minus that of a true second, in parts (see [`PARTS`]).
     longer: i128,
 }
 
 impl Clock {
-    /// Creates a clock whose seconds are `ppm` millionths too long, so that its device samples late. Range: +/-10^5.
+    /// Creates a clock whose seconds are `ppm` millionths too long, so that its device samples late. Range of `ppm`:
+    /// +/-10^5.
     pub(crate) fn slow_by_ppm(ppm: f64) -> Self {
         let per_ppm = (PARTS / 1_000_000) as f64;
         Self { longer: i128::from(math::round_to_i64(ppm.clamp(-1e5, 1e5) * per_ppm)) }
@@ -32,7 +33,7 @@ impl Clock {
         START + DurNs(i64::try_from(true_span).unwrap_or(i64::MAX))
     }
 
-    /// Earliest time on this clock at which the true time is `at` or later.
+    /// Earliest time that this clock shows when the true time is `at` or later.
     pub(crate) fn shows(&self, at: MonoNs) -> MonoNs {
         let true_span = i128::from(at.since(START).0);
         let near = (true_span * PARTS).div_euclid(PARTS + self.longer);

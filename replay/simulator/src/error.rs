@@ -17,7 +17,7 @@ pub enum SceneError {
     Blocked {
         /// Time after the start at which the vehicle meets the obstacle, s.
         after_s: f64,
-        /// Chainage of the vehicle at that time, m.
+        /// Chainage of the vehicle when it meets the obstacle, m.
         chainage_m: f64,
         /// Distance of the vehicle to the left of the axis, m.
         y_m: f64,

@@ -14,7 +14,7 @@ pub struct Facts {
     pub sensors: Vec<SensorFacts>,
     /// Parts of the vehicle that may hide a head's view.
     pub hull: Vec<Obstacle>,
-    /// Reference of the trajectory's speeds: the water, which carries the vehicle, or the tunnel.
+    /// Reference of the trajectory's speeds: either the tunnel, or the water, which carries the vehicle.
     pub ground: Ground,
     /// Length of the tunnel, m.
     pub length_m: f64,

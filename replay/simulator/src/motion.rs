@@ -10,9 +10,9 @@ use crate::sensing::Scenery;
 
 /// The sample at time `at` of an inertial unit that samples every `period`.
 ///
-/// Rate and acceleration are means over the period, as in a unit that integrates between samples. The sums of the
-/// samples give the whole change of attitude and velocity, even over a jerk between samples. At constant attitude and
-/// velocity, rate and acceleration are zero to rounding.
+/// Rate and acceleration are means over the period, as in a unit that integrates between samples. The sum of the
+/// samples is therefore the whole change of attitude and velocity, even if the acceleration jumps between two samples.
+/// At constant attitude and velocity, rate and acceleration are zero except for rounding errors.
 pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) -> Inertia {
     let level = Rot::<Level, Tunnel>::from_roll_pitch_yaw(0.0, 0.0, truth.site.axis_yaw_rad);
     let attitude = |at| level * truth.pose(at).attitude * mount.rotation;
@@ -48,12 +48,13 @@ fn rate(before: Rot<Level, Sensor>, after: Rot<Level, Sensor>, elapsed: DurNs) -
     if elapsed_s <= 0.0 {
         return Vec3::zero();
     }
-    // For small angles, the ratio of the angle to the sine of its half tends to two.
+    // `sine` is that of half the angle. For small angles, the ratio of the angle to it tends to two.
     let angle_per_sine = if sine > 1e-9 { 2.0 * math::atan2(sine, w.abs()) / sine } else { 2.0 };
     axis.scaled(angle_per_sine / elapsed_s)
 }
 
-/// Acceleration over two intervals: the change of mean velocity between them, divided by the mean of their lengths.
+/// Acceleration over two intervals: the change from the mean velocity of the first to that of the second, divided by
+/// the mean of their lengths.
 fn acceleration(places: [Point3<Tunnel>; 3], times: [MonoNs; 3]) -> Vec3<Tunnel> {
     let [before, at, after] = times;
     let [p0, p1, p2] = places;

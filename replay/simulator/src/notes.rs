@@ -1,4 +1,4 @@
-//! Finds the changes that each effect makes to each measurement, by comparison before and after.
+//! Finds the changes that each effect makes to each measurement, by comparing it before and after each system.
 //!
 //! Effects need not report their changes. This module is only active in a simulation with ground truth.
 
@@ -117,8 +117,7 @@ impl<M: Measurement> Default for Before<M> {
     }
 }
 
-/// The effect to which the system that has just run belongs; `None` for a base system, whose output is the original
-/// measurement.
+/// The effect whose system has just run; `None` if it was a base system, whose output is the original measurement.
 #[derive(Debug, Clone, Copy)]
 struct After(Option<u16>);
 
@@ -126,7 +125,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// Returns a system that records all changes since the previous such system ran, and attributes them to `effect`.
+/// Returns a recording system. It attributes all changes since the previous recording system ran to `effect`.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

@@ -20,14 +20,14 @@ pub struct Message<'a> {
 
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
-/// Messages that wait until all earlier messages of other lines are known.
+/// Messages of all lines. Each waits until all earlier messages of other lines are known.
 ///
 /// Messages are merged on demand. Their bytes stay in the devices' buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
     /// Waiting messages of each source, in the order of the sources.
     lanes: Vec<Lane>,
-    /// Time at which the next message of each source is due; `NEVER` if none waits.
+    /// For each source, the time at which its next message is due; `NEVER` if none waits.
     due: Vec<MonoNs>,
     /// Messages with timestamps before this time are released.
     until: MonoNs,
@@ -49,7 +49,7 @@ impl Lane {
         self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
     }
 
-    /// Takes over the messages of a time slice. The few messages that still wait stay in front of them.
+    /// Takes over the messages of a time slice. Messages of earlier slices that still wait stay in front of them.
     fn take(&mut self, line: &mut Line) {
         std::mem::swap(&mut self.line, line);
         self.line.put_first(line, self.next);
@@ -57,7 +57,7 @@ impl Lane {
         line.clear();
         // Drops messages that have lost all their bytes.
         self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
-        // A reply may cross the line after the next request does, so the messages need sorting.
+        // The next request may cross the line before the reply to the previous request, so the messages need sorting.
         if !self.line.messages.is_sorted_by_key(|message| message.at) {
             self.line.messages.sort_by_key(|message| message.at);
         }
@@ -76,7 +76,7 @@ impl Outbox {
         self.front.is_some()
     }
 
-    /// Removes and returns the next message, once no earlier message can follow.
+    /// Removes and returns the next released message. No earlier message can follow it.
     pub(crate) fn next(&mut self) -> Option<Message<'_>> {
         let front = self.front?;
         let lane = self.lanes.get_mut(front)?;
@@ -120,7 +120,7 @@ impl Outbox {
         more
     }
 
-    /// Skips the released messages.
+    /// Skips all messages that are released but not yet taken.
     pub(crate) fn skip(&mut self) {
         let until = self.until;
         for lane in &mut self.lanes {

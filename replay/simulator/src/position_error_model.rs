@@ -1,8 +1,8 @@
-//! Expected position errors of a calm dive, computed by running the filter.
+//! Expected position errors of a calm dive, computed by running the navigation filter.
 //!
 //! The vehicle moves straight through its tunnel, with devices that are ideal except for their wire formats. The
-//! filter's covariance does not depend on the readings, so the errors between two passes apply to any calm dive. These
-//! errors agree within 10 % with dives simulated from data sheets (`tests/tests/sampling/calm.rs`).
+//! filter's covariance does not depend on the readings, so the errors between two passes over a place apply to any calm
+//! dive. They agree within 10 % with dives simulated from data sheets (`tests/tests/sampling/calm.rs`).
 
 use headrace_config::Document;
 use headrace_coverage::PassError;
@@ -24,7 +24,8 @@ use crate::simulation::Simulation;
 /// Duration of the dive, s. After this time, the uncertainty of an inertial unit's biases is within a few per cent of
 /// its final value.
 const CALM_S: f64 = 180.0;
-/// Largest speed of the dive, m/s, and largest share of the tunnel that the dive covers.
+/// Largest speed of the simulated dive, m/s, and largest share of the tunnel that it covers. The speed is lower in a
+/// short tunnel.
 const CALM_MPS: f64 = 0.1;
 const MOST_SHARE: f64 = 0.5;
 /// Largest evaluated time between two passes, s. All whole seconds up to this time are evaluated.
@@ -32,7 +33,7 @@ const TIMES_S: u32 = 110;
 
 /// Expected position errors of a vehicle. `load` returns the vehicle file for its `name`.
 ///
-/// `None` if the navigation gives no errors.
+/// `None` if the vehicle's navigation estimates no errors.
 ///
 /// Errors: the vehicle cannot be simulated.
 pub fn expected_errors(
@@ -80,8 +81,8 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
     Ok(navigation)
 }
 
-/// Standard deviations of the hole's size by the time between two passes: pairs of time, s, and deviation, m. Each
-/// deviation is the largest around the wall.
+/// Standard deviation of a hole's diameter for each time between two passes, as pairs of time, s, and deviation, m.
+/// Each deviation is the largest one around the wall.
 fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig, mount_sd_rad: f64) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;

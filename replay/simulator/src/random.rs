@@ -46,8 +46,8 @@ impl Stream {
         self.block(step, 0)
     }
 
-    /// Block number `block` of random numbers for `step`. An effect that draws more than two numbers per step needs
-    /// more than one block.
+    /// Block number `block` of random numbers for `step`. A block has two numbers, so an effect that draws more per
+    /// step needs several blocks.
     pub fn block(self, step: u64, block: u64) -> Draw {
         let half = |value: u64| [(value & 0xFFFF_FFFF) as u32, (value >> 32) as u32];
         let ([a, b], [c, d]) = (half(step), half(block));
@@ -56,7 +56,7 @@ impl Stream {
 }
 
 impl Draw {
-    /// Two random numbers, uniform between 0 and 1, both ends excluded, in steps of 2^-53.
+    /// Two random numbers that are uniformly distributed between 0 and 1, in steps of 2^-53. Neither 0 nor 1 occurs.
     pub fn uniform(&self) -> [f64; 2] {
         let [a, b, c, d] = self.words;
         let number = |high: u32, low: u32| {
@@ -180,7 +180,7 @@ const FAR_TAIL: Rational = [
 mod tests {
     use super::*;
 
-    /// Known answers from the authors of the generator (Random123, kat_vectors).
+    /// Compares with known answers from the authors of the generator (Random123, kat_vectors).
     #[test]
     fn philox_gives_the_known_answers() {
         let all = u32::MAX;
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// Expected values have 16 digits and come from mpmath with 50 digits.
+    /// The expected values have 16 digits and were computed with mpmath at 50 digits.
     #[test]
     fn normal_quantiles_are_accurate_in_the_middle_and_tails() {
         for (p, x) in [
@@ -227,7 +227,7 @@ mod tests {
             below += stream.at(step).uniform().iter().filter(|u| **u < 0.3).count() as u64;
         }
         let n = 2.0 * count as f64;
-        // Tolerances are five standard deviations of each estimate.
+        // Each tolerance is five standard deviations of the estimate.
         assert!((sum / n).abs() < 5.0 / math::sqrt(n));
         assert!((squares / n - 1.0).abs() < 5.0 * math::sqrt(2.0 / n));
         assert!((fourth / n - 3.0).abs() < 5.0 * math::sqrt(96.0 / n));

@@ -54,7 +54,8 @@ impl Scene {
         Self::parse_taking(document, kinds, load, seed, None)
     }
 
-    /// Parses a scene like [`Scene::parse`]. `take` overrides the value in the scene.
+    /// Parses a scene like [`Scene::parse`]. `take` overrides the scene's own key `take`, which decides whether implied
+    /// effects are simulated.
     ///
     /// Errors: see [`Scene::parse`].
     pub fn parse_taking(
@@ -72,7 +73,7 @@ impl Scene {
         }
     }
 
-    /// Parses the scene's tables. Errors of the vehicle file are added to `of_vehicle`.
+    /// Parses the scene's tables. Errors in the vehicle file are added to the list `of_vehicle`.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -112,7 +113,7 @@ impl Scene {
         let (design, length_m) = (&vehicle.tunnel.profile, vehicle.tunnel.length_m);
         let environment = root.part(|| Environment::parse(tunnel, design, length_m, text, load))?;
         let trajectory = root.part(|| trajectory::parse(&trajectory?, (design, length_m), seed, text))?;
-        // If the trajectory is invalid, effects are checked without a trajectory.
+        // If the trajectory is invalid, effects are still checked, with an assumed duration.
         let known = trajectory.as_ref().map(|(trajectory, ground)| (*ground, trajectory.duration_s()));
         let (ground, duration_s) = known.unwrap_or((Ground::Water, LONGEST_S));
         let facts = Facts::new(&vehicle, &programs, ground, duration_s);
@@ -147,7 +148,7 @@ impl Scene {
         self.trajectory.is_advised()
     }
 
-    /// Effects that the scene implies, each with whether and how it is simulated.
+    /// Effects that the scene implies. Each tells whether and how it is simulated.
     pub fn called(&self) -> &[Called] {
         &self.called
     }
@@ -157,12 +158,12 @@ impl Scene {
         self.active().map(|(kind, _)| kind.name()).collect()
     }
 
-    /// Leaves these effects out from now on. Effects that were left out before are restored.
+    /// Leaves the effects named `names` out of the simulation. Effects that an earlier call left out are restored.
     pub fn leave_out(&mut self, names: &[&str]) {
         self.without = names.iter().map(|name| (*name).to_owned()).collect();
     }
 
-    /// The effects that are simulated, without those left out.
+    /// The effects that are simulated. Effects that [`Scene::leave_out`] names are missing.
     pub(crate) fn active(&self) -> impl Iterator<Item = (&'static dyn EffectKind, &dyn Effect)> {
         let is_in = |kind: &dyn EffectKind| self.without.iter().all(|name| name != kind.name());
         self.effects

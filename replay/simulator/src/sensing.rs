@@ -16,10 +16,10 @@ use crate::environment::{Environment, Hit, What};
 use crate::error::SceneError;
 use crate::trajectory::Trajectory;
 
-/// Interval at which the trajectory is checked for obstacles, s.
+/// Interval of the points on the trajectory that are checked for obstacles, s.
 const CHECK_S: f64 = 0.5;
 
-/// Time slice: the span of the dive that is simulated at once.
+/// Time slice: a span of the dive whose measurements are all processed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
 pub(crate) struct Slice {
     /// Start of the time slice.
@@ -64,8 +64,8 @@ pub(crate) struct Echosounder;
 /// Measurements of a sensor in the current time slice, in order of time.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Samples<M: Measurement> {
-    /// Number of the first sample, counted from the start of the dive. It is the step for the random numbers of
-    /// effects.
+    /// Number of the first sample, counted from the start of the dive. Effects use it as the step number of their
+    /// random numbers.
     pub first: u64,
     /// The measurements, in order of time.
     pub list: Vec<M>,
@@ -86,7 +86,7 @@ pub(crate) struct Ray {
     pub hit: Option<Hit>,
 }
 
-/// Distance up to which the walls ahead of a sonar are computed: its range setting and a margin, m.
+/// Distance up to which the walls ahead of a sonar are computed, m. It is the sonar's range setting and a margin.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 
@@ -145,7 +145,7 @@ impl Scenery {
         self.trajectory.place(self.under_way_s(at)).chainage_m
     }
 
-    /// Time for which the vehicle has been moving at time `at`, s.
+    /// Time since the vehicle set out, as of time `at`, s.
     fn under_way_s(&self, at: MonoNs) -> f64 {
         self.sets_out
             .map_or_else(|| at.since(START).as_secs_f64(), |out| at.since(out).as_secs_f64().max(0.0))
@@ -189,7 +189,7 @@ impl Line {
         self.bytes.get(from..to).unwrap_or_default()
     }
 
-    /// Inserts the messages of another line, from number `first` on, before the messages of this line.
+    /// Inserts messages of the line `other`, from number `first` on, in front of the messages of this line.
     pub(crate) fn put_first(&mut self, other: &Self, first: usize) {
         let bytes = &mut self.bytes;
         let moved = other.messages.iter().skip(first).map(|message| {

@@ -26,10 +26,10 @@ use crate::stages::{self, AIM_HELD, Frozen, Held, Stage};
 use crate::trajectory::PilotAdvice;
 use crate::truth::{self, TruthRow};
 
-/// Length of a time slice. At this length, the overhead of the schedule is negligible.
+/// Length of a time slice. A second is long enough to make the overhead of the schedule negligible.
 const SLICE: DurNs = DurNs(1_000_000_000);
-/// Distance up to which walls are computed, as a multiple of a sonar's range. The margin allows for effects that
-/// shorten ranges.
+/// Distance up to which walls are computed, as a multiple of a sonar's range. It is larger than 1 because effects may
+/// shorten the reported range of a farther wall.
 const REACH_SHARE: f64 = 1.25;
 /// Largest range of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
@@ -121,7 +121,7 @@ impl Simulation {
         }
         sim.base();
         if asker == Asker::Hosts {
-            // This system runs after all effects on the counters, and before the counters encode their counts.
+            // `freeze` runs after all effects on the cable counters, and before the counters encode their counts.
             sim.system(Stage::Tell, stages::freeze);
         }
         add_base_systems(&mut sim);
@@ -139,7 +139,7 @@ impl Simulation {
         Ok(Self { world, schedule, entities, end, slice: SLICE, outbox, added, base, truth, adviser: None })
     }
 
-    /// Gives the pilot this adviser.
+    /// Makes the pilot listen to `adviser`.
     ///
     /// An adviser has an effect only if the trajectory is that of an advised pilot ([`Scene::is_advised`]). Without an
     /// adviser, an advised pilot gets no advice.
@@ -226,7 +226,7 @@ impl Simulation {
 
     /// Passes bytes from a host to device number `source` of the vehicle file.
     ///
-    /// `at` must not precede the end of the time simulated so far.
+    /// `at` must not be before the end of the time that is already simulated.
     pub fn hear(&mut self, source: usize, at: MonoNs, bytes: &[u8]) {
         let Some(entity) = self.entities.get(source).copied() else { return };
         hear::<Sounding>(&mut self.world, entity, at, bytes);
@@ -236,7 +236,7 @@ impl Simulation {
         hear::<GroundVelocity>(&mut self.world, entity, at, bytes);
     }
 
-    /// Starts the vehicle's movement at `at`. The dive ends at the end of the trajectory.
+    /// Starts the vehicle's movement at `at`. The dive then ends at the end of the trajectory.
     pub fn set_out(&mut self, at: MonoNs) {
         if let Some(mut scenery) = self.world.get_resource_mut::<Scenery>() {
             scenery.sets_out = Some(at);
@@ -264,8 +264,8 @@ impl Simulation {
         }
     }
 
-    /// Makes the cable counters repeat their next count if `is_frozen`, and count again if not. Returns the counters'
-    /// numbers in the vehicle file.
+    /// If `is_frozen`, makes the cable counters repeat their next count. Otherwise makes them count again. Returns the
+    /// counters' numbers in the vehicle file.
     pub fn freeze_counters(&mut self, is_frozen: bool) -> Vec<usize> {
         let mut frozen = Vec::new();
         for (number, entity) in self.entities.iter().enumerate() {
@@ -309,7 +309,7 @@ impl Simulation {
             self.end = START + DurNs::from_secs_f64(scenery.trajectory.duration_s());
         }
         let Some(slice) = self.world.get_resource::<Slice>() else { return false };
-        // The last slice includes a measurement at the very end of the dive.
+        // The end of a slice is excluded. One nanosecond more includes a measurement at the very end of the dive.
         let last = self.end + DurNs(1);
         if slice.until >= last {
             return self.outbox.finish();
@@ -353,7 +353,7 @@ impl Simulation {
         }
     }
 
-    /// All measurements of a sensor in the dive, simulated without the other sensors.
+    /// All measurements of the sensor `source` in the dive. No other sensor is simulated.
     pub(crate) fn measurements_of<M: Measurement>(mut self, source: usize) -> Vec<M> {
         self.keep_only(source);
         let mut all: Vec<M> = Vec::new();
@@ -367,7 +367,7 @@ impl Simulation {
     }
 }
 
-/// Passes bytes from a host to a device that measures `M`. An immediate reply is put on the device's line.
+/// Passes bytes from a host to a device that measures `M`. If the device replies at once, the reply is put on its line.
 fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[u8]) {
     let mut entity = world.entity_mut(entity);
     let Ok((mut device, mut line)) = entity.get_components_mut::<(&mut Device<M>, &mut Line)>() else {
@@ -376,7 +376,7 @@ fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[
     device.0.hear(at, bytes, &mut |direction, at, bytes| line.send(at, direction, bytes, 0));
 }
 
-/// The scene's facts after effects have changed the heads' programs, and the random streams that the effects used.
+/// The scene's facts after effects have changed the heads' programs, and the random streams that these effects used.
 fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
     for (kind, effect) in scene.active() {
@@ -473,7 +473,7 @@ mod tests {
     use super::*;
     use crate::testing_motion::Bench;
 
-    /// Counts of the cable in half a second of a simulation for hosts, m.
+    /// Readings of the cable counter during the next half second of a simulation with real hosts, m.
     fn counts_m(simulation: &mut Simulation, tether: usize, at: &mut MonoNs) -> Vec<f64> {
         *at = *at + DurNs(500_000_000);
         simulation.go_on(*at);
@@ -504,7 +504,7 @@ mod tests {
         let scene = bench.scene();
         let mut simulation = Simulation::for_hosts(&scene).unwrap();
         let (ping, mut at) = (bench.source("ping"), START);
-        // Message 1400 to all devices, with the id of the profile and the checksum.
+        // Message 1400 of the Ping protocol, addressed to all devices. It has a profile's id and a checksum.
         simulation.hear(ping, at, &[0x42, 0x52, 2, 0, 0x78, 0x05, 0, 255, 0x14, 0x05, 0x2B, 0x02]);
         let mut pings = |simulation: &mut Simulation| {
             counts_m(simulation, bench.source("tether"), &mut at);

@@ -13,7 +13,7 @@ use crate::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach,
 
 /// Name of the system [`aim_held`]. Effects use the name to replace the system.
 pub(crate) const AIM_HELD: &str = "aim_held";
-/// Tolerance within which a rotation counts as a whole turn, radians.
+/// A head's rotation may fall short of a whole turn by this angle and still count as one, radians.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
 /// Order of processing in a slice. Within a stage, base systems run first, then effects in the order of
@@ -22,19 +22,19 @@ const SAME_ANGLE_RAD: f64 = 1e-9;
 pub enum Stage {
     /// Devices give the times and kinds of their measurements.
     Begin,
-    /// Heads turn. Effects on beam angles act here.
+    /// Heads turn. Effects on beam angles act in this stage.
     Turn,
     /// Sonars get a position and a direction.
     Aim,
     /// Beams hit walls and objects.
     Look,
-    /// Pings get a range. Effects on ranges act here.
+    /// Pings get a range. Effects on ranges act in this stage.
     Hear,
-    /// Other sensors get pressure, motion and cable length. Effects on these act here.
+    /// All sensors except sonars get pressure, motion or cable length. Effects on these quantities act in this stage.
     Feel,
     /// Devices encode their measurements.
     Tell,
-    /// Effects on the devices' lines act here.
+    /// Effects on the devices' lines act in this stage.
     Line,
 }
 
@@ -54,8 +54,8 @@ impl Stage {
     }
 }
 
-/// State of a head whose pings all start from the vehicle's pose at the start of the turn: that pose, and the rotation
-/// since then.
+/// State of a head whose pings all start from the vehicle's pose at the start of the turn. The state is this pose, and
+/// the head's rotation since then.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub(crate) struct Held {
     pose: Option<Pose>,
@@ -65,7 +65,7 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    /// Whether a new turn or sweep begins with a ping at this angle.
+    /// Whether a new turn or sweep begins with a ping at `angle_rad`, which must be the head's next ping.
     fn begins(&mut self, angle_rad: f64) -> bool {
         // The head's first ping has no previous angle.
         let came_rad = if self.pose.is_some() { angle_rad - self.last_rad } else { 0.0 };
@@ -85,8 +85,8 @@ type Beginning<'a, M> = (&'a mut Device<M>, &'a mut Samples<M>, Option<&'a Clock
 
 /// Polls the devices for the measurements of the slice.
 ///
-/// A device with a drifting clock is polled up to the time that its clock shows at the end of the slice. The drift
-/// effect later sets the true times.
+/// A device with a drifting clock is polled up to the time that its clock shows at the end of the slice. The effect
+/// clock_drift later sets the true times.
 pub(crate) fn begin<M: Measurement>(slice: Res<'_, Slice>, mut devices: Query<'_, '_, Beginning<'_, M>>) {
     for (mut device, mut samples, clock) in &mut devices {
         let samples = &mut *samples;
@@ -215,11 +215,11 @@ pub(crate) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, 
     }
 }
 
-/// Marks a cable counter that repeats a count, with the chainage of this count, m.
+/// Marks a cable counter that repeats one count, and holds the chainage of this count, m; `None` until the first count.
 #[derive(Debug, Default, Component)]
 pub(crate) struct Frozen(Option<f64>);
 
-/// Frozen cable counters repeat their first count since they were frozen.
+/// Cable counters that are frozen repeat the first count after they were frozen.
 pub(crate) fn freeze(mut counters: Query<'_, '_, (&mut Samples<Payout>, &mut Frozen)>) {
     for (mut samples, mut frozen) in &mut counters {
         for payout in &mut samples.list {

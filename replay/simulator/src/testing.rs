@@ -51,7 +51,7 @@ impl Dive {
         Self::with_heads(&[[0.0; 3]])
     }
 
-    /// Adds heads `sonar_0`, `sonar_1`, ... at these positions, all facing forward.
+    /// Adds heads `sonar_0`, `sonar_1`, ... at the positions `places`, all facing forward.
     pub(crate) fn with_heads(places: &[[f64; 3]]) -> Self {
         let ids = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"];
         let head = |(place, id): (&[f64; 3], &'static str)| {
@@ -75,7 +75,7 @@ impl Dive {
         Self { sensors: vec![sounder], ..Self::with_head() }
     }
 
-    /// Parses the scene with these effects from the text of a scene file.
+    /// Writes a scene file with these effects as text, and parses it.
     pub(crate) fn scene(&self, effects: &str) -> Result<Scene, SceneError> {
         let mut vehicle =
             format!("target_m = 0.5\n[tunnel]\n{}\nlength_m = 5000\n{}\n", self.tunnel, self.vehicle);
@@ -116,7 +116,7 @@ impl Dive {
         Dived { rows, messages }
     }
 
-    /// Text of the error if the scene with these effects is refused.
+    /// Text of the error with which the scene with these effects is refused. Panics if it is accepted.
     pub(crate) fn refusal(&self, effects: &str) -> String {
         match self.simulation(effects) {
             Ok(_) => panic!("{effects} was accepted"),
@@ -133,7 +133,7 @@ impl Dive {
             assert!(usual.messages == other.messages, "slices of {slice_ms} ms: {effects}");
             assert_eq!(usual.rows.len(), other.rows.len(), "slices of {slice_ms} ms: {effects}");
             for (a, b) in usual.rows.iter().zip(&other.rows) {
-                // Results are compared as text, in which NaN equals NaN.
+                // Results are compared as text, because NaN equals NaN only there.
                 assert_eq!(format!("{a:?}"), format!("{b:?}"), "slices of {slice_ms} ms: {effects}");
             }
         }

@@ -59,7 +59,7 @@ connect = "hid:1209:0001"
 counts_per_metre = 2000
 "#;
 
-/// A trajectory that leads forwards and then a little backwards; it lasts 35 s.
+/// A trajectory of 35 s that leads forwards and then a little backwards.
 pub(crate) const LEGS: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = 0.2\n\
                                [[trajectory.legs]]\ndistance_m = 1\nspeed_mps = -0.2\n";
 /// A trajectory of a single leg that lasts 640 s.
@@ -74,7 +74,7 @@ pub(crate) const WAYPOINTS: &str = "kind = \"waypoints\"\n[[trajectory.waypoints
 /// A message on a line: time, direction, and bytes.
 pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 
-/// A test bench: the scene of this file with arbitrary effects.
+/// A test bench: the scene that this file describes, with the given effects.
 pub(crate) struct Bench {
     layout: &'static str,
     scene: String,
@@ -144,7 +144,7 @@ impl Bench {
         u16::try_from(self.parse().unwrap().facts.sensors.len()).unwrap()
     }
 
-    /// All measurements of a sensor, simulated without the other sensors.
+    /// All measurements of a sensor. No other sensor is simulated.
     pub(crate) fn run<M: Measurement>(&self, sensor: &str) -> Vec<M> {
         let scene = self.parse().unwrap();
         Simulation::new(&scene).unwrap().measurements_of(self.source(sensor))

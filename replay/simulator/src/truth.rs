@@ -1,4 +1,5 @@
-//! Ground truth: for each measurement the vehicle's pose, the point on the wall, and the changes by effects.
+//! Ground truth: for each measurement, the vehicle's pose, the point of the wall that the beam hits, and the changes by
+//! effects.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
@@ -41,7 +42,7 @@ pub struct SoundingTruth {
     pub origin: Point3<Tunnel>,
     /// Direction of the beam's axis, a unit vector.
     pub direction: Vec3<Tunnel>,
-    /// True hit of the beam's axis, and the arc length at the hit, m.
+    /// True hit of the beam's axis, and the arc length at the hit, m; `None` if the beam hits nothing.
     pub wall: Option<(Hit, f64)>,
 }
 

@@ -1,4 +1,4 @@
-//! Splits the wall of a long dive into blocks, because a search in a [`Wall`] scans all samples of that wall.
+//! Splits the wall of a long dive into blocks, because a search in a [`Wall`] takes time for every sample of that wall.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ const WHOLE_M: f64 = 256.0;
 pub(crate) struct Blocks {
     /// Whole wall, for a short dive.
     whole: Option<Wall>,
-    /// Blocks of a long dive by block number, built on demand.
+    /// Blocks of a long dive. The key is the block's number. Blocks are built on demand.
     blocks: RefCell<BTreeMap<i64, Wall>>,
 }
 
@@ -44,11 +44,11 @@ impl Blocks {
             let places =
                 truth.samples.iter().map(|sample| sample.place).filter(|[x_m, _]| near.contains(x_m));
             // Building the wall never fails here: `Wall::new` rejects only coordinates that aren't numbers or are far
-            // too large. True samples have neither fault.
+            // too large. True samples have no such coordinates.
             Wall::new(places, truth.perimeter_m).unwrap_or_default()
         });
-        // A circle with a radius of `BEYOND_M` or more may contain samples beyond this block and its overlap. Such a
-        // hole counts as infinite.
+        // A circle with a radius of `BEYOND_M` or more may contain samples beyond this block and its overlap. The hole
+        // is therefore taken as infinite.
         Some(wall.hole_m(from_m, to_m)).filter(|hole_m| *hole_m < 2.0 * BEYOND_M).unwrap_or(f64::INFINITY)
     }
 }

@@ -1,8 +1,8 @@
 //! CPU time of this thread.
 //!
-//! Wall time is unusable on a loaded machine: it was seen at six to eight times the CPU time. The thread's CPU clock
-//! includes kernel work for the thread, such as page faults. `getrusage` separates user and kernel time by sampling
-//! every 4 ms, which is too coarse here.
+//! Wall time is unusable on a loaded machine. There, it was measured at six to eight times the CPU time. The thread's
+//! CPU clock includes kernel work for the thread, such as page faults. `getrusage` separates user and kernel time by
+//! sampling every 4 ms, which is too coarse here.
 
 use std::hint::black_box;
 

@@ -1,9 +1,9 @@
 //! Simulates a dive once, replays it with any settings, and compares the reported sections with the true holes D_true.
 //!
 //! The estimated chainage may have a constant offset (slack, wheel scale). Section bounds are in estimated chainage,
-//! because a pilot goes back to an estimated chainage. For the comparison, the bounds of each section are shifted by
-//! an offset. This offset is the median of true minus estimated vehicle chainage over all pings with samples in or
-//! near the section.
+//! because a pilot goes back to an estimated chainage. For the comparison, the bounds of each section are shifted by an
+//! offset of their own. It is the median of the vehicle's true chainage minus its estimated chainage, over all samples
+//! in or near the section.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -38,7 +38,7 @@ const NEAR_M: f64 = 1.0;
 /// Packets sent by the devices, in order of time.
 #[derive(Debug, Default)]
 pub struct Packets {
-    /// Receive time, source and end offset of each packet's bytes.
+    /// For each packet: receive time, source, and the offset in `bytes` at which the packet ends.
     list: Vec<(MonoNs, u16, usize)>,
     bytes: Vec<u8>,
 }
@@ -97,12 +97,12 @@ impl PacketSource for PacketFeed<'_> {
 pub struct Recorded {
     /// Packets sent by the devices.
     pub packets: Packets,
-    /// Simulated truth: the places where beams met the wall.
+    /// Simulated truth of the dive: the places where beams met the wall.
     pub truth: Arc<Truth>,
     /// True trajectory of the vehicle.
     pub scenery: Scenery,
     wall: Blocks,
-    /// Cache of the true holes D_true, by the bits of the stretch's bounds.
+    /// Cache of the true holes D_true. The key is the bit patterns of the two bounds of a stretch.
     holes_m: RefCell<BTreeMap<[u64; 2], f64>>,
 }
 
@@ -134,7 +134,7 @@ pub fn dive(scene: &Scene) -> Result<JudgedDive, TruthError> {
     dive_believing(scene, &scene.vehicle)
 }
 
-/// Simulates a scene and replays it with another vehicle file, whose sensors must send the same bytes.
+/// Simulates a scene and replays it with another vehicle file, with sensors that send the same bytes.
 ///
 /// Errors: see [`TruthError`].
 pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> Result<JudgedDive, TruthError> {
@@ -299,7 +299,7 @@ fn scenery_of(simulation: &Simulation) -> Result<Scenery, TruthError> {
     })
 }
 
-/// For each placed sample: its time, its estimated chainage, and the vehicle's estimated chainage.
+/// For each placed sample: its time, its estimated chainage, and the vehicle's estimated chainage at this time.
 #[derive(Resource, Default)]
 struct Seen(Vec<(MonoNs, f64, f64)>);
 
@@ -332,14 +332,14 @@ impl Seen {
     }
 }
 
-/// For each sample: its estimated chainage, and the vehicle's chainage offset (true minus estimated), m. Sorted by
-/// chainage.
+/// For each sample: its estimated chainage, and the vehicle's chainage offset (true minus estimated) at its time, m.
+/// The samples are sorted by chainage.
 #[derive(Default)]
 struct Shifts(Vec<(f64, f64)>);
 
 impl Shifts {
-    /// Median chainage offset (true minus estimated) of the samples near a section. If no sample is near, the offset of
-    /// the nearest sample. 0 in a dive without samples.
+    /// Median chainage offset (true minus estimated) of the samples near a section. If no sample is near, it is the
+    /// offset of the nearest sample. It is 0 in a dive without samples.
     fn about(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
         let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();

@@ -17,12 +17,12 @@ pub enum TruthError {
     /// The loop can't be driven.
     #[error("driving a loop to measure: {0}")]
     Driving(#[from] DriveError),
-    /// The oracle rejects the truth.
+    /// The oracle rejects the truth that the simulator gives.
     #[error("taking the true hole of {what}: {why}")]
     Oracle {
-        /// Rejected item.
+        /// Part of the truth that is rejected.
         what: String,
-        /// Reason.
+        /// Reason for the rejection.
         why: String,
     },
     /// A figure of the comparison can't be computed.
@@ -30,7 +30,7 @@ pub enum TruthError {
     Figure {
         /// Name of the figure.
         what: String,
-        /// Reason.
+        /// Reason why the figure can't be computed.
         why: String,
     },
 }

@@ -1,7 +1,7 @@
 //! Computes D_true: the hole diameter D over the places where beams truly met the wall.
 //!
-//! Simulated dives are compared with D_true. Its computation uses Voronoi vertices and edges of a triangulation, and
-//! arc lengths without ray casting. The program uses neither method.
+//! The results of simulated dives are compared with D_true. The computation finds circles by the Voronoi vertices and
+//! edges of a triangulation, and arc lengths without ray casting. The program uses neither of these methods.
 
 mod blocks;
 mod cpu;

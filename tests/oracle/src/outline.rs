@@ -1,5 +1,5 @@
-//! Computes arc lengths from many points on a profile's outline: at the crossing of a ray with the chord between two
-//! points.
+//! Computes arc lengths from many points on a profile's outline. The arc length of a ray is that of its crossing with
+//! the chord between two neighbouring points.
 //!
 //! This method shares no ray casting with the program.
 
@@ -50,8 +50,8 @@ impl Outline {
             self.points.partition_point(|(angle, ..)| *angle <= turned).clamp(1, self.points.len() - 1);
         let (_, a, arc_a_m) = self.points[after - 1];
         let (_, b, arc_b_m) = self.points[after];
-        // Distances of the chord's two ends from the ray. The crossing divides the chord in the ratio of these
-        // distances.
+        // `beside` gives the distance of a chord's end from the ray. The crossing divides the chord in the ratio of the
+        // distances of its two ends.
         let beside =
             |p: Yz| towards[0] * (p[1] - self.reference[1]) - towards[1] * (p[0] - self.reference[0]);
         let (left, right) = (beside(a), beside(b));

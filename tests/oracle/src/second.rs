@@ -1,15 +1,15 @@
 //! A second computation of the true hole D_true, which bounds the error of the first one.
 //!
 //! It uses no Voronoi vertices. For one chainage at a time, it finds the highest point of the lower envelope of
-//! distances to all samples. If a circle's centre moves, its radius grows by at most that movement. So a stretch of
-//! chainage is dropped if it can't hold a circle larger than the largest one found so far. All other stretches are
-//! halved.
+//! distances to all samples. If the centre of a circle moves, the circle's radius grows by at most the movement. A
+//! stretch of chainage that can't hold a larger circle than the largest one found so far is therefore dropped. All
+//! other stretches are halved.
 
 use super::truth::Truth;
 use super::wall::Wall;
 use crate::error::TruthError;
 
-/// Stretches of chainage with at most this half length aren't halved again, m.
+/// Stretches of chainage whose half length is at most this aren't halved again, m.
 const FINEST_M: f64 = 2e-10;
 
 /// Hole diameter D of a stretch between two chainages, computed from envelopes alone, m. It is exact to 0.5 nm, and
@@ -32,8 +32,9 @@ pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
 
 /// Bound on the error of the true holes D_true in a dive, m.
 ///
-/// This bound is the sum of two parts. One is the largest difference between the two computations over stretches of
-/// section length. The other is the error that the arc lengths of two samples may add.
+/// This bound is the sum of two parts. The first part is the largest difference between the two computations of D_true
+/// in `stretches` stretches of length `stretch_m`. The second part is the error that the arc lengths of two samples may
+/// add.
 ///
 /// Errors: as for [`Wall::new`].
 pub fn may_be_off_m(
@@ -52,7 +53,7 @@ pub fn may_be_off_m(
         if !one_m.is_finite() {
             continue;
         }
-        // Samples that are farther from the stretch than the hole's diameter can't touch the hole's circle.
+        // Samples whose distance from the stretch is larger than the hole's diameter can't touch the hole's circle.
         let near = |x_m: f64| x_m >= begin_m - one_m && x_m <= end_m + one_m;
         let places = truth.samples.iter().map(|sample| sample.place).filter(|place| near(place[0]));
         let other_m = hole_m(&Wall::new(places, truth.perimeter_m)?, begin_m, end_m);

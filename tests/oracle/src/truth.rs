@@ -26,7 +26,7 @@ pub const REPLACING: [&str; 10] = [
     "device_faults",
     "stuck_range",
 ];
-/// Properties by which the effects in [`REPLACING`] mark a changed return.
+/// Values whose change by an effect in [`REPLACING`] shows that the effect has changed the return.
 const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];
 
 /// A place where a beam truly met the wall.
@@ -43,7 +43,7 @@ pub struct TrueSample {
 /// Simulated ground truth of a dive: true samples and the vehicle's range of chainage.
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// Places where beams truly met the wall, grouped by source within each second.
+    /// Places where beams truly met the wall. Within each second of the dive, they are grouped by source.
     pub samples: Vec<TrueSample>,
     /// Smallest and largest chainage of the vehicle, m.
     pub way_m: [f64; 2],
@@ -74,7 +74,7 @@ pub struct TruthTaker {
 }
 
 impl TruthTaker {
-    /// Prepares to collect the truth of this scene; arc lengths are measured on `profile`.
+    /// Prepares to collect the truth of this scene; Arc lengths are measured on `profile`.
     pub fn new(scene: &Scene, simulation: &Simulation, profile: &Profile) -> Self {
         let sound_mps = scene.vehicle.site.sound_speed_mps;
         let reach = |sensor: &SensorFacts| sensor.head.map(|head| head.reach_m(sound_mps));

@@ -1,7 +1,7 @@
 //! Largest empty circles on an unrolled wall, from all samples at once.
 //!
 //! Candidate centres are the Voronoi vertices of a Delaunay triangulation with exact predicates, and the points where
-//! Voronoi edges cross the ends of a section. There are no cells and no search radius.
+//! Voronoi edges cross the ends of a section. Unlike the program, it uses no cells and no search radius.
 
 use headrace_geometry::math;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -41,7 +41,7 @@ pub struct Circle {
 pub struct Wall {
     perimeter_m: f64,
     samples: Vec<Place>,
-    /// The samples and their images one perimeter before and after, sorted by arc length.
+    /// The samples, and copies of them one perimeter before and one perimeter after, sorted by arc length.
     images: Vec<Place>,
     /// Empty circles through three samples, the largest first.
     circles: Vec<Circle>,
@@ -86,16 +86,17 @@ impl Wall {
         Some(best)
     }
 
-    /// Hole diameter D of a stretch between two chainages, m: that of its largest empty circle; infinite without
-    /// samples.
+    /// Hole diameter D of a stretch between two chainages, m: the diameter of the stretch's largest empty circle. It is
+    /// infinite without samples.
     pub fn hole_m(&self, from_m: f64, to_m: f64) -> f64 {
         self.largest(from_m, to_m).map_or(f64::INFINITY, |circle| 2.0 * circle.radius_m)
     }
 
-    /// The largest empty circle with its centre at one chainage. Its centre is equally far from two samples: it is
-    /// the highest point of the lower envelope of distances.
+    /// The largest empty circle with its centre at one chainage. Its centre is equally far from two samples, at the
+    /// highest point of the lower envelope of the distances to all samples.
     pub fn largest_on(&self, x_m: f64) -> Option<Circle> {
-        // All squared distances are parabolas of the same shape, so each pair of them crosses once.
+        // As functions of arc length, the squared distances to the samples are parabolas of the same shape. Each pair
+        // of them therefore crosses once.
         let mut envelope: Vec<(f64, f64)> = Vec::new();
         let crossing = |left: &(f64, f64), right: &(f64, f64)| {
             0.5 * (left.0 + right.0) + (right.1 - left.1) / (2.0 * (right.0 - left.0))
@@ -128,7 +129,7 @@ impl Wall {
     }
 }
 
-/// Circumcircles of a Delaunay triangulation, limited to centres on the wall; the largest comes first.
+/// Circumcircles of a Delaunay triangulation, limited to those with a centre on the wall. The largest comes first.
 fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError> {
     let tidy = |value: f64| if value.abs() < TINY_M { 0.0 } else { value };
     let vertices = images.iter().map(|[x, sigma]| Vertex(Point2::new(tidy(*x), tidy(*sigma)))).collect();
@@ -141,8 +142,8 @@ fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError
     let mut circles: Vec<Circle> = triangles
         .inner_faces()
         .filter_map(|face| circle(face.positions().map(|at| [at.x, at.y])))
-        // Rounding may move the centre of a circle near the seam to either side of the seam. The tolerance keeps at
-        // least one of two circles: the circle itself or its image across the seam.
+        // Where arc length jumps from the perimeter to 0, rounding may move the centre of a circle to either side of
+        // the jump. The tolerance keeps at least one of two circles: the circle itself, or its copy on the other side.
         .filter(|circle| (-ROUNDING_M..perimeter_m + ROUNDING_M).contains(&circle.centre[1]))
         .map(|Circle { centre: [x, sigma], radius_m }| Circle {
             centre: [x, math::wrap(sigma, perimeter_m)],

@@ -1,4 +1,5 @@
-//! The program, built as a binary of this package, because Cargo gives tests only binaries of their own package.
+//! The program under test. It is built as a binary of this package, because Cargo gives tests only the binaries of
+//! their own package.
 
 use std::process::ExitCode;
 

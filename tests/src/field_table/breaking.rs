@@ -19,7 +19,7 @@ pub struct DeviceFault {
     pub sense: Sense,
     /// Name of the device.
     pub sensor: String,
-    /// One of [`FAULTS`]. A device with the fault `die` never recovers; a device with the fault `return` does.
+    /// One of [`FAULTS`]. With `die`, the device dies for good. With `return`, it dies and later recovers.
     pub fault: &'static str,
     /// Start of the fault, seconds after the start of the dive.
     pub from_s: f64,
@@ -30,8 +30,8 @@ pub struct DeviceFault {
 }
 
 impl DeviceFault {
-    /// The fault that belongs to a seed, in a dive of this duration. Senses and faults rotate with the seed; all other
-    /// values are drawn.
+    /// The fault that belongs to a seed, in a dive of this duration. Consecutive seeds take the senses and faults in
+    /// turn. All other values are drawn at random.
     pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
         let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);
         let turn = usize::try_from(seed).unwrap();
@@ -44,7 +44,7 @@ impl DeviceFault {
         let from_s = duration_s * draw.between(0.2, 0.7);
         let length_s = math::exp(draw.between(0.0, math::ln(60.0)));
         let lasts = fault == "die" || draw.below(4) == 0;
-        // The jumps range from sizes that no check can detect to sizes that must be detected.
+        // The smallest jumps are too small for any check. The largest jumps must be detected.
         let [least, most] = match sense {
             Sense::Head | Sense::Inertial => [1.0, 40.0],
             _ => [0.05, 5.0],

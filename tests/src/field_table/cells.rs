@@ -28,12 +28,13 @@ pub struct Vehicle {
     pub layout: &'static str,
     /// Default length of a dive, m. It is larger for vehicles whose passes are far apart.
     pub length_m: f64,
-    /// Factor for the chainages of [`PLACES`], except for the place near the portal. It is 1 in a tunnel of 7 km.
+    /// Factor by which the chainages of [`PLACES`] are multiplied, except the place near the portal. It is 1 in a
+    /// tunnel of 7 km.
     pub far_share: f64,
     /// Noise of the inertial unit, unless a condition changes it.
     unit: Unit,
-    /// Largest speed that meets the target by the paper's Eq. 16, with the vehicle's own occlusion and no other margin,
-    /// m/s. The value is constant, so that speeds derived from it don't change with the planner.
+    /// Largest speed that meets the target by the paper's Eq. 16, reduced only for the vehicle's own occlusion, m/s.
+    /// The value is a constant, so that speeds derived from it don't depend on the planner.
     pub edge_mps: f64,
 }
 
@@ -84,10 +85,10 @@ pub enum Condition {
     Clean,
     /// Every sensor has the noise of its data sheet.
     DataSheet,
-    /// As `DataSheet`, but the vehicle file states the true sensor noises. The file allows for no rough walls, tilt or
-    /// cable slack.
-    Declared,
-    /// A MEMS inertial unit and cable slack, both stated in the vehicle file; a cable counter with 0.5 % error; steel
+    /// As `DataSheet`, but the vehicle file states the true sensor noises. The file makes no allowance for rough walls,
+    /// tilt or cable slack.
+    Told,
+    /// A MEMS inertial unit and cable slack, stated in the vehicle file. Also a counter with 0.5 % error, and steel
     /// nearby.
     Poor,
     /// Several lost returns in a row, returns from objects in front of the wall, and second echoes.
@@ -150,7 +151,7 @@ pub const CONDITIONS: [(&str, Condition); 19] = [
 /// Place at which a dive starts: name, and chainage in m.
 pub type Place = (&'static str, f64);
 
-/// Places at which dives start. Tunnels shorter than 7 km use a fraction of the chainage ([`Vehicle::far_share`]).
+/// Places at which dives start. In tunnels shorter than 7 km, the chainages are reduced ([`Vehicle::far_share`]).
 pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900.0)];
 
 /// Speed and manner in which the pilot drives during a dive.
@@ -164,7 +165,7 @@ pub enum Driven {
     Swung,
     /// At this multiple of the largest speed by the paper's Eq. 16, with the heads in phase for the planned speed.
     Times(f64),
-    /// By a pilot who never goes back and follows the live advice within 5 %, with a delay of 3 s.
+    /// By a pilot who never goes back. He follows the live advice within 5 %, with a delay of 3 s.
     Advised,
     /// By a pilot who drives at 1.2 times the largest speed by the paper's Eq. 16, and afterwards goes back for every
     /// missed section.
@@ -190,7 +191,7 @@ pub struct Cell {
     pub condition: Condition,
     /// Chainage at which the dive starts, m.
     pub start_m: f64,
-    /// Chainage at which the vehicle is launched, m, if it drives from there to `start_m`.
+    /// Chainage at which the vehicle is launched, m, if this isn't `start_m`. The vehicle then drives to `start_m`.
     pub let_in_m: Option<f64>,
     /// Speed and manner of driving.
     pub driven: Driven,
@@ -204,7 +205,7 @@ pub struct CellDive {
     pub believed: Scene,
 }
 
-/// Noise and resolution of the depth sensor; heads and echosounders have separate tables. Source:
+/// Noise and resolution of the depth sensor; Heads and echosounders have tables of their own. Source:
 /// `replay/simulator/src/implied_effects/data_sheets.rs`.
 const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
 /// Noise and biases of the inertial units. Source: `plugins/imu_can/src/noise.rs`, and the defaults of `[navigation]`
@@ -221,20 +222,20 @@ const MEMS_TOLD: &str = "gyro_noise_degps_rthz = 0.007\naccel_noise_mps2_rthz = 
      gyro_bias_time_s = 300\naccel_bias_mps2 = 0.02\naccel_bias_time_s = 300\n";
 const STEEL: &str = "magnetic_disturbance = { per_100m = 4, up_to_deg = 10, length_m = 6 }\n";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
-/// Cable slack settings of the vehicle file for a taut cable. `HANGS` has those for a hanging cable.
+/// Cable slack settings of the vehicle file for a taut cable. `HANGS` has the settings for a hanging cable.
 const TAUT: &str = "slack_sd_m = 0.003\nslack_time_s = 10\n";
 const MOUNTS: &str = "mount_sd_deg = 0.3\n";
 const HANGS: &str = "slack_sd_m = 0.06\nslack_time_s = 10\n";
 
 /// Settings of the vehicle file that state the noises of the `DataSheet` effects.
 ///
-/// They cover heads (resolution 2 cm, noise 1 cm, range 10 m), echosounders, depth (152 Pa) and attitudes. Cable and
-/// scale have almost no noise. The preset of an inertial unit states its noise.
+/// The settings cover heads (resolution 2 cm, noise 1 cm, range 10 m), echosounders, depth (152 Pa) and attitudes. The
+/// cable and its scale have almost no noise. The noise of the inertial unit comes from the unit's preset.
 const TRUE_NOISES: &str = "return_sd_m = 0.0116\necho_sd_m = 0.02\ndepth_sd_m = 0.0155\ntilt_sd_deg = 0.3\nattitude_sd_deg = 0.3\n\
      heading_sd_deg = 0.3\ndeviation_deg = 0.01\ntether_sd_m = 0.0001\nslack_sd_m = 0.0001\nslack_time_s = 10\ntether_scale_sd = 0.00001\n";
 
-/// Standard deviation of a rough wall, m. Together with the noise of the heads, it gives the 3 cm that vehicle files
-/// allow for.
+/// Standard deviation of the roughness of a wall, m. Roughness and noise of the heads together give the 3 cm that
+/// vehicle files allow for.
 const ROUGH_M: f64 = 0.028;
 
 /// Largest deviation of the wall from the design, m: the sum of several lining tolerances.
@@ -268,14 +269,14 @@ impl Cell {
         self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
 
-    /// Broken device and its fault, in the dive with this seed and length.
+    /// The device that is broken in the dive with this seed and length, and its fault.
     pub fn broken(&self, seed: u64, length_m: f64) -> DeviceFault {
         let plain = self.plain(seed, length_m);
         let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
         DeviceFault::of(seed, &plain, length_m / speed_mps)
     }
 
-    /// The scene of a dive without effects; its speed is arbitrary.
+    /// The scene of a dive without effects. Its speed has no meaning.
     fn plain(&self, seed: u64, length_m: f64) -> Scene {
         parse(&self.text(seed, length_m, 0.1, ""), &self.declared(), seed)
     }
@@ -296,9 +297,9 @@ impl Cell {
         declared.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.declared_navigation()))
     }
 
-    /// Navigation settings that state the slack of the cable and the noise of the unit, if the pilot knows both in this
-    /// condition.
-    fn declared_navigation(&self) -> String {
+    /// Navigation settings of the vehicle file that headrace reads. In most conditions they state only the slack of a
+    /// taut cable. In some they also state noises or mount errors.
+    fn told_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
             Condition::Declared => TRUE_NOISES.to_owned(),
@@ -314,8 +315,8 @@ impl Cell {
             declared.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
         };
         match self.condition {
-            // The cable counter reads too little, not too much, so that no estimated chainage lies beyond the tunnel's
-            // end.
+            // A cable counter that reads too little keeps estimated chainages within the tunnel. One that reads too
+            // much could put them beyond its end.
             Condition::Poor => counts(0.995),
             Condition::WrongCable => counts(0.98),
             Condition::WrongMount => {
@@ -332,7 +333,8 @@ impl Cell {
         match self.driven {
             Driven::Planned | Driven::Stood | Driven::Swung => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
-            // For these kinds of driving, the second value is the largest speed that the pilot may drive.
+            // A pilot who follows advice has no fixed speed. For these kinds of driving, the second value is the
+            // largest speed that he may drive.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
         }
     }
@@ -407,7 +409,7 @@ impl Cell {
         )
     }
 
-    /// Bulges and hollows around the whole wall, two per metre of tunnel.
+    /// Bulges and hollows at random places all around the wall, two per metre of tunnel.
     fn as_built(&self, seed: u64, length_m: f64) -> String {
         let most_m = self.aside_m(OFF_DESIGN_M);
         let mut draw = Draw::new(seed ^ 0xb17);
@@ -428,8 +430,8 @@ impl Cell {
         text
     }
 
-    /// A third of the dive with another wall: wider, with a ditch or with a side tunnel. Only tunnels with a floor have
-    /// ditches and side tunnels.
+    /// Another wall on the middle third of the dive: wider, with a ditch or with a side tunnel. Only tunnels with a
+    /// floor have ditches and side tunnels.
     fn altered(&self, seed: u64, length_m: f64) -> String {
         let mut draw = Draw::new(seed ^ 0xa17e);
         let from_m = self.start_m + length_m / 3.0;
@@ -462,7 +464,7 @@ impl Cell {
         }
     }
 
-    /// Limits an offset from the centre line, m, so that the vehicle keeps clear of the wall of a narrow pipe.
+    /// Reduces an offset from the centre line, m, if the vehicle is in a narrow pipe and must keep clear of its wall.
     fn aside_m(&self, most_m: f64) -> f64 {
         if self.vehicle.name == "pipe" { 0.3 * most_m } else { most_m }
     }
@@ -520,7 +522,7 @@ impl Cell {
     /// Murky stretches of 5 to 20 m length with gaps of 2 to 6 m.
     ///
     /// In these stretches, 10 to 30 % of the heads' returns are missing, several in a row. Clusters in front of the
-    /// wall cause 5 % of the returns, and second echoes cause some. Source: field.md, "murk".
+    /// wall cause 5 % of the returns, and second echoes cause some more. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();
@@ -580,7 +582,7 @@ fn quoted(ids: &[String]) -> String {
     format!("{ids:?}")
 }
 
-/// Turns one head in a vehicle file by 3 degrees about the vertical.
+/// Changes a vehicle file: turns one head by 3 degrees about the vertical.
 fn turned(file: &str, head: &str) -> String {
     let mut within = false;
     let mut lines = Vec::new();

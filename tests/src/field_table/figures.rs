@@ -18,12 +18,12 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("tether", Sense::Tether),
     ("dvl", Sense::Velocity),
 ];
-/// Length that is left out at each end of a dive, in addition to a length equal to the target, m. Sections
-/// there have neighbours on one side only. The length covers the hull and the distance to the next pass.
+/// Length that is left out at each end of a dive, in addition to a length equal to the target, m. Sections there have
+/// neighbours on one side only. The 2 m cover the length of the hull and the distance between passes.
 const END_M: f64 = 2.0;
 /// A hole belongs to a section if its centre is at least this far from both bounds of the section, m.
 const FLANK_M: f64 = 0.005;
-/// A section counts as entered if the vehicle reaches at least this far into it, m.
+/// A section counts as entered if the vehicle drives at least this far into it, m.
 const TOUCH_M: f64 = 0.02;
 
 /// A section that passed although its true hole exceeds the target.
@@ -62,15 +62,15 @@ pub struct Figures {
     pub failed_under: u32,
     /// Total inner length, which excludes the ends of dives, m.
     pub inner_m: f64,
-    /// Inner length with each verdict, m: passed, failed, can't say, open.
+    /// Inner length by verdict, m, in this order: passed, failed, can't say, open.
     pub verdicts_m: [f64; 4],
     /// Inner length with a true hole D_true within the target, m.
     pub passable_m: f64,
-    /// One pair for each inner section with a bounded hole, unless the hole is centred on a boundary of the section:
-    /// hole D minus true hole D_true, and the standard deviation of D, m.
+    /// One pair for each inner section with a bounded hole: the hole D minus the true hole D_true, and the standard
+    /// deviation of D, m. Sections whose hole is centred on their boundary are left out.
     pub errors: Vec<[f64; 2]>,
-    /// For each kind of sensor: number of measurements that the filter used, and sum of their normalised innovations
-    /// squared.
+    /// For each kind of sensor: the number of measurements that the filter used, and the sum of their normalised
+    /// innovations squared.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
     /// Advised speeds, without the speeds near the ends of dives, m/s.
     pub advised_mps: Vec<f64>,
@@ -161,8 +161,8 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle centred on a section's boundary belongs to the neighbouring section's hole. If the circle counted
-        // here, that hole would count twice.
+        // A circle that is centred on a section's boundary is part of the neighbouring section's hole. That hole must
+        // not count twice.
         let is_own = section
             .report
             .hole_x_m
@@ -195,7 +195,7 @@ impl Figures {
             return;
         };
         let from = math::floor_to_i64((dive.truth.way_m[0] - first.shift_m) / section_m);
-        // A trajectory doesn't enter the section that begins at the trajectory's end.
+        // A section that begins where the trajectory ends isn't entered.
         let to = math::floor_to_i64((dive.truth.way_m[1] - last.shift_m - TOUCH_M) / section_m);
         let mut reported: Vec<i64> = dive
             .sections
@@ -254,12 +254,12 @@ impl Figures {
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Among sections with a true hole D_true over the target, the fraction that passed.
+    /// Fraction of false passes: passed sections among those with a true hole D_true over the target.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Among sections with a true hole D_true below 0.9 times the target, the fraction that failed.
+    /// Fraction of false fails: failed sections among those with a true hole D_true below 0.9 times the target.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }

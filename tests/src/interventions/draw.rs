@@ -1,4 +1,4 @@
-//! Dives with injected causes, drawn from a seed. Writes their vehicle and scene files with any of the causes
+//! Dives with injected causes, drawn from a seed. Their vehicle and scene files can be written with any of the causes
 //! removed.
 
 use std::f64::consts::TAU;
@@ -11,13 +11,13 @@ use crate::random_dives::Draw;
 
 /// Chainage at which dives begin, m.
 pub(super) const START_M: f64 = 3.0;
-/// Distance that a vehicle drives beyond the far end, m. A vehicle that turns back too early stops this far
-/// short of the far end.
+/// Distance that a vehicle drives beyond the far end of the dive, m. A vehicle that turns back too early stops this far
+/// before the far end.
 const ON_M: f64 = 4.5;
-/// Distance over which the vehicle rolls to its new roll angle before a rolled pass, m.
+/// Before a pass in a rolled attitude, the vehicle rolls over this distance, m.
 const ROLLS_OVER_M: f64 = 1.0;
 
-/// Tables of the sensors that determine the vehicle's position. No part of the hull hides them.
+/// Tables of the sensors that determine the vehicle's position. No part of the hull blocks their beams.
 const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"
@@ -63,8 +63,7 @@ pub enum Injected {
     MissingReturns { keys: String },
     /// A range setting of the heads that is shorter than the distance to the wall, m.
     OutOfRange { range_m: u32 },
-    /// Parts of the vehicle hide the wall from the beams. Vehicle files declare these parts even if the cause isn't
-    /// injected.
+    /// Parts of the vehicle hide the wall from the beams. Vehicle files always declare these parts.
     Occluded,
     /// The vehicle is offset from the centre line by [y, z], m.
     Aside { over_m: [f64; 2], by_m: [f64; 2] },
@@ -126,13 +125,13 @@ pub struct Drawn {
     pub end_m: f64,
     /// Speed without injected causes, m/s.
     pub speed_mps: f64,
-    /// Target T, m; only an estimate until the dive has been simulated.
+    /// Target T, m. Until the dive has been simulated, this is only an estimate.
     pub target_m: f64,
     /// Ratio of the target to the largest hole without injected causes.
     pub margin: f64,
     tunnel: Tunnel,
     mode: &'static str,
-    /// Vehicle file tables of the heads, without mode and range.
+    /// Tables of the heads in the vehicle file, without the keys for mode and range.
     heads: Vec<String>,
     hull: &'static str,
     way: &'static str,
@@ -141,7 +140,8 @@ pub struct Drawn {
     swaying: bool,
     /// A stretch on which the vehicle obeys a speed limit, and the limit in m/s.
     at_most: Option<([f64; 2], f64)>,
-    /// A stretch that the vehicle passes again at the end of the dive, and the roll angle to each side, degrees.
+    /// A stretch that the vehicle passes again at the end of the dive, and the angle by which it then rolls to each
+    /// side, degrees.
     again: Option<([f64; 2], f64)>,
 }
 
@@ -209,7 +209,7 @@ pub const KINDS: [Cause; 11] = [
 ];
 
 impl Drawn {
-    /// Draws the dive of a seed with these kinds of causes, given as indices of [`KINDS`].
+    /// Draws the dive of a seed. `kinds` are the kinds of its causes, as indices of [`KINDS`].
     pub fn of(seed: u64, kinds: &[usize]) -> Self {
         let mut draw = Draw::new(seed);
         let causes: Vec<Cause> = kinds.iter().map(|kind| KINDS[*kind]).collect();
@@ -254,15 +254,15 @@ impl Drawn {
         drawn
     }
 
-    /// The same dive with other random noise, selected by number.
+    /// The same dive with other random noise. `noise` selects the noise.
     #[must_use]
     pub fn with_noise(&self, noise: u64) -> Self {
         Self { noise: self.seed + 1_000_000 * noise, ..self.clone() }
     }
 
-    /// The same dive without these causes and with a speed limit (m/s) on a stretch.
+    /// The same dive without the causes that `without` selects, and with a speed limit (m/s) on a stretch.
     ///
-    /// If a roll angle (degrees) is given, the vehicle also passes this stretch again, rolled by this angle.
+    /// If a roll angle `again_deg` is given, the vehicle also passes this stretch again, rolled by this angle.
     #[must_use]
     pub fn changed(
         &self,
@@ -318,7 +318,7 @@ impl Drawn {
             },
             Cause::Phase => {
                 let mut offsets_deg = vec![0.0; count];
-                // At any time, all heads look almost in the direction of the first head. So their passes leave gaps.
+                // With these offsets, all heads always look in almost the same direction, so their passes leave gaps.
                 for (head, offset_deg) in offsets_deg.iter_mut().enumerate().skip(1) {
                     let together_deg = 360.0 * head as f64 / count as f64;
                     *offset_deg = math::wrap_signed(together_deg * draw.between(0.7, 1.0), 360.0);
@@ -421,8 +421,8 @@ impl Drawn {
         let last_m = if turns_back { self.end_m - ON_M } else { self.end_m + ON_M };
         points.push(self.point(&|_| false, last_m, last_m));
         if let Some(([from_m, to_m], roll_deg)) = self.again {
-            // Heads that are apart along the hull are in phase in the forward direction only. So a pass rolled to
-            // each side needs two forward runs.
+            // If heads are mounted at different places along the hull, they are in phase only while the vehicle moves
+            // forwards. Passes that are rolled to the left and to the right therefore need two forward runs.
             let from_m = from_m.max(START_M);
             let to_m = to_m.min(self.end_m + ON_M);
             let sides_deg: &[f64] = if roll_deg > 0.0 { &[-roll_deg, roll_deg] } else { &[0.0] };
@@ -450,7 +450,7 @@ impl Drawn {
                 Injected::TooFast { over_m, factor } if (over_m[0]..over_m[1]).contains(&before_m) => {
                     point.speed_mps *= factor;
                 }
-                // Between neighbouring points of the path, the vehicle moves to the offset or back.
+                // The vehicle moves to the offset, and later back, between neighbouring points of the path.
                 Injected::Aside { over_m, by_m } if (over_m[0]..=over_m[1]).contains(&x_m) => {
                     point.place_m = [point.place_m[0] + by_m[0], point.place_m[1] + by_m[1]];
                 }

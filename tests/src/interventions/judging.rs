@@ -12,7 +12,7 @@ const END_M: f64 = 2.0;
 /// Failed sections within this distance of each other form one stretch, m.
 const JOIN_M: f64 = 0.5;
 
-/// A hole up to this multiple of the target counts as close to the target.
+/// A hole whose diameter is at most this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
 /// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of these
@@ -32,8 +32,8 @@ pub struct Judged {
     pub run: Option<u32>,
     /// Diameter of the section's hole, m.
     pub hole_m: f64,
-    /// Diameter of the hole with one injected cause removed, one value per cause, m; infinite if the hole can't
-    /// be measured.
+    /// For each injected cause, the diameter of the hole if this cause is removed, m; infinite if the hole can't be
+    /// measured.
     pub without_m: Vec<f64>,
     /// Evidence that the program reports for the displayed causes.
     pub evidence: Evidence,
@@ -45,8 +45,8 @@ impl Judged {
         self.right.contains(&self.reported)
     }
 
-    /// Whether the only displayed cause is nearly right: the cause was injected, and without the cause the hole exceeds
-    /// the target by at most 5 %.
+    /// Whether a single cause is displayed that is nearly right. It was injected, and without it the hole exceeds the
+    /// target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.reported == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
@@ -63,7 +63,7 @@ pub struct InterventionDive {
     pub sections: Vec<Judged>,
 }
 
-/// A stretch: neighbouring failed sections that share a right answer.
+/// A stretch: neighbouring failed sections that have at least one right set of causes in common.
 pub struct Stretch<'a> {
     /// Sections of the stretch.
     pub sections: &'a [Judged],
@@ -72,10 +72,9 @@ pub struct Stretch<'a> {
 }
 
 impl Stretch<'_> {
-    /// Causes that are displayed for most sections of the stretch.
-    pub fn reported(&self) -> &[Cause] {
-        let count =
-            |reported: &[Cause]| self.sections.iter().filter(|section| section.reported == reported).count();
+    /// The set of causes that is displayed for more of the stretch's sections than any other set.
+    pub fn told(&self) -> &[Cause] {
+        let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
         self.sections
             .iter()
             .map(|section| section.reported.as_slice())
@@ -83,7 +82,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// Number of displayed missed stretches (`run`) that contain sections of this stretch.
+    /// Number of missed stretches (`run`) that the program displays for the sections of this stretch.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();
@@ -107,8 +106,8 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let is_inner = |section: &&SectionRow| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
-    // The target may be changed here: holes don't depend on it. All later reports use the new target for their
-    // verdicts.
+    // The target may still be changed here, because holes don't depend on it. All later reports use the new target for
+    // their verdicts.
     let all = report(&drawn, &|_| true);
     let without: Vec<Report> = match kinds {
         [_, _] => (0..2).map(|k| report(&drawn, &|other| other != k)).collect(),
@@ -202,7 +201,8 @@ impl InterventionDive {
     }
 }
 
-/// Kinds of causes in the dive with this number. Dives with even numbers have one cause, all others two, in rotation.
+/// Kinds of causes in the dive with this seed. Dives with even seeds have one cause, all others have two. Consecutive
+/// dives take the causes in turn.
 pub fn kinds(seed: u64) -> Vec<usize> {
     let number = usize::try_from(seed).unwrap();
     if number.is_multiple_of(2) {

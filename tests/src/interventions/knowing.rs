@@ -1,4 +1,5 @@
-//! Upper bound on the fraction of correct causes. It comes from a reference that knows the injected causes.
+//! Upper bound on the fraction of causes that a program can display correctly. It comes from a reference that knows the
+//! injected causes.
 //!
 //! The reference simulates the same dive without each cause, but with other noise than the judged dive. Its fraction
 //! of right answers is an upper bound for any method.
@@ -13,8 +14,8 @@ use super::matrix::Count;
 /// Number of noise seeds with which the reference simulates each dive.
 const NOISES: u64 = 3;
 
-/// Number of right answers of the reference for dives with two causes. The reference knows everything except the
-/// noise.
+/// Number of right answers of the reference for dives with two causes. The reference knows everything about a dive
+/// except the noise.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct UpperBound {
     /// Answers for all stretches.
@@ -57,7 +58,7 @@ impl UpperBound {
 }
 
 impl InterventionDive {
-    /// Sets of causes that count as right for each section, from simulations with another noise.
+    /// Sets of causes that count as right for each section, from simulations with the noise number `noise`.
     fn with_noise(&self, noise: u64) -> Vec<Right> {
         let drawn = self.drawn.with_noise(noise);
         let without = [0, 1].map(|k| report(&drawn, &|other| other != k));

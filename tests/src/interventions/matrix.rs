@@ -48,15 +48,16 @@ pub struct Matrix {
     pub stretches: [Count; 2],
     /// Answers for stretches that truly have two causes.
     pub pairs: Count,
-    /// As `pairs`, but a nearly right answer counts as right: see [`super::Judged::is_close`].
+    /// As `pairs`, but an answer that is nearly right also counts as right: see [`super::Judged::is_close`].
     pub close_pairs: Count,
-    /// Answers for stretches. An answer is right if the stretch is displayed as at most one missed stretch (`run`).
+    /// Answers for stretches. An answer is right if the program displays the whole stretch as one missed stretch
+    /// (`run`) or as none.
     pub one_run: Count,
     /// Number of dives without a failed section.
     pub idle: u32,
-    /// Number of sections and of stretches by true and displayed cause, for dives with one cause.
-    reported: BTreeMap<(String, String), [u32; 2]>,
-    /// Number of wrong stretches by true and displayed cause, for dives with two causes.
+    /// Number of sections and number of stretches for each pair of true and displayed cause, in dives with one cause.
+    told: BTreeMap<(String, String), [u32; 2]>,
+    /// Number of stretches with a wrong answer for each pair of true and displayed causes, in dives with two causes.
     wrong: BTreeMap<(String, String), u32>,
 }
 

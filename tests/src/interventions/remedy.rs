@@ -9,7 +9,7 @@ use super::judging::{InterventionDive, Judged, hole_at_m, report};
 /// Length added at either end of a stretch that is passed again, m, because heads are mounted at different places along
 /// the hull.
 const ROOM_M: f64 = 2.0;
-/// Roll angle of a vehicle that hides the wall from its own heads, degrees.
+/// Roll angle for the second pass of a vehicle that hides part of the wall from its own heads, degrees.
 const ROLLED_DEG: f64 = 75.0;
 
 /// A missed stretch with its displayed remedy, and the result of simulating the remedy.
@@ -40,7 +40,7 @@ fn mends(action: Action, injected: &Injected) -> bool {
     }
 }
 
-/// Simulates the displayed remedy of each missed stretch. Skips stretches in which injected causes explain no section.
+/// Simulates the displayed remedy of each missed stretch. Skips those in which injected causes explain no section.
 pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
     let of_run = |reported: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(reported.run)).cloned().collect()
@@ -61,12 +61,9 @@ fn remedy(dive: &InterventionDive, reported: &ReturnReport, sections: &[Judged])
     } else {
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
-    // The action "slower" without a speed means that other settings of the heads are enough at the planned speed.
-    let at_most_mps = if reported.at_most_mps > 0.0 || !has(Action::Slower) {
-        reported.at_most_mps
-    } else {
-        dive.drawn.speed_mps
-    };
+    // If the action "slower" has no speed, other settings of the heads are enough at the planned speed.
+    let at_most_mps =
+        if told.at_most_mps > 0.0 || !has(Action::Slower) { told.at_most_mps } else { dive.drawn.speed_mps };
     let then = report(&dive.drawn.changed(&mended, over_m, at_most_mps, again_deg), &|_| true);
     let then_m: Vec<[f64; 2]> =
         sections.iter().map(|section| [section.ends_m[0], hole_at_m(&then, section.ends_m[0])]).collect();

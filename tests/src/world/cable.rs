@@ -12,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Host, Line, OpenError, OpenErrorKind, READ_BYTES};
 use headrace_sensor::connect::Connect;
 
-/// Errors that an open line may return after its connection breaks.
+/// Errors that an open line may return after its connection has broken.
 pub const FAILURES: [io::ErrorKind; 4] = [
     io::ErrorKind::BrokenPipe,
     io::ErrorKind::ConnectionReset,
@@ -48,9 +48,9 @@ pub struct Cable {
     pub refuses: AtomicBool,
     /// Whether the machine's writes to the device fail.
     pub deaf: AtomicBool,
-    /// Number of breaks of the connection. Lines that were opened before a break fail.
+    /// Number of breaks of the connection. A line that was opened before the latest break fails.
     breaks: AtomicU64,
-    /// Error that lines return after the last break, as an index of [`FAILURES`].
+    /// Error that lines return after the latest break, as an index of [`FAILURES`].
     failure: AtomicU64,
     /// Number of breaks before the latest opening, plus one; 0 before the first opening. The connection is intact if
     /// this number exceeds `breaks`.
@@ -71,7 +71,7 @@ impl Cable {
         Self { connect, to_host, to_device, refuses, deaf, breaks, failure, opened, unread }
     }
 
-    /// Delivers a message of the device. Datagrams are dropped if too many of them are unread.
+    /// Delivers a message of the device. If too many datagrams are unread, the new one is dropped.
     pub fn arrive(&self, bytes: Vec<u8>) {
         if matches!(self.connect, Connect::Udp { .. }) && self.to_host.len() >= KEPT_DATAGRAMS {
             self.unread.fetch_add(1, Ordering::SeqCst);
@@ -80,7 +80,7 @@ impl Cable {
         }
     }
 
-    /// Breaks the cable's connection; unread data is lost.
+    /// Breaks the cable's connection. Data that the machine hasn't read yet is lost.
     pub fn break_off(&self, failure: usize) {
         while self.to_host.pop().is_some() {}
         self.failure.store(failure as u64, Ordering::SeqCst);
@@ -129,7 +129,7 @@ struct OpenCable {
     cable: Arc<Cable>,
     clock: Arc<Clock>,
     breaks: u64,
-    /// Rest of a message that was longer than the last read.
+    /// Rest of a message that was longer than the buffer of the last read.
     left: VecDeque<u8>,
 }
 
@@ -169,7 +169,7 @@ impl Line for OpenCable {
         self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
-    /// Exchanges one message with the device, as over UDP. The answer also arrives as one message with its own length.
+    /// Writes one message to the device. As over UDP, the answer arrives as one message with its own length.
     fn exchange(
         &mut self,
         write: &[u8],

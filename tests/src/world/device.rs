@@ -53,12 +53,12 @@ impl Device {
         &self.cable
     }
 
-    /// Number of frames sent whole and in order over an open cable.
+    /// Number of frames that the device has sent whole and in order over an open cable.
     pub fn whole(&self) -> u64 {
         self.whole
     }
 
-    /// Whether the cable loses no frame: at worst, it delays and splits frames.
+    /// Whether no frame is lost on the cable. The cable may still delay and split frames.
     pub fn is_lossless(&self) -> bool {
         self.faults.iter().all(|fault| matches!(fault.what, CableFault::Cut | CableFault::Held))
     }
@@ -73,8 +73,8 @@ impl Device {
         self.was_broken
     }
 
-    /// Handles the bytes from the machine, measures, sends, and delivers the parts of frames that are due. A `quiet`
-    /// device sends nothing new.
+    /// Handles the bytes from the machine, measures, sends, and delivers the parts of frames that are due. If `quiet`
+    /// is set, the device sends nothing new.
     pub fn step(&mut self, now: MonoNs, quiet: bool) {
         self.connection(now);
         let mut out = Vec::new();
@@ -135,7 +135,7 @@ impl Device {
             self.put(now, frame.clone());
         }
         if self.has(CableFault::Disordered, now) && self.random.one_in(4) {
-            // Messages that are sent later may overtake this message.
+            // The delay lets messages that are sent later overtake this message.
             let late = now + DurNs(self.random.below(LONGEST_DELAY_NS) as i64);
             let place = self.under_way.partition_point(|(at, _)| *at <= late);
             return self.under_way.insert(place, (late, frame));
@@ -172,7 +172,7 @@ impl Device {
         }
     }
 
-    /// Queues a part of a frame after all parts queued before, because cables keep the order.
+    /// Queues a part of a frame. It arrives no earlier than the parts queued before it, because cables keep the order.
     fn put(&mut self, at: MonoNs, bytes: Vec<u8>) {
         let at = self.under_way.back().map_or(at, |(last, _)| at.max(*last));
         self.under_way.push_back((at, bytes));

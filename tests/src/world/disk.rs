@@ -1,4 +1,4 @@
-//! A disk in memory that fails and waits as planned, and the content that is left after a kill or a power cut.
+//! A disk in memory that fails and waits as planned, and keeps the content that a kill or a power cut leaves.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::random::Random;
 
 /// Smallest unit that a power cut leaves intact, bytes.
 const SECTOR_BYTES: usize = 512;
-/// Linux error number for an input or output error. `ENOSPC` means no space left on the device.
+/// Linux error number for an input or output error. `ENOSPC` is the number for a full device.
 const EIO: i32 = 5;
 const ENOSPC: i32 = 28;
 
@@ -24,7 +24,7 @@ enum Done {
     Created(PathBuf),
     Wrote(PathBuf, Vec<u8>),
     Synced(PathBuf),
-    /// A failed sync, after which unsynced data reads as zeros.
+    /// A sync of this file failed. Data that wasn't synced before reads as zeros from then on.
     Lost(PathBuf),
     Removed(PathBuf),
 }
@@ -64,7 +64,7 @@ impl SimulatedDisk {
         Self { clock, faults: faults.into(), done, busy_until, syncs, failed, sabotage }
     }
 
-    /// Time at which the last operation is complete; its caller waits until then.
+    /// Time at which the last operation is complete. The caller of that operation waits until then.
     pub fn busy_until(&self) -> MonoNs {
         MonoNs(self.busy_until.load(Ordering::SeqCst))
     }
@@ -74,12 +74,12 @@ impl SimulatedDisk {
         self.syncs.load(Ordering::SeqCst)
     }
 
-    /// Time at which an operation begins: after the earlier ones.
+    /// Time at which a new operation begins: now, or at the end of all earlier operations.
     fn begins(&self) -> MonoNs {
         self.clock.now().max(self.busy_until())
     }
 
-    /// Performs an operation after the earlier ones; returns the time at which it is complete.
+    /// Performs an operation when all earlier operations are complete. Returns the time of its completion.
     fn take_turn(&self, is_sync: bool) -> MonoNs {
         let begins = self.begins();
         let active = self.faults.iter().filter(|window| window.holds(begins));
@@ -98,8 +98,9 @@ impl SimulatedDisk {
         self.failed.len()
     }
 
-    /// Returns the files that are left on the disk after the dive. A kill or a power cut stops operations that are not
-    /// complete. After a power cut, unsynced data is cut off or has holes.
+    /// Returns the files that are left on the disk after the dive. If the dive ends by a kill or a power cut,
+    /// operations that are not complete by then have no effect. After a power cut, unsynced data is also cut off or has
+    /// holes.
     pub fn left(&self, ending: Ending, random: &mut Random) -> Vec<LeftFile> {
         let mut files: Vec<LeftFile> = Vec::new();
         while let Some((complete, done)) = self.done.pop() {

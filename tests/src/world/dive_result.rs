@@ -23,11 +23,11 @@ pub struct DiveResult {
     pub disk_failures: usize,
     /// Files of the recording that are left on the disk.
     pub left: Vec<LeftFile>,
-    /// Number of consumed packets that must be in the log, whichever way the dive ends.
+    /// The first `certain` consumed packets must be in the log, whichever way the dive ends.
     pub certain: usize,
     /// Whether the recorder left packets out because its queue was full.
     pub has_left_out: bool,
-    /// Longest time for which packets waited to be taken although the loop ran.
+    /// Longest time for which packets waited for the loop while it was running.
     pub longest_wait: DurNs,
 }
 
@@ -40,7 +40,8 @@ pub struct Replayed {
     pub digest: u64,
     /// Losses that the replay reported.
     pub losses: Vec<String>,
-    /// Result of the replay after the plan's change of the files, or the reason why they can't be read as a log.
+    /// Result of another replay, after the files were changed as planned; or the reason why the changed files can't be
+    /// read as a log. `None` if no change is planned.
     pub changed: Option<Result<Box<Self>, String>>,
 }
 
@@ -55,7 +56,7 @@ pub struct Line {
     pub whole: u64,
     /// Number of good frames that the loop found.
     pub good: u64,
-    /// Counts of openings, losses and dropped packets of the line, and its last status.
+    /// Last status of the line, and its numbers of openings, losses and dropped packets.
     pub history: LineHistory,
 }
 

@@ -1,8 +1,8 @@
 //! Reduces a failure to the fewest faults.
 
-/// Returns faults that still fail, such that without any one of them nothing fails.
+/// Returns some of the faults that together still make a test fail. Without any single one of them, the test succeeds.
 ///
-/// `fails` says whether these faults fail. All faults together do.
+/// `fails` tells whether the test fails with the given faults. With all faults together it must fail.
 pub fn fewest<T: Clone>(faults: &[T], mut fails: impl FnMut(&[T]) -> bool) -> Vec<T> {
     let mut left = faults.to_vec();
     let mut number = 0;

@@ -27,8 +27,8 @@ pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<St
     broken
 }
 
-/// Whether the recorder must record everything: nothing stalls and no disk operation fails. A disk that performs only
-/// some operations per second is no reason to leave packets out.
+/// Whether the recorder must record everything, because nothing stalls and no disk operation fails. A disk that
+/// performs only a few operations per second is no excuse for leaving packets out.
 fn keeps_up(lived: &DiveResult) -> bool {
     let plan = &lived.plan;
     let is_limited = |what: DiskFault| matches!(what, DiskFault::OpsLimited { .. });
@@ -39,7 +39,8 @@ fn keeps_up(lived: &DiveResult) -> bool {
         && !plan.cables.iter().flatten().any(|window| is_held(window.what))
 }
 
-/// Number of packets that the loop never took, or took in another order.
+/// Number of packets in `theirs` that the loop never took, or took in another order. `ours` are the packets that it
+/// took.
 fn invented(ours: &[Consumed], theirs: &[Consumed]) -> usize {
     let mut rest = ours.iter();
     theirs.iter().filter(|packet| !rest.any(|other| other == *packet)).count()
@@ -47,8 +48,8 @@ fn invented(ours: &[Consumed], theirs: &[Consumed]) -> usize {
 
 /// Checks the replay of the recording whose files were changed after the dive.
 ///
-/// The order of the parts doesn't matter. No packet is counted twice, and missing packets are reported. Otherwise the
-/// log is refused by an error that names a file.
+/// The order of the parts doesn't matter. No packet may be counted twice, and missing packets must be reported. Instead
+/// of a replay, an error that names a file is also right, unless only the order of the parts was changed.
 fn of_changed(lived: &DiveResult, replayed: &Replayed) -> Option<String> {
     let (change, changed) = (lived.plan.log?, replayed.changed.as_ref()?);
     let what = match changed {
@@ -76,8 +77,8 @@ fn of_changed(lived: &DiveResult, replayed: &Replayed) -> Option<String> {
     Some(format!("the recording after its change ({change:?}): {what}"))
 }
 
-/// Checks one device: other devices' faults don't affect it, delays lose no frame, and it runs again after all
-/// faults.
+/// Checks that other devices' faults don't affect a device, that delays lose none of its frames, and that it runs again
+/// after all faults.
 fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let is_of = |fault: MachineFault| matches!(fault, MachineFault::LoopStalls | MachineFault::PortsStall);
@@ -101,8 +102,8 @@ fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
 
 /// Checks a log against the dive.
 ///
-/// The log contains every packet that the loop took, in the loop's order. Recorder and reader report exactly the
-/// missing packets. The log also states the packets that a line dropped before the loop.
+/// The log contains every packet that the loop took, in the loop's order. Recorder and reader report exactly those
+/// packets that are missing. The log also states the packets that a line dropped before the loop.
 fn of_log(lived: &DiveResult, replayed: &Replayed) -> Vec<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let (ours, theirs) = (&lived.consumed, &replayed.consumed);

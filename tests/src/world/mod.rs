@@ -52,11 +52,11 @@ pub use sabotage::Sabotage;
 
 /// Longest time step of the simulated world, ns.
 const LONGEST_STEP_NS: usize = 12_000_000;
-/// Longest wait at the end of a dive for data that is on its way to the loop.
+/// At the end of a dive, the world waits at most this long for data that is on its way to the loop.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
-/// Capacity of the queue of notices to the terminal. It is small, so that the queue becomes full soon.
+/// Capacity of the queue of notices to the terminal. It is small so that the queue is soon full.
 const NOTICES: usize = 4;
-/// Age beyond which recorded packets are always synced: half a second plus one step of the world.
+/// Recorded packets older than this are always synced. The age is half a second plus one step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
 const TUNNEL: &str = r#"name = "a world of faults"
@@ -96,7 +96,7 @@ pub fn vehicle_text() -> String {
     text
 }
 
-/// Returns the seeds of `HEADRACE_WORLD_SEEDS`, such as `1000..2000`, or the default ones without that variable.
+/// Returns the seeds of `HEADRACE_WORLD_SEEDS`, such as `1000..2000`, or the seeds `default` if the variable isn't set.
 pub fn seeds(default: Range<u64>) -> Range<u64> {
     let Ok(text) = std::env::var("HEADRACE_WORLD_SEEDS") else { return default };
     let (from, to) = text.split_once("..").unwrap();
@@ -116,10 +116,10 @@ pub struct World {
     consumed: Vec<Consumed>,
     disk: SimulatedDisk,
     recorder: RecorderWorker,
-    /// Moments since the last disk failure at which the recorder's queue was empty, each with the number of packets
-    /// consumed by then.
+    /// Moments at which the recorder had emptied its queue, each with the number of packets that it had then recorded.
+    /// A disk failure clears the list.
     taken: VecDeque<(MonoNs, usize)>,
-    /// Time at which a sync is complete, and number of packets that are then certain.
+    /// Syncs in progress: the completion time of each, and the number of packets that are then certainly in the log.
     syncing: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
     is_behind: bool,
@@ -135,7 +135,7 @@ pub struct World {
 }
 
 impl World {
-    /// Creates the world of a seed; the dive hasn't begun.
+    /// Creates the world of a seed. Its dive hasn't begun yet.
     pub fn new(seed: u64) -> Self {
         Self::with(seed, None, None)
     }
@@ -208,7 +208,7 @@ impl World {
         }
     }
 
-    /// The same world with a terminal that accepts nothing if `is_open` is set, and otherwise everything.
+    /// The same world with another terminal. The terminal accepts nothing if `stands` is set, and everything otherwise.
     #[must_use]
     pub fn with_terminal(mut self, is_open: bool) -> Self {
         self.plan = self.plan.with_terminal(is_open);
@@ -275,7 +275,7 @@ impl World {
     /// Lets the recorder write until its queue is empty or the disk has an operation to complete.
     ///
     /// Without a disk failure, packets are synced by a sync that begins half a second and one step after the recorder
-    /// took them, or earlier. They count as certainly recorded when that sync is complete.
+    /// took them, or earlier. When this sync is complete, they count as certainly recorded.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
         let (failures, syncs) = (self.disk.failures(), self.disk.syncs());
@@ -299,7 +299,7 @@ impl World {
             self.taken.clear();
             return;
         }
-        // The recorder syncs at the end of a step only if it has emptied its queue.
+        // Packets taken so far can only be certain if the recorder has emptied its queue or synced in this step.
         if is_empty || self.disk.syncs() > syncs {
             self.taken.push_back((now, self.consumed.len() - self.skipped));
             while let Some((at, count)) = self.taken.front().copied()
@@ -360,8 +360,8 @@ impl World {
 }
 
 impl DiveResult {
-    /// Writes the files that are left on the disk to `folder` and replays them. Then replays a recording without an orderly
-    /// end after it was continued, and the files after a change.
+    /// Writes the files that are left on the disk to `folder` and replays them. Also continues a recording that has no
+    /// orderly end and replays it, and replays the files after the planned change.
     ///
     /// Errors: the files can't be read as a log, or the recording can't be continued.
     pub fn replay(&self, folder: &Folder, sabotage: Option<Sabotage>) -> Result<Replayed, String> {
@@ -395,7 +395,7 @@ impl DiveResult {
     ) -> Result<Box<Replayed>, String> {
         let (number, mut left) = (self.certain % self.left.len(), self.left.clone());
         let own = &mut left[number].bytes;
-        // Before a part is doubled or joined, it may have been cut.
+        // A part that is doubled or joined is first cut, in half of the worlds.
         if change == LogChange::Cut || change != LogChange::Reordered && self.certain.is_multiple_of(2) {
             own.truncate(self.certain * 257 % own.len().max(1));
         }
@@ -442,7 +442,8 @@ fn replayed_apart(files: &[PathBuf]) -> Result<Replayed, String> {
 
 /// If a recording has no orderly end, continues it for some ticks and replays the whole recording.
 ///
-/// Errors: packets from before or after the interruption are missing, or no loss states the interruption.
+/// Errors: packets from before or after the interruption are missing, or the replay reports no loss for the
+/// interruption.
 fn resumed(recording: &Path, so_far: &Replayed) -> Result<(), String> {
     const TICKS: u64 = 20;
     let Some(unfinished) = Unfinished::read(recording).map_err(|error| error.to_string())? else {
@@ -534,8 +535,8 @@ fn assemble(
 
 /// Does the work of a line service's thread until the thread would wait.
 fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
-    // The driver reads once in each round. The limit detects a driver that is due again at once in every round; a real
-    // thread would never wait.
+    // The driver reads once in each round. If it is due again at once in every round, a real thread would never wait.
+    // The limit of rounds detects this.
     for _ in 0..10_000 {
         let due = match service.closed_until() {
             Some(until) => until <= now,

@@ -6,7 +6,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::random::Random;
 
-/// Time of the simulated clock at which dives start; the machine was switched on some time before.
+/// Time of the simulated clock at which dives start. It isn't zero, as if the machine was switched on some time before.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 /// Faults begin within this time from the start of a dive, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
@@ -14,7 +14,7 @@ const END_WITHIN_NS: usize = 7_000_000_000;
 /// Duration of a dive. It includes time to recover after the last fault.
 const LENGTH: DurNs = DurNs(12_000_000_000);
 /// Longest delay on a cable, ns. It is shorter than any silence timeout. `LONGEST_STALL_NS` is the longest stall of the
-/// loop or recorder, long enough to fill the queues.
+/// loop or recorder. It is long enough to fill the queues.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;
@@ -117,7 +117,7 @@ pub enum DiskFault {
     Full,
     /// No file can be created.
     CreateFails,
-    /// The disk performs only so many operations per second: each write and each sync takes its turn.
+    /// The disk performs a limited number of operations per second. Each write and each sync waits for its turn.
     OpsLimited {
         /// Number of operations that the disk performs per second.
         per_s: u16,
@@ -129,7 +129,7 @@ pub enum DiskFault {
     },
 }
 
-/// Operations per second of a limited disk: from an SD card in poor condition to a hard disk.
+/// Operations per second of a limited disk, from an SD card in poor condition to a hard disk.
 const OPS_PER_S: [u16; 5] = [3, 10, 30, 100, 300];
 /// Durations of slow syncs, ms.
 const SYNCS_MS: [u16; 6] = [10, 100, 250, 700, 2000, 5000];
@@ -168,12 +168,12 @@ pub enum Fault {
     Disk(Window<DiskFault>),
     /// A change of the recording's files.
     Log(LogChange),
-    /// An end of the dive that isn't regular, and its time.
+    /// An end of the dive by a kill or a power cut, and its time.
     Ending(Ending, MonoNs),
 }
 
 impl Fault {
-    /// Returns the kind of the fault as text, the same for all faults of a kind.
+    /// Returns the kind of the fault as text. The text is the same for all faults of a kind.
     pub fn kind(&self) -> String {
         match self {
             Self::Cable(_, window) => format!("cable: {:?}", window.what),
@@ -275,7 +275,7 @@ impl Plan {
         plan
     }
 
-    /// The same plan with a terminal that accepts nothing if `is_open` is set, and otherwise everything.
+    /// The same plan with another terminal. The terminal accepts nothing if `stands` is set, and everything otherwise.
     #[must_use]
     pub fn with_terminal(mut self, is_open: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);

@@ -13,7 +13,8 @@ pub enum Sabotage {
     SyncLies,
     /// The log doesn't state the packets that a line dropped.
     DropsUntold,
-    /// The recorder writes single sectors, so each of them takes its turn on a limited disk.
+    /// The recorder writes every sector by a separate operation, which makes it too slow for a disk with limited
+    /// operations.
     WritesSectors,
     /// Parts and copies of a log are replayed one after the other in the given order, without a check.
     PartsReadApart,

@@ -16,7 +16,8 @@ fn change(text: &str, from: &str, to: &str) -> String {
     text.replace(from, to)
 }
 
-/// Output of the program for each wrong text. Every run must end with a usage error and write nothing to stdout.
+/// Output of the program for each of the wrong texts that `cases` makes from `text`. Every run must end with a usage
+/// error and write nothing to stdout.
 fn refusals(command: &[&str], file: &str, text: &str, cases: &[(&str, &str, &str)]) -> String {
     let folder = Folder::with_dive();
     let mut said = String::new();
@@ -300,7 +301,7 @@ fn truncated_log_is_used_up_to_the_cut_and_the_rest_reported_lost() {
             let last_s = (messages[read - 1].log_time - messages[0].log_time) as f64 * 1e-9;
             assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
 
-            // The readable part gives the same results as an undamaged log that has only the readable messages.
+            // The readable part of the damaged log gives the same results as an intact log with only these messages.
             write_log(&folder.path("short.mcap"), WriteOptions::new(), Some(VEHICLE), &messages[..read]);
             let (_, short) = folder.replay("short.mcap", &[]);
             assert_eq!(report["digest"], short["digest"], "{log} {tenths}");
@@ -337,7 +338,7 @@ fn corrupt_log_loses_only_the_broken_chunk() {
         assert_eq!(code, Some(3));
         let read = usize::try_from(report["log"]["messages"].as_u64().unwrap()).unwrap();
         assert!(read < count && read > count * 8 / 10, "{read} of {count}");
-        // The loss extends from the last message before the broken chunk to the first message after it.
+        // The reported loss extends from the last message before the broken chunk to the first message after the chunk.
         let [loss] = losses(&report)[..] else { panic!("{:?}", losses(&report)) };
         let close = |word, at_ns: u64| (seconds(loss, word) - (at_ns - first_ns) as f64 * 1e-9).abs() < 0.02;
         assert_eq!(chunk.message_start_time > first_ns, loss.contains("after"), "{loss}");

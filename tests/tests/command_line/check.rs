@@ -1,5 +1,5 @@
-//! `headrace check` lists all errors of a file at once. It also reports sensors that can't share a port, walls out of
-//! range, and the same figures as `plan`.
+//! `headrace check` lists all errors of a file at once. It also reports sensors that can't share a port and walls that
+//! are out of range. Its figures are the same as those of `plan`.
 
 use std::fmt::Write as _;
 
@@ -92,7 +92,7 @@ fn findings(cases: &[(&str, &[(&str, &str)])]) -> String {
     for (what, changes) in cases {
         folder.write("vehicle.toml", changed(VEHICLE, changes));
         let answer = folder.headrace(&["check", "vehicle.toml"]);
-        // If `check` finds errors, it prints no summary; warnings don't suppress the summary.
+        // If `check` finds errors, it prints no summary. If it finds only warnings, it prints the summary.
         assert_eq!(answer.stdout.is_empty(), answer.code == Some(2), "{what}");
         write!(said, "{what}: {}\n{}", answer.code.unwrap(), answer.stderr).unwrap();
     }
@@ -281,7 +281,7 @@ fn json_has_every_error_with_its_line() {
     assert_eq!(errors[1]["line"], line("id = \"imu\""));
 }
 
-/// CSV text of a surveyed profile: a circle of 3 m radius with this number of points.
+/// CSV text of a surveyed profile: a circle with a radius of 3 m and this number of points.
 fn surveyed(points: u32) -> String {
     let mut text = "y_m,z_m\n".to_owned();
     for k in 0..points {
@@ -340,8 +340,8 @@ fn too_many_sensors_give_the_same_error_in_check_and_run() {
     assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
 }
 
-/// The heads' phases are set at the start of the dive, for the planned speed in the vehicle file. The speed limit from
-/// `check` applies to these phases. `run` gives the same limit.
+/// At the start of a dive, the phases of the heads are set for the planned speed in the vehicle file. The speed limit
+/// from `check` is the limit for heads with these phases. `run` gives the same limit.
 #[test]
 fn check_gives_the_speed_limit_for_head_phases_of_the_planned_speed() {
     let folder = Folder::new();

@@ -29,7 +29,7 @@ fn completions_know_all_commands_and_are_valid_scripts() {
         assert!(answer.stdout.contains("sound-speed"), "{shell}: options of commands");
     }
     let script = folder.headrace(&["completions", "bash"]).stdout;
-    // Completes a word as readline does.
+    // This script completes the word "rep" as readline does.
     let asked = "\nCOMP_WORDS=(headrace rep); COMP_CWORD=1; _headrace headrace rep headrace; echo \"${COMPREPLY[*]}\"\n";
     let bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     let Ok(mut bash) = bash else { return skipped("no bash") };
@@ -50,7 +50,8 @@ fn every_command_has_a_manual_page() {
         let page = String::from_utf8(folder.read(&format!("pages/headrace-{command}.1"))).unwrap();
         assert!(page.contains(".SH SYNOPSIS") && page.contains(&command), "{page}");
     }
-    // Manual pages can be written a second time. A page that another program wrote is only overwritten with `--force`.
+    // Manual pages can be written a second time. If another program has written a page, this page is only overwritten
+    // with `--force`.
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(0));
     folder.write("pages/headrace.1", ".TH headrace 1\n");
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(2));
@@ -108,7 +109,7 @@ fn commands_longer_than_2_s_show_the_remaining_time() {
     quiet.end();
 }
 
-/// Another process that shares stdout may have made stdout non-blocking.
+/// The report must be complete even if another process that shares stdout has made it non-blocking.
 #[cfg(target_os = "linux")]
 #[test]
 fn report_is_complete_on_a_non_blocking_pipe() {
@@ -116,12 +117,12 @@ fn report_is_complete_on_a_non_blocking_pipe() {
     let folder = Folder::with_dive();
     let (mut reader, mut writer) = std::io::pipe().unwrap();
     fcntl_setfl(&writer, OFlags::NONBLOCK).unwrap();
-    // Nearly fills the pipe, which holds 64 KiB. JSON allows leading spaces.
+    // Nearly fills the pipe, which holds 64 KiB. The spaces do no harm, because JSON allows leading spaces.
     writer.write_all(&vec![b' '; 60_000]).unwrap();
     let mut command = program();
     command.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path("")).stdout(writer);
     let mut replay = command.spawn().unwrap();
-    // The `Command` value still holds a copy of the pipe's writing end.
+    // The `Command` value still holds a copy of the pipe's writing end, which would keep the pipe open.
     drop(command);
     std::thread::sleep(std::time::Duration::from_secs(2));
     let mut bytes = Vec::new();
@@ -162,7 +163,8 @@ fn lack_of_address_space_gives_an_error_and_no_abort() {
         assert_eq!(output.status.code(), Some(1), "{limit_kib}: {said}");
         assert!(said.contains("MiB of address space for the dive: the system refuses it"), "{said}");
     }
-    // A dive in a long tunnel needs more address space. With any limit it is refused or replayed, but never aborted.
+    // A dive in a long tunnel needs more address space. Whatever the limit is, the dive is either refused or replayed,
+    // and the program never aborts.
     folder.write("long.toml", headrace_tests::VEHICLE.replace("length_m = 100", "length_m = 20000"));
     let mut refused = 0;
     for limit_kib in [250_000, 400_000, 700_000, 1_000_000, 1_300_000, 1_700_000, 2_500_000] {
@@ -212,7 +214,7 @@ fn unwritable_output_is_a_failure() {
     // A live dive succeeds even if its stdout is redirected to a full disk.
     let dive = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max"];
     assert_eq!(code(&dive, full()).0, Some(0));
-    // Closing the reading end is no error: the reader wants no more output.
+    // If a reader closes its end of the pipe, this is no error, because it wants no more output.
     for arguments in [&["replay", "live.mcap"][..], &["replay", "live.mcap", "--json"], &["help"], &dive] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);

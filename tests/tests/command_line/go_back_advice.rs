@@ -4,8 +4,8 @@
 use headrace_tests::{Folder, root};
 use serde_json::Value;
 
-/// Output lines (JSON) of a dive in which the shipped vehicle follows this scene's path.
-fn json_lines(scene: &str) -> Vec<Value> {
+/// Output lines (JSON) of a dive in which a shipped vehicle follows the trajectory in `scene`.
+fn told(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
     folder.write("vehicle.toml", std::fs::read(file).unwrap());
@@ -25,7 +25,7 @@ fn figure(line: &Value, key: &str) -> f64 {
     line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
 }
 
-/// Displayed conditions (such as "too_fast") between two chainages while the vehicle moves in one direction. The
+/// Displayed conditions (such as "too_fast") between two chainages while the vehicle moves in one direction. The first
 /// seconds after a reversal are left out.
 fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");
@@ -48,8 +48,8 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     assert_eq!(cleared[0]["from_m"], flags[0]["from_m"]);
     let [from_m, to_m] = ["from_m", "to_m"].map(|key| figure(cleared[0], key));
     assert!(to_m - from_m > 4.0, "{from_m} to {to_m}");
-    // On the way back, new samples leave some sections undecided until the vehicle passes them again. Inside the missed
-    // stretch, no line may report this.
+    // On the way back, new samples make some sections undecided until the vehicle passes them again. No output line
+    // inside the missed stretch may report these sections.
     let unsure = of(&lines, "cannot_say");
     let within = unsure.iter().filter(|line| (from_m..to_m).contains(&figure(line, "from_m")));
     assert_eq!(within.count(), 0, "{unsure:?}");
@@ -81,8 +81,8 @@ fn too_fast_is_not_raised_over_passed_wall_or_while_reversing() {
     assert!(back.len() > 5 && back.iter().all(|condition| *condition == "going_back"), "{back:?}");
 }
 
-/// When the vehicle goes forward again, the speed limit is displayed early enough for the pilot to slow down before the
-/// heads reach unsampled wall.
+/// After the way back, the vehicle goes forward again. The speed limit is then displayed early enough for the pilot to
+/// slow down before the heads reach unsampled wall.
 #[test]
 fn speed_limit_is_displayed_again_before_the_heads_reach_unsampled_wall() {
     let lines = json_lines(

@@ -13,8 +13,8 @@ fn headrace(folder: &Folder, rust_log: Option<&str>, arguments: &[&str]) -> Answ
     Answer { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 
-/// Probes an address without a listener. The probe logs events of this crate (vehicle file) and of `headrace_ports`
-/// (probe).
+/// Probes an address without a listener. The crate of the program then logs that it reads the vehicle file, and the
+/// crate `headrace_ports` logs the probe.
 fn probe(folder: &Folder, rust_log: Option<&str>, flags: &[&str]) -> Answer {
     let devices = ["devices", "--vehicle", "vehicle.toml", "--address", "tcp:127.0.0.1:1", "--json"];
     headrace(folder, rust_log, &[flags, &devices].concat())

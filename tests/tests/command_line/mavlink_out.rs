@@ -1,5 +1,5 @@
-//! Checks the messages of `--mavlink-out` as a ground station receives them. They are read with a decoder that was
-//! written from the MAVLink guide, independently of headrace's decoder.
+//! Checks the messages of `--mavlink-out` as a ground station receives them. The decoder in this file was written from
+//! the MAVLink guide, independently of headrace's decoder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::UdpSocket;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, root};
 
-/// Names of values that QGroundControl would mistake for values of the autopilot.
+/// Names of values that QGroundControl takes for values of the autopilot. headrace must not use them.
 const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
@@ -33,7 +33,8 @@ fn said(datagram: &[u8]) -> Said {
     assert_eq!((datagram[0], datagram[2], datagram.len()), (0xfd, 0, 12 + length), "{datagram:?}");
     assert_eq!(datagram[5..7], [7, 191], "system and component");
     let id = u32::from_le_bytes([datagram[7], datagram[8], datagram[9], 0]);
-    // CRC_EXTRA (checksum seed) of a MAVLink message. Only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT may occur.
+    // CRC_EXTRA (checksum seed) of the message, by message id. Only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT may
+    // occur.
     let extra =
         *BTreeMap::from([(0, 50), (251, 170), (253, 83)]).get(&id).unwrap_or_else(|| panic!("message {id}"));
     let summed = datagram[1..10 + length].iter().copied().chain([extra]);
@@ -123,7 +124,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     );
     assert!(limits.iter().any(|mps| (0.2..0.35).contains(mps)), "{limits:?}");
     assert!(values("HR_MISS_M").iter().any(|m| *m > 2.0));
-    // STATUSTEXT messages with parts of a long text have the same id; the test joins them.
+    // STATUSTEXT messages with the parts of a long text have the same id. The test joins these parts.
     let mut texts: BTreeMap<(usize, u16), String> = BTreeMap::new();
     for (place, said) in of(253).enumerate() {
         let id = u16::from_le_bytes([said.payload[51], said.payload[52]]);

@@ -15,7 +15,7 @@ fn refuses(folder: &Folder, command: &[&str], there: &str) {
     assert_eq!(folder.read(there), before, "{command:?}");
 }
 
-/// Checks that a command refuses to write to its own input, even with `--force`. The folder stays unchanged.
+/// Checks that a command refuses to overwrite its own input, even with `--force`. The folder stays unchanged.
 #[track_caller]
 fn never(folder: &Folder, command: &[&str]) {
     let before = content(folder);
@@ -233,7 +233,7 @@ fn command_never_writes_its_own_input() {
     for further in [["--record", "vehicle.toml"], ["--record", "live.mcap"]] {
         never(&folder, &[&run[..], &further].concat());
     }
-    // A vehicle file may have any name, also that of a report.
+    // A vehicle file may have any name, even one that looks like a report's.
     folder.write("vehicle.json", VEHICLE);
     never(&folder, &["run", "vehicle.json", "--source", "live.mcap", "--report", "./vehicle.json"]);
     let import = ["import", "candump.log", "--source", "imu=can0", "--vehicle", "vehicle.toml", "-o"];
@@ -283,7 +283,7 @@ fn output_that_links_to_an_input_is_refused() {
 #[test]
 fn two_outputs_of_a_command_must_differ() {
     let folder = Folder::with_dive();
-    // The recording is named like a report, because a report must have this extension.
+    // The recording gets the extension `.json`, because a report must have it and both must name the same file.
     let run = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", "x.json"];
     let live = ["run", "vehicle.toml", "--for", "1", "--record", "x.json"];
     for run in [&run[..], &live] {
@@ -371,7 +371,7 @@ fn existing_file_stays_if_the_new_one_cannot_be_written() {
     }
 }
 
-/// The simulation writes to an unnamed file until it is complete, which requires a file system with such files.
+/// Until the simulation is complete, it writes to an unnamed file. The test needs a file system that has unnamed files.
 #[cfg(target_os = "linux")]
 #[test]
 fn killed_simulation_leaves_no_file() {

@@ -106,7 +106,7 @@ fn json_and_csv_have_the_same_figures() {
     }
 }
 
-/// Slightly above v_max, the spacing T still meets the target, but without a margin for position errors.
+/// At a speed slightly above v_max, the spacing T still meets the target, but leaves no margin for position errors.
 #[test]
 fn speed_above_v_max_misses_the_target_even_if_t_meets_it() {
     let folder = Folder::new();
@@ -152,7 +152,7 @@ fn measured_turn_times_of_a_vehicle_file_override_the_table() {
         (mode["turn_s"].as_f64().unwrap(), mode["turn_basis"].as_str().unwrap().to_owned())
     };
     assert_eq!(turn("fast"), (6.0, "measured".to_owned()));
-    // The range of 5 m is a sixth of the way from 4 m to 10 m, the ranges with measured times.
+    // Turn times were measured at ranges of 4 m and 10 m. The range of 5 m is a sixth of the way between them.
     assert_eq!(turn("slow"), (16.0, "estimated".to_owned()));
     // A range that is shorter by 5 m shortens the sound path of each of the 600 pings by 10 m. At 1500 m/s this saves 4
     // s per turn.
@@ -265,8 +265,8 @@ fn pictures_are_identical_in_every_run() {
     }
 }
 
-/// The documents must show the pictures that the command draws now. After an intended change, the command in
-/// docs/how-to/plan/README.md draws them again.
+/// The documents must show the pictures that the command draws now. If a change is intended, draw them again with the
+/// command in docs/how-to/plan/README.md.
 #[test]
 fn pages_show_the_pictures_of_the_current_program() {
     let folder = Folder::new();
@@ -299,8 +299,8 @@ fn lines_written_by_plan_configure_the_best_mode() {
     assert!((0.0..0.001).contains(&(0.95 * v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
     assert_eq!(line("mode"), format!("mode = {}", best["mode"]));
     assert_eq!(written.stdout.matches("[[sensors]]").count(), 4);
-    // If the lines from `plan --write` replace the same keys of the vehicle file, `check` accepts the file and computes
-    // the same v_max.
+    // The lines from `plan --write` replace the same keys in the vehicle file. Then `check` accepts the file and
+    // computes the same v_max.
     let old = std::fs::read_to_string(VITA_2).unwrap();
     let pasted: Vec<String> = old
         .lines()

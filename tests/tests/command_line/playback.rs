@@ -1,4 +1,4 @@
-//! `replay --interactive` with keys on a terminal and with commands from a pipe; demonstrations on a terminal.
+//! `replay --interactive` with keys on a terminal and with commands from a pipe; the command `demo` on a terminal.
 
 use std::io::Write as _;
 use std::process::Stdio;
@@ -77,7 +77,8 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     let folder = Folder::new();
     let mut screen = Screen::run(&folder, &["demo", "--speed", "20x", "--out", "demo"], 100, &[]);
     screen.until("m/s");
-    // A wrapper such as `timeout` sends the signal twice: to the program, and then to its process group.
+    // The test sends the signal twice, because a wrapper such as `timeout` does so: to the program, and then to its
+    // process group.
     screen.signal(Signal::INT);
     std::thread::sleep(std::time::Duration::from_millis(5));
     screen.signal(Signal::INT);
@@ -121,7 +122,7 @@ fn finished_demonstration_is_replayed_on_its_open_page_until_q() {
     assert!(refused["why"].as_str().unwrap().contains("this dive has ended"), "{refused}");
     viewer.send(&json!({"do": "play", "command": "seek", "to_s": end_s}));
     viewer.until("the end", |viewer| viewer.state["now_s"].as_f64() == Some(end_s));
-    // At the end of the log, the dive is played from its beginning.
+    // If playback is at the end of the log, `go` plays the dive from its beginning.
     viewer.send(&json!({"do": "play", "command": "go"}));
     viewer.until("the beginning", |viewer| viewer.state["now_s"].as_f64().unwrap() < end_s - 300.0);
     screen.press(b"q");

@@ -11,8 +11,8 @@ const RENEW: &str = "HEADRACE_RENEW_README";
 
 /// The part of the demonstration's piped output that the README shows.
 ///
-/// It consists of the line with the missed section, the state after it, the line that clears the section, and the
-/// summary with the length of each verdict.
+/// It consists of four parts: the line about the missed section, the line with the state after that, the line that
+/// clears the section, and the summary with the length of each verdict.
 fn excerpt(stdout: &str) -> String {
     let lines: Vec<&str> = stdout.lines().collect();
     let missed = lines.iter().position(|line| line.contains("MISSED: ")).unwrap();

@@ -1,4 +1,4 @@
-//! A loop accepts each sensor only once. The report counts readings that a decoder withheld.
+//! A loop accepts each sensor only once. The report counts the readings that a decoder withheld.
 
 use headrace_config::Document;
 use headrace_fusion::direct::DirectNavigation;

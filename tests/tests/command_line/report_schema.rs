@@ -64,7 +64,8 @@ fn golden_reports_match_the_schema() {
     let mut golden = bless();
     assert_eq!(faults(&schema, &golden), Vec::<String>::new());
     assert_eq!(golden["log"], Value::Null);
-    // Renewing a golden report keeps its tolerances and adds keys that an earlier version didn't have.
+    // If a golden report is renewed, its tolerances stay, and keys that earlier versions of the program didn't write
+    // are added.
     golden["tolerances"] = serde_json::json!({"/summary/hole/max_m": 0.1});
     golden.as_object_mut().unwrap().remove("log");
     folder.write("golden.json", golden.to_string());
@@ -101,11 +102,12 @@ fn wrong_report_violates_the_schema() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Suffixes of report keys, each with its unit. The description of a key with this suffix must contain the unit.
+/// Suffixes of report keys, each with its unit. The schema's description of a key with such a suffix must contain the
+/// unit.
 const UNITS: [(&str, &str); 13] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),
-    // These two keys are also keys of the vehicle file.
+    // The next two keys have the same names as in the vehicle file.
     ("clock_from", "hours"),
     ("clock_to", "hours"),
     ("_deg", "degrees"),

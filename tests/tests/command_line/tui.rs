@@ -1,6 +1,7 @@
 //! Checks `--tui` on terminals of several sizes with a separate terminal emulator.
 //!
-//! The tests cover pages of golden dives at fixed times, keys, and the restored terminal after every kind of exit.
+//! The tests cover the pages of golden dives at fixed times and the keys. They also check that the terminal is restored
+//! after every kind of exit.
 
 use headrace_tests::screen::Screen;
 use headrace_tests::{Folder, root};
@@ -19,8 +20,8 @@ fn ended(log: &str, size: (u16, u16), variables: &[(&str, &str)]) -> (Folder, Sc
     (folder, screen)
 }
 
-/// The displayed page at the dive's time `time`. It is reached by `back` key presses from the end; a step goes back to
-/// a multiple of ten seconds.
+/// The displayed page at the dive's time `time`. The page is reached by `back` key presses from the end of the dive.
+/// Each key press goes back to a multiple of ten seconds.
 fn at(screen: &mut Screen, back: usize, time: &str) -> String {
     screen.until_page(" END ");
     for _ in 0..back {

@@ -5,13 +5,14 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, program, root};
 
-/// Options that the test adds to the tutorial's commands, by command. They avoid the browser and shorten all waiting.
+/// Options that the test adds to the tutorial's commands, by command. With these options, no browser opens and all
+/// waiting is short.
 const QUICK: [(&str, &[&str]); 2] =
     [("demo", &["--no-open", "--speed", "max"]), ("emulate", &["--linger", "60"])];
-/// Duration of the rehearsal in the tutorial and in the test, s.
+/// Duration of the rehearsal, s: the first value in the tutorial, the second in the test.
 const REHEARSAL_S: [&str; 2] = ["300", "3"];
 
-/// Interval at which the test looks for the rehearsal's vehicle file. `WAITS` tries take one minute.
+/// Interval at which the test looks for the rehearsal's vehicle file. It looks `WAITS` times, for one minute.
 const WAIT: Duration = Duration::from_millis(50);
 const WAITS: usize = 1200;
 

@@ -1,7 +1,8 @@
 //! Checks that other programs can display dive logs. The tests read the logs with the plain `mcap` crate.
 //!
-//! Every message under `/result/view/` must match its channel's schema and the loop's published results. Summary and
-//! indexes must be right, and a replay must ignore these messages. `tests/viewers/` checks the logs with other readers.
+//! Every message under `/result/view/` must match its channel's schema and the loop's published results. The log's
+//! summary and indexes must be right, and a replay must ignore the messages under `/result/view/`. `tests/viewers/`
+//! checks the logs with other readers.
 
 use std::collections::BTreeMap;
 
@@ -148,7 +149,7 @@ fn message_that_violates_its_schema_is_detected() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Number of the head, and position, of each point in a point cloud message.
+/// For each point in a point cloud message, the number of its head and its position.
 fn points_of(cloud: &Value) -> Vec<(u8, [f64; 3])> {
     let origin = numbers(&cloud["pose"]["position"], ["x", "y", "z"]);
     let stride = usize::try_from(cloud["point_stride"].as_u64().unwrap()).unwrap();
@@ -191,7 +192,7 @@ fn summary_and_indexes_match_a_full_read() {
     assert_eq!(stats.attachment_count as usize, summary.attachment_indexes.len());
     assert_eq!(stats.metadata_count as usize, summary.metadata_indexes.len());
     let mut indexed: BTreeMap<u16, u64> = BTreeMap::new();
-    // The first chunk contains channel definitions, but no message.
+    // The first chunk is skipped, because it contains channel definitions, but no message.
     for chunk in summary.chunk_indexes.iter().filter(|chunk| !chunk.message_index_offsets.is_empty()) {
         let indexes: Vec<_> = summary.read_message_indexes(&log, chunk).unwrap().into_iter().collect();
         for (channel, entries) in indexes {

@@ -1,5 +1,5 @@
-//! A cable counter that gets stuck while the vehicle moves. The fault is reported at once. No section far over the
-//! target passes because of the fault, with one known exception.
+//! A cable counter that gets stuck while the vehicle moves. The fault is reported at once. With one known exception,
+//! the fault lets no section pass whose hole is far over the target.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::time::MonoNs;
@@ -19,7 +19,7 @@ const DIVES: u64 = 24;
 const EDGE_MPS: f64 = 0.118;
 const LENGTH_M: f64 = 14.0;
 const DOUBTED_WITHIN_S: f64 = 2.0;
-/// Known number of sections that pass with a true hole over 1.1 times the target T; the goal is zero. Such a section
+/// Known number of sections that pass with a true hole over 1.1 times the target T. The goal is zero. Such a section
 /// has samples from before and after the moment when the counter is first doubted. The reported standard deviation of
 /// its hole is too small.
 const KNOWN_FAR: usize = 1;
@@ -59,8 +59,8 @@ fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     Stuck { scene: scenes::seeded(&text, &load, Some(seed)), from_s }
 }
 
-/// Time of a filter update that doubts the cable counter because the counter contradicts the inertial unit; otherwise
-/// `None`.
+/// Time at which a filter update doubts the cable counter because the counter contradicts the inertial unit; `None` for
+/// any other item.
 fn doubted_at(item: &PlacedItem) -> Option<MonoNs> {
     let Placement::Update(update) = &item.placement else { return None };
     update.doubts.cable.filter(|doubt| doubt.log.is_none()).map(|_| update.at)
@@ -138,8 +138,8 @@ fn no_section_far_over_the_target_passes_with_a_stuck_cable() {
     assert!(far <= KNOWN_FAR, "{far}");
 }
 
-/// A misaligned velocity log measures three quarters of the speed. The counter is right, but no third sensor can
-/// decide between the two.
+/// A misaligned velocity log measures three quarters of the speed. The cable counter is right, but no third sensor
+/// shows which of the two is wrong.
 #[test]
 fn velocity_log_that_contradicts_the_counter_is_reported_and_causes_no_false_pass() {
     let log = "\n[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\nposition_m = [-0.2, 0, -0.1]\n";
@@ -162,7 +162,8 @@ fn velocity_log_that_contradicts_the_counter_is_reported_and_causes_no_false_pas
     let wrong = of(41);
     let [alert] = observed(&wrong.report)[..] else { panic!("{:?}", wrong.report.alert_list) };
     assert_eq!((alert.kind, alert.sensor.as_deref()), ("cable_doubted", Some("dvl")));
-    // The velocity log measures a quarter too little. In a minute, with 12 m of motion, it misses at most 3 m.
+    // The velocity log measures a quarter too little. In a minute, the vehicle moves by 12 m and the log misses at most
+    // 3 m of this.
     assert!((0.5..3.5).contains(&alert.worst_m.unwrap()), "{alert:?}");
     let target_m = wrong.report.target_m;
     let is_wrong = |section: &&truth::JudgedSection| {

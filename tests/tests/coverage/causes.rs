@@ -112,8 +112,8 @@ const CASES: [Case; 11] = [
 fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.185");
-    // The report attributes a missing return to occlusion wherever the vehicle file says that the vehicle hides the
-    // wall. A thin body hides almost nothing.
+    // Where the vehicle file says that the vehicle hides the wall, the report attributes missing returns to occlusion.
+    // The bodies of heads are made thin here, so that they hide almost nothing.
     let thin = "plugin = \"imagenex881\"\nbody_radius_m = 0.001";
     let vehicle = match case.cause {
         "missing_returns" => vehicle.replace("plugin = \"imagenex881\"", thin),
@@ -146,7 +146,7 @@ fn reported_cause_is_the_injected_one() {
             right_of_case += named.get(case.cause).copied().unwrap_or(0);
             writeln!(table, "{:<15} {:<55} seed {seed}: {named:?}", case.cause, case.what).unwrap();
         }
-        // While the cable counter slips, holes are so uncertain that only few sections fail.
+        // If the cable slips at the counter, holes are so uncertain that only few sections fail.
         if of_case < 2 || 10 * right_of_case < 9 * of_case {
             let Case { cause, what, .. } = case;
             writeln!(wrong, "{what}: {right_of_case} of {of_case} failed sections are named {cause}")
@@ -160,7 +160,7 @@ fn reported_cause_is_the_injected_one() {
 }
 
 /// Heads mounted at different places along the hull are in phase only near the planned speed. A section can therefore
-/// fail at a lower speed, although it passes at the planned speed. The reported cause is then the phase.
+/// pass at the planned speed and fail at a lower speed. The reported cause is then the phase of the heads.
 #[test]
 fn section_that_passes_only_at_a_higher_speed_fails_because_of_phase() {
     let driven = |speed_mps: f64| {

@@ -1,5 +1,5 @@
-//! Confidence of verdicts. One dive is judged with margins of one, two and three standard deviations between hole and
-//! target.
+//! Confidence of verdicts. One dive is judged three times. The margin between hole and target is one, two or three
+//! standard deviations.
 
 use headrace_coverage::Verdict;
 use headrace_monitor::report::Report;

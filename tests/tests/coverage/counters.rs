@@ -1,4 +1,4 @@
-//! Counters with a resolution of 1 cm on swinging cables cause no wrong displayed speed and no wrong verdict.
+//! Cable counters with steps of 1 cm, on swinging cables. They cause no wrong displayed speed and no wrong verdict.
 
 use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
@@ -39,13 +39,13 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
     scenes::seeded(&text, &|name: &str| scenes::vehicle_file(name), Some(seed))
 }
 
-/// Wrong results of a dive: errors of displayed speed and of verdicts.
+/// Wrong results of a dive: errors of the displayed speed, and wrong verdicts.
 #[derive(Debug, Default)]
 struct Wrong {
     /// Largest error of the displayed speed while there is a fix, m/s.
     speed_mps: f64,
-    /// Number of sections that pass with a true hole over 1.1 times the target. `failed` counts sections that fail with
-    /// a true hole below 0.9 times the target.
+    /// Number of sections that pass although their true hole is over 1.1 times the target. `failed` counts sections
+    /// that fail although their true hole is below 0.9 times the target.
     passed: usize,
     failed: usize,
     /// Number of sections with the verdict `cannot_say`. `sections` is the number of all sections.
@@ -110,8 +110,8 @@ fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
         println!("slack of {reach}: {wrong:?}, can't say {:.1} %", 100.0 * cannot_say);
         assert!(wrong.sections > 200, "{reach}: {wrong:?}");
         assert!(wrong.speed_mps < SPEED_OFF_MPS, "{reach}: {wrong:?}");
-        // A false fail costs a drive back, but a false pass may miss a rock. So one section in a hundred may fail
-        // falsely.
+        // A false pass may miss a rock, but a false fail costs only a drive back. One section in a hundred may
+        // therefore fail falsely.
         assert!(wrong.passed == 0 && 100 * wrong.failed <= wrong.sections, "{reach}: {wrong:?}");
         assert!(cannot_say <= most, "{reach}: {cannot_say}");
     }

@@ -1,6 +1,6 @@
 //! The report accounts for every metre of the dive. If a dive has no position, its report says so first.
 //!
-//! Each section that the vehicle or its heads have entered is judged or open, even if no head has looked at it.
+//! Each section that the vehicle or its heads have entered has a verdict or is open, even if no head has sampled it.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::time::DurNs;
@@ -51,7 +51,7 @@ fn accounted_for(what: &str, report: &Report) {
     assert!(report.sections.iter().all(judged), "{what}");
 }
 
-/// Checks that a section fails because of these silent heads.
+/// Checks that a section fails, and that its reported cause is the silence of these heads.
 #[track_caller]
 fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     let evidence = section.cause.unwrap();
@@ -60,8 +60,8 @@ fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// Time at which a plane, `behind_m` behind the vehicle, is past a section's end by half the target, seconds after the
-/// start.
+/// Time at which the plane `behind_m` behind the vehicle is half the target beyond a section's end, seconds after the
+/// start of the dive.
 fn left_s(section: &SectionRow, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
 }
@@ -83,8 +83,8 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(&report, section, HEAD_M);
-        // The upper limit allows for one update and the position margin. The flag may be raised as soon as the
-        // section's start is left, because a circle centred there may exceed the target.
+        // A flag may be early, because a circle that is centred on the section's start may exceed the target and is
+        // left first. The upper limit allows for one update and the position margin.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.go_back.iter().map(|back| back.from_m).fold(0.0, f64::max);
@@ -114,7 +114,7 @@ fn stretch_crossed_while_all_heads_are_silent_fails() {
     }
 }
 
-/// Report of a dive without position errors; the signed lengths of its legs are given in m.
+/// Report of a dive without position errors. `distances_m` are the signed lengths of its legs.
 fn legs(distances_m: &[f64]) -> Report {
     let vehicle = VEHICLE.replace("slack_sd_m = 0.02", "way = \"direct\"\n#");
     let mut scene = format!("seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n");
@@ -187,12 +187,12 @@ fn flags_wait_only_for_live_heads() {
     assert!(inner.len() > 10);
     for section in inner {
         fails_by_silence(section, &[1, 2, 3]);
-        // The flag waits only for the live front head. This head leaves the section ten seconds before the silent aft
-        // heads.
+        // The flag waits only for the front head that still works. This head leaves the section ten seconds before the
+        // silent aft heads.
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
-    // One of the four heads is silent; the vehicle is slow enough for the other three heads.
+    // One of the four heads is silent, but the vehicle is slow enough for the remaining three.
     let silent = silence("\"sonar_1\"", "from_s = 10");
     let (one, none) = (steady(6.0, &silent), steady(6.0, ""));
     accounted_for("one of four", &one);
@@ -216,7 +216,7 @@ fn verdict_lengths_add_up_in_random_dives() {
     }
 }
 
-/// The dives are short, go out and back, reach beyond a short tunnel, and end at any place in a section.
+/// The dives are short, go out and back, reach beyond the ends of a short tunnel, and end anywhere within a section.
 #[test]
 fn lengths_of_all_verdicts_add_up_in_dives_out_and_back() {
     let vehicle = SHORT.replace("length_m = 100", "length_m = 8");
@@ -260,8 +260,8 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
         let what = format!("seed {seed}");
         accounted_for(&what, report);
         let Some(to_m) = report.coverage_extent.to_m else { continue };
-        // Heads are at most 0.6 m ahead of or behind the vehicle. A section counts as left when the heads are past its
-        // end by half the target.
+        // Heads are at most 0.6 m ahead of or behind the vehicle. A section counts as left when the heads are beyond
+        // its end by half the target.
         let (target_m, section_m) = (report.target_m, report.section_m);
         let seen_m = dive.samples().map(|sample| sample.place[0]).fold(f64::NEG_INFINITY, f64::max);
         let far = |s: &&SectionRow| s.start_m > seen_m + target_m;
@@ -284,7 +284,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
 
 #[test]
 fn stretch_without_a_position_fails_once_the_vehicle_has_left_it() {
-    // Some seconds after the cable counter falls silent, the filter has no fix any more.
+    // Some seconds after the cable counter falls silent at 25 s, the filter has no fix any more.
     let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
     accounted_for("outage", &report);
     let lost = |s: &&SectionRow| s.cause.is_some_and(|evidence| evidence.cause.as_str() == "position_lost");
@@ -350,8 +350,9 @@ fn dive_mostly_without_a_position_exits_with_1() {
     );
 }
 
-/// Wall that the heads scanned while the tether was silent has no verdict. The report tells for how long and about
-/// where. The vehicle drives at 0.11 m/s; the position is lost some seconds after the counter falls silent at 60 s.
+/// Wall that the heads scanned while the tether was silent has no verdict. The report tells for how long the position
+/// was missing, and about where. The vehicle drives at 0.11 m/s. The counter falls silent at 60 s, and the position is
+/// lost some seconds later.
 #[test]
 fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainage() {
     let noise = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -363,11 +364,11 @@ fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainag
         let begun_s = report.dive.start_s;
         let true_m = |at_s: f64| START_M + SPEED_MPS * (at_s - begun_s);
         let end_s = if is_over { 120.0 } else { 20.0 / SPEED_MPS };
-        // When the counter is back, its reading is compared with the estimate before there is a fix.
+        // When the counter works again, its reading is first compared with the estimate. Then there is a fix again.
         let late_s = gap.to_s - begun_s - end_s;
         assert!((-2.0..15.0).contains(&late_s) && gap.is_over == is_over, "{span}: {gap:?}");
         assert!((60.0..100.0).contains(&(gap.from_s - begun_s)), "{span}: {gap:?}");
-        // 50 pings per second of each of the four heads.
+        // Each of the four heads sends 50 pings per second.
         let pings = 200.0 * (gap.to_s - gap.from_s);
         assert!((gap.pings as f64 - pings).abs() < 0.05 * pings, "{span}: {gap:?}");
         let (from_m, to_m) = (gap.from_m.unwrap(), gap.to_m.unwrap());
@@ -380,7 +381,7 @@ fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainag
 }
 
 /// Samples from before the position estimate has converged don't affect later sections. If a vehicle waits until its
-/// heading is known, only the wall that its front heads sampled meanwhile stays undecided.
+/// heading is known, only the wall that its front heads sampled during this time stays undecided.
 #[test]
 fn waiting_for_a_known_heading_leaves_at_most_25_cm_undecided() {
     let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");

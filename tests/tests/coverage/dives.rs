@@ -1,4 +1,4 @@
-//! Two hundred short dives of all kinds. They are simulated once, for the tests of holes and of flags.
+//! Two hundred short dives of all kinds. They are simulated once, for the tests of holes and the tests of flags.
 
 use std::sync::LazyLock;
 

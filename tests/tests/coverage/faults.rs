@@ -1,6 +1,7 @@
-//! Sixty dives with one broken device each. No section passes with a true hole far over the target.
+//! Sixty dives with one broken device each. No section whose true hole is far over the target passes.
 //!
-//! The seeds rotate through all senses and faults. Start, duration and size of a fault are random.
+//! Consecutive seeds take all senses (measured quantities) and faults in turn. Start, duration and size of a fault are
+//! random.
 
 use std::collections::BTreeMap;
 

@@ -35,7 +35,8 @@ fn print(name: &str, figures: &Figures) {
     );
 }
 
-/// No section far over the target passes. At most one in forty of all sections over the target passes.
+/// No section whose true hole is far over the target passes. Of all sections whose true hole is over the target, at
+/// most one in forty passes.
 #[test]
 fn no_section_far_over_the_target_passes_in_field_dives() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
@@ -60,7 +61,8 @@ fn no_section_far_over_the_target_passes_in_field_dives() {
 }
 
 /// Fish and second echoes aren't wall, so they must not make a section pass. With `HEADRACE_FISH_SEEDS=5`, the test
-/// runs five dives of each cell, and some of these sections pass (docs/why/field.md). The goal is none.
+/// runs five dives of each cell. Some sections far over the target then pass (docs/why/field.md). The goal is that none
+/// does.
 #[test]
 fn no_section_far_over_the_target_passes_with_fish_and_second_echoes() {
     let seeds = std::env::var("HEADRACE_FISH_SEEDS").map_or(1, |seeds| seeds.parse().unwrap());
@@ -86,8 +88,8 @@ fn no_section_far_over_the_target_passes_with_fish_and_second_echoes() {
 }
 
 /// On walls as rough as the vehicle file allows, the reported standard deviation of the hole diameter D is neither too
-/// small nor too large. An echosounder sees the same bump for seconds. The filter must not take the bump for a change
-/// of position.
+/// small nor too large. An echosounder sees the same bump for seconds. The filter must not mistake the bump for a
+/// change of position.
 #[test]
 fn reported_sd_of_d_is_right_on_rough_walls() {
     for name in ["vita2-4", "pipe", "bluerov2"] {
@@ -143,7 +145,8 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
     };
     let passed = all(Verdict::Pass);
     assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
-    // The counts in `passed` and `failed` include the dive's ends, where a section has a neighbour on one side only.
+    // The counts in `passed` and `failed` include the dive's ends, where a section has a neighbouring section on one
+    // side only.
     assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
     assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
     let failed = all(Verdict::Fail);
@@ -155,9 +158,9 @@ fn field_statistics_count_all_false_passes_and_false_fails() {
     assert!((reported_m - less.way_m[1] - judged.report.section_m).abs() < 1e-9, "{reported_m} {less:?}");
 }
 
-/// Swinging finds an undeclared mount error of 3 degrees. Declared mount errors are included in the standard deviation
-/// of the hole diameter D and in the planned speed. `HEADRACE_MOUNT_SEEDS=10` tries all vehicles, with ten dives of
-/// each cell.
+/// If the vehicle swings before the dive, an undeclared mount error of 3 degrees is found. Declared mount errors are
+/// included in the standard deviation of the hole diameter D and in the planned speed. `HEADRACE_MOUNT_SEEDS=10` tries
+/// all vehicles, with ten dives of each cell.
 #[test]
 fn no_section_far_over_the_target_passes_with_wrong_mounts() {
     const ALL: [&str; 7] =

@@ -1,7 +1,8 @@
 //! Checks the flags of two hundred short dives against their definition.
 //!
-//! A flag is raised when driving on can no longer undo a fail, and cleared when a later pass fills the hole. The oracle
-//! has the poses and all samples, but not the order in which the loop judges sections.
+//! A flag is raised when driving on can no longer undo a fail, and cleared when a later pass fills the hole. The
+//! independent computation of flags knows the poses and all samples, but not the order in which the loop judges
+//! sections.
 
 use headrace_coverage::Verdict;
 use std::sync::LazyLock;
@@ -14,8 +15,8 @@ use headrace_tests::random_dives::{Kind, Seeded};
 
 use crate::dives::DIVES;
 
-/// A dive and its due flags by two definitions of a fail: the hole exceeds the target, or it exceeds the target by two
-/// standard deviations.
+/// A dive and its due flags by two definitions of a fail. By the first, the hole exceeds the target. By the second, it
+/// exceeds the target by two standard deviations.
 struct Judged {
     seeded: &'static Seeded,
     dive: &'static Dive,
@@ -33,8 +34,8 @@ static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     DIVES.iter().map(judge).collect()
 });
 
-/// Calls `wrong` for every section with two flags: due if the hole exceeds the target, and due if it does so by two
-/// standard deviations. `wrong` returns the fault, if any.
+/// Calls `wrong` for every section, with the section's flag by both definitions of a fail (see [`Judged`]). `wrong`
+/// returns what is wrong, if anything.
 #[track_caller]
 fn every_flag(
     dives: impl Fn(&Judged) -> bool,
@@ -97,21 +98,23 @@ fn flag_of_a_moving_vehicle_is_raised_within_one_turn() {
     );
 }
 
-/// Longest distance that the heads may move before the flag is raised, m (`docs/why/coverage.md`, "Verdicts").
+/// Longest distance that the heads may move between the due moment and the raising of a flag, m
+/// (`docs/why/coverage.md`, "Verdicts").
 const LATE_M: f64 = 0.25;
-/// Time from the start until the position estimate has converged, seconds: the alignment, and another 20 s.
+/// Time from the start until the position estimate has converged, seconds: the alignment, and 20 s after it.
 const SETTLED_S: f64 = 22.0;
 
 #[test]
 fn flag_is_raised_within_25_cm_of_the_point_of_no_return() {
     let (mut late, mut on_time) = (Vec::new(), 0);
     for judged in JUDGED.iter().filter(|judged| forward(judged) && judged.seeded.kind != Kind::Parked) {
-        // With a filter, standard deviations differ from place to place. So a flag counts as due only if the hole
-        // exceeds the target by three standard deviations.
+        // With a navigation filter, standard deviations differ from place to place. In such dives a flag counts as due
+        // only if the hole exceeds the target by three standard deviations.
         let flags =
             if direct(judged) { &judged.by_two_sigma } else { &judged.journey.flags(judged.dive, 3.0) };
         for flag in flags {
-            // Standard deviations shrink while the estimate converges, but the report contains only the final ones.
+            // While the estimate converges, standard deviations shrink, but the report has only the final ones. Such
+            // early flags don't count.
             let settles = !direct(judged) && flag.due_s.is_some_and(|due_s| due_s < SETTLED_S);
             let is_late = flag.late_m.filter(|_| !settles).map(|late_m| late_m > LATE_M);
             on_time += u32::from(is_late == Some(false));

@@ -4,7 +4,7 @@
 use headrace_tests::{Folder, SCENE, VEHICLE};
 use serde_json::Value;
 
-/// Runs the short dive with another scene and vehicle; returns its report and terminal output.
+/// Simulates and replays a dive with these files. Returns its report and terminal output.
 fn dive(vehicle: &str, scene: &str) -> (Value, String) {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle);
@@ -72,8 +72,8 @@ fn declared_opening_is_listed_and_does_not_fail() {
         .map(|section| section["start_m"].as_f64().unwrap())
         .collect();
     assert_eq!(masked, [4.0, 4.25, 4.5, 4.75, 5.0, 5.25]);
-    // The opening covers two of the twelve clock positions, and chainages from 4.2 to 5.4 m. So it covers a fifth of
-    // the first section's length, and three fifths of the last one's.
+    // The opening covers two of the twelve clock positions, and chainages from 4.2 to 5.4 m. It therefore covers a
+    // fifth of the length of the first section, and three fifths of the last section.
     let share = |start_m: f64| {
         let section =
             report["sections"].as_array().unwrap().iter().find(|s| s["start_m"] == start_m).unwrap();

@@ -1,5 +1,5 @@
-//! Repeats dives without the reported causes, and checks that the failed sections then pass. Uses a twentieth of the
-//! dives of the bench `causes`.
+//! Repeats dives without their causes, and checks that the program reported those causes without which the failed
+//! sections pass. Uses a twentieth of the dives of the bench `causes`.
 
 use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
 

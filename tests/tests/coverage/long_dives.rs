@@ -11,13 +11,13 @@ use headrace_tests::truth::{self, JudgedDive};
 const PARKED_S: u32 = 3600;
 /// Number of times that the vehicle goes back and forth.
 const ROUNDS: usize = 100;
-/// Chainage from which the vehicle goes back and forth, up to `TO_M`, m.
+/// The vehicle goes back and forth between this chainage and `TO_M`, m.
 const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
 /// Chainage of the end of the dive, m.
 const END_M: f64 = 16.0;
-/// Largest difference between the lower and upper bound of a hole's diameter if the loop thins out samples in full
-/// cells, m.
+/// Largest allowed difference between the upper and the lower bound of a hole's diameter, m. The bounds differ if the
+/// loop thins out samples in full cells.
 const THINNED_M: f64 = 0.04;
 
 fn scene(parked_s: u32, rounds: usize) -> String {
@@ -62,8 +62,8 @@ fn hour_of_parking_and_hundred_trips_back_and_forth_change_no_verdict() {
             panic!("section {}: no bounds", b.report.start_m)
         };
         assert!(most_m - least_m <= THINNED_M, "section {}: {least_m} to {most_m}", b.report.start_m);
-        // Sections beyond the parking place and the rounds have holes as close to the truth as in a dive without
-        // parking and rounds.
+        // In sections beyond the rounds and the parking place, holes are as close to the truth as in a dive without
+        // rounds and parking.
         if a.report.start_m >= TO_M + 1.0 {
             for (off_m, section) in off_m.iter_mut().zip([a, b]) {
                 *off_m = off_m.max((section.report.hole_m.unwrap() - section.true_hole_m).abs());
@@ -74,8 +74,7 @@ fn hour_of_parking_and_hundred_trips_back_and_forth_change_no_verdict() {
     println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
     assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
     found("loop.rounds", off_m[1], 0.02);
-    // Memory growth over two spans: from a third of the parked hour to its end, and from three quarters of the rounds
-    // to their end.
+    // Memory may hardly grow in the last two thirds of the parked hour, and in the last quarter of the rounds.
     let parked = PARKED_S as usize / 60;
     let rounds = used.len() - 3 - parked;
     let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;

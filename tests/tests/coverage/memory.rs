@@ -15,7 +15,8 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoint
     [[trajectory.waypoints]]\nchainage_m = 17.1\nspeed_mps = 0.2\n\
     [effects]\nrange_noise = { sd_m = 0.02 }\n";
 
-/// Quantities that may grow in an armed loop: bytes of stored samples, and number of entries in the history of advice.
+/// The two quantities that may grow in an armed loop: the bytes of stored samples, and the number of entries in the
+/// history of advice.
 fn used(dive: &Loop) -> [usize; 2] {
     [dive.view().coverage().store.usage().bytes, dive.advice_log().entries.len()]
 }

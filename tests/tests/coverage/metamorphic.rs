@@ -1,7 +1,7 @@
 //! Transformations of a dive that must not change its results.
 //!
-//! They are a mirror, other origins of chainage and arc length, other names and another order of heads, and another
-//! tick length.
+//! The transformations are a mirror, other origins of chainage and arc length, other names of heads, another order of
+//! heads, and another tick length.
 
 use headrace_coverage::Verdict;
 use std::fmt::Write as _;
@@ -21,7 +21,7 @@ use serde_json::Value;
 
 const TOLERANCE_M: f64 = 1e-9;
 
-/// Two dives with results that must agree after a transformation.
+/// Two dives. After a transformation, the results of the second must agree with those of the first.
 struct Beside<'a> {
     here: &'a Dive,
     there: &'a Dive,
@@ -64,8 +64,8 @@ impl Beside<'_> {
                 && both(deviations[0], deviations[1])
         };
         let cause = |section: &SectionRow| section.cause.map(|evidence| evidence.cause);
-        // The dives may report different holes of the same size. The hole reported for the second dive must also be a
-        // hole of the first dive.
+        // The two dives may report different holes of the same size. The hole of the second dive must then also exist
+        // in the first dive.
         let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
             near(2.0 * wall.clear_m([x - self.along_m, (self.around)(sigma)]), hole_m)
         });
@@ -90,8 +90,8 @@ impl Beside<'_> {
 
 /// Vehicle file without a navigation filter, with heads at these positions in the body frame.
 ///
-/// If `side` is -1, the places, the turning direction of the heads, and the directions of the echosounders are
-/// mirrored.
+/// If `side` is -1, the vehicle is mirrored: the positions and turning directions of its heads, and the directions of
+/// its echosounders.
 fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     let mut text = format!(
         "target_m = 0.7\n[tunnel]\nlength_m = 1200\n{tunnel}\n[navigation]\nway = \"direct\"\n[heads]\nplanned_speed_mps = 0\n"
@@ -117,7 +117,7 @@ fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     text
 }
 
-/// The vehicle is slow enough at first, then too fast, and then goes back over a part of its path.
+/// Trajectory of a vehicle that is slow enough at first, then too fast, and then goes back over a part of its path.
 fn legs(start_m: f64, place_m: [f64; 2]) -> String {
     let mut text = format!(
         "vehicle = \"vehicle.toml\"\n[effects]\nmotion_within_turn = {{}}\n[trajectory]\nstart_m = {start_m}\nplace_m = {place_m:?}\n"
@@ -208,7 +208,7 @@ fn reordered(vehicle: &str, heads: usize) -> String {
     tables.join("[[sensors]]\n")
 }
 
-/// Values of these keys in the report.
+/// Values of the keys `keys` in the report.
 fn answers<'a>(report: &'a Value, keys: &[&str]) -> Vec<&'a Value> {
     assert!(report["summary"]["flags_raised"].as_u64().unwrap() > 5, "{}", report["summary"]);
     keys.iter().map(|key| &report[*key]).collect()

@@ -1,4 +1,5 @@
-//! Checks holes, spacings and verdicts of two hundred short dives against an oracle.
+//! Checks holes, spacings and verdicts of two hundred short dives against an oracle, which is an independent
+//! computation.
 //!
 //! The oracle uses only the samples and the definitions. It has no cells, no search radius, and no order of judging.
 //! Flags are checked in `flags.rs`.
@@ -70,8 +71,9 @@ fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed and this diameter is at most the upper bound of the section's hole. The bound may come from
-/// the samples of some visits only. The oracle uses the samples of all visits, which can only make the hole smaller.
+/// Whether a section passed and this diameter is at most the upper bound of the section's hole. The program may have
+/// computed the bound from some visits of the vehicle only. The oracle uses the samples of all visits, which can only
+/// make the hole smaller.
 fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == Verdict::Pass);
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
@@ -89,8 +91,8 @@ fn holes_are_the_largest_empty_circles() {
                 && [Verdict::Fail, Verdict::Open].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        // The loop stores samples in packed form, which moves them by micrometres. The reported bounds include this
-        // movement.
+        // The loop stores samples in packed form, which moves them by micrometres. The reported bounds of the hole
+        // allow for this.
         let right =
             section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
@@ -115,14 +117,14 @@ fn verdicts_follow_from_hole_size_its_sd_and_the_target() {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let (hole_m, target_m, twice_m) =
             (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sd_m);
-        // A section stays open if driving on could still fill its hole.
+        // A section must stay open if driving on could still fill its hole.
         let reached = reached(dive);
         let (rear_m, passed_m) = (reached.last()?.rear_m, all_passed_from_m(&reached));
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // The first failing place counts as near the start of the stretch that all heads have passed, if it changes
-        // when this start moves by `NEAR_M`.
+        // The stretch that all heads have passed starts at `passed_m`. If the first failing place changes when this
+        // start moves by `NEAR_M`, the place counts as near the start.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
         // Tolerance for differences between oracle and program. The oracle finds the first failing place to within one
@@ -144,7 +146,7 @@ fn verdicts_follow_from_hole_size_its_sd_and_the_target() {
             {
                 either
             }
-            // Doubtful returns may fill the hole. The oracle has only samples.
+            // Doubtful returns may be why a section is undecided, but the oracle knows only samples.
             either @ Verdict::CannotSay if section.cannot_say == Some(Unsure::DoubtfulReturns) => either,
             // A flagged section keeps the verdict "fail" until its hole is filled.
             either @ Verdict::Fail if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
@@ -174,8 +176,8 @@ fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
 
 /// Whether a section has samples that deviate from the design by more than a tenth of the radius.
 ///
-/// A return that deviates so far is stored only after the next returns of its head. So later samples of other heads may
-/// be stored before it, and count as earlier passes.
+/// A return that deviates so much is stored only after the next returns of its head. Meanwhile, later samples of other
+/// heads may be stored. They then count as earlier passes.
 fn has_run(section: &SectionRow, perimeter_m: f64) -> bool {
     let extremes_m = section.deviation.map(|deviation| [deviation.inmost_m, deviation.outmost_m]);
     extremes_m.into_iter().flatten().any(|off_m| off_m.abs() > 0.1 * perimeter_m / TAU)
@@ -223,7 +225,7 @@ fn spacings_of_every_section_match_their_definitions() {
     assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without end points of series");
 }
 
-// Places in rows and columns, for tests of the oracle itself. `at` returns the place of a row and column.
+// Samples in rows and columns, for tests of the oracle itself. `at` returns the place of a row and column.
 
 fn lattice(rows: u32, columns: u32, at: impl Fn(f64, f64) -> Place) -> Vec<Place> {
     let row = |i| (0..columns).map(move |j| (f64::from(i), f64::from(j)));
@@ -239,20 +241,20 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 #[test]
 fn holes_of_sample_lattices_match_exact_values() {
     let diagonal_m = math::sqrt(2.0);
-    // A lattice of squares of 0.25 m, in which all four corners of a square are on a common circle. The second
+    // A lattice of squares of 0.25 m, in which the four corners of each square lie on a common circle. The second
     // section contains no centre of a square.
     let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0).unwrap();
     holds(&squares, 1.0, 1.25, 0.25 * diagonal_m);
     holds(&squares, 1.0, 1.05, 2.0 * math::hypot(0.05, 0.125));
-    // Rows that are offset by half a step form triangles with sides of 0.4 m.
+    // Every other row is offset by half a step, so that the samples form triangles with sides of 0.4 m.
     let height_m = 0.2 * math::sqrt(3.0);
     let triangles =
         Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0).unwrap();
     holds(&triangles, 1.0, 2.0, 0.8 / math::sqrt(3.0));
-    // A single ring of samples: the hole grows with the distance from the ring.
+    // With a single ring of samples, the hole of a section grows with the section's distance from the ring.
     let ring = Wall::new(lattice(1, 10, |_, j| [0.0, 0.3 * j]), 3.0).unwrap();
     holds(&ring, 1.0, 2.0, 2.0 * math::hypot(2.0, 0.15));
-    // A single sample, repeated: the hole's centre is on the opposite side of the perimeter.
+    // With a single place of all samples, the centre of the hole is on the opposite side of the perimeter.
     let one = Wall::new(vec![[5.0, 0.0]; 7], 8.0).unwrap();
     holds(&one, 5.0, 8.0, 10.0);
     assert!(Wall::new(Vec::new(), 8.0).unwrap().largest(0.0, 1.0).is_none());
@@ -278,8 +280,8 @@ fn holes_of_small_sample_sets_match_a_dense_grid_search() {
             .fold(0.0, f64::max);
         let exact = wall.largest(0.0, 0.5).unwrap();
         let short_m = exact.radius_m - dense_m;
-        // Between a point and the nearest grid point, the distance to the nearest sample changes by no more than the
-        // distance between the two points.
+        // From any point to the nearest grid point, the distance to the nearest sample changes by no more than the
+        // distance between the point and the grid point.
         assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
     }
 }
@@ -298,7 +300,7 @@ fn seam_position_does_not_change_holes() {
     }
 }
 
-/// Samples of one head on a circle, with `count` pings per turn and a chainage of `d_m` per ping.
+/// Pings of one head in a circular tunnel, with `count` pings per turn. The chainage grows by `d_m` per ping.
 fn helix(radius_m: f64, count: u32, d_m: f64, pings: u32) -> Vec<Ping> {
     let ping = |k: u32| {
         let angle = TAU * f64::from(k % count) / f64::from(count);
@@ -337,8 +339,8 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // Ping 20 has no return. So the pings beside this ping's angle have no pass distance T_x in the next turn, and the
-    // ping distance T_y of the return after ping 20 spans the gap.
+    // Ping 20 has no return. In the next turn, the pings beside its angle therefore have no T_x. The T_y of the return
+    // after ping 20 spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

@@ -1,4 +1,4 @@
-//! Wall that differs from the vehicle file: a wider stretch, and a side tunnel that isn't declared.
+//! Wall that differs from the vehicle file: a wider stretch, and a side tunnel that the file doesn't declare.
 
 use headrace_tests::{Folder, VEHICLE};
 use serde_json::Value;
@@ -32,7 +32,7 @@ fn sections(report: &Value, from_m: f64, to_m: f64) -> Vec<&Value> {
 }
 
 /// From chainage 11 to 20 m, the radius is 23 % larger than designed. The wall is on average 0.66 m outside the design.
-/// The filter takes a part of this deviation for a change of height.
+/// The navigation filter takes a part of this deviation for a change of the vehicle's height.
 fn wider_wall() -> String {
     let stations = [(0, 1.0), (9, 1.0), (11, 1.23), (20, 1.23), (22, 1.0)];
     let station =
@@ -82,8 +82,9 @@ fn suggested_declaration_of_a_side_tunnel_clears_its_missed_stretch() {
     let (report, summary) = dive(&vehicle, &scene);
     let suggested = report["suggested_openings"].as_array().unwrap();
     assert_eq!(suggested.len(), 1, "{summary}");
-    // Beams that enter the side tunnel obliquely return from its own walls. So the patch without returns is smaller
-    // than the mouth, which extends from 10 to 14 m, and 2 m up and down from the axis of the side tunnel.
+    // Beams that enter the side tunnel obliquely return from its own walls. The patch without returns is therefore
+    // smaller than the mouth of the side tunnel. The mouth extends from 10 to 14 m, and 2 m up and down from the side
+    // tunnel's axis.
     let [from_m, to_m, clock_from, clock_to] =
         ["from_m", "to_m", "clock_from", "clock_to"].map(|key| number(&suggested[0], key));
     assert!(9.5 < from_m && from_m < 11.0 && 13.0 < to_m && to_m < 14.5, "{suggested:?}");

@@ -1,4 +1,5 @@
-//! Wrong settings are reported with their value within a hundred metres. Correct settings aren't reported.
+//! Wrong settings are reported within a hundred metres of driving, with their right value. Correct settings aren't
+//! reported.
 
 use headrace_monitor::alert_list::SettingJson;
 use headrace_simulator::Scene;
@@ -62,7 +63,7 @@ fn doubt_while_swinging(
     doubted(&parse(truly), &parse(declared))
 }
 
-/// Vehicle files, each with the id of the head whose setting is wrong.
+/// Vehicle files, each with the id of the head whose setting the tests make wrong.
 const OF_VEHICLES: [(&str, &str); 2] = [("vita1.toml", "sonar_0"), ("vita2-4.toml", "sonar_1")];
 const ASIDE_M: f64 = 0.5;
 
@@ -79,8 +80,8 @@ fn head_turned_about_its_axis_is_reported_with_angle() {
     }
 }
 
-/// If a head is yawed or pitched on its mount, its ranges change while the vehicle yaws back and forth. With a single
-/// head, this looks like a heading error.
+/// If a head is yawed or pitched on its mount, its ranges change while the vehicle yaws back and forth. If the vehicle
+/// has only one head, this looks like a heading error.
 #[test]
 fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
     let right = file("vita2-4.toml");
@@ -131,7 +132,7 @@ fn cell(vehicle: &str, condition: Condition) -> Cell {
     Cell { vehicle, condition, start_m: 100.0, let_in_m: None, driven: Driven::Planned }
 }
 
-/// Faster sound than configured gives ranges that are too short. A wider wall gives ranges that are too long.
+/// If sound is faster than configured, measured ranges are too short. If the tunnel is too wide, they are too long.
 #[test]
 fn wrong_range_scale_is_reported_with_its_value() {
     let wrong = [(Condition::WrongSound, 1.0 / 1.04 - 1.0), (Condition::WrongWall, 0.06)];
@@ -158,7 +159,7 @@ fn correct_settings_are_not_reported() {
     let conditions =
         [Condition::Clean, Condition::DataSheet, Condition::Poor, Condition::Murk, Condition::Lively];
     for (k, condition) in conditions.into_iter().enumerate() {
-        // Each condition with the four heads, and with one of the vehicles with fewer heads.
+        // Each condition is tried with the vehicle with four heads, and with one of the vehicles with fewer heads.
         for vehicle in [["vita1", "vita2-2"][k % 2], "vita2-4"] {
             let dive = cell(vehicle, condition).dive(3, 45.0);
             assert_eq!(doubted(&dive.scene, &dive.believed), None, "{vehicle} {condition:?}");
@@ -166,8 +167,8 @@ fn correct_settings_are_not_reported() {
     }
 }
 
-/// If a head sees only a round vault about its own axis, its rotation can't be observed. Without noise, its range
-/// errors of some millimetres are constant. They must not be taken for a wrong setting.
+/// If a head sees only a round vault about its own axis, its rotation can't be observed. Without noise, the head's
+/// range errors of some millimetres are constant. They must not be mistaken for a wrong setting.
 #[test]
 fn millimetre_range_errors_under_a_round_vault_are_not_reported_as_rotation() {
     for layout in ["sector_offset", "phase_shift"] {

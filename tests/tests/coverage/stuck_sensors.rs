@@ -1,4 +1,4 @@
-//! Stuck devices: a head or inertial unit that repeats its output for ever counts as silent.
+//! Stuck devices: a head or inertial unit that repeats the same output for ever counts as silent.
 
 use headrace_coverage::Cause;
 use headrace_coverage::Verdict;
@@ -10,7 +10,7 @@ const NOISE: &str = "motion_within_turn = {}\nocclusion = {}\nrange_noise = { sd
 const SWAY: &str =
     "pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 12, pitch_deg = 3, period_s = 25 }\n";
 
-/// VITA 2 with four heads: stationary for a minute, then a drive of this length.
+/// A scene of VITA 2 with four heads. The vehicle is stationary for a minute, and then drives the way `way` (m, m/s).
 fn scene(start_m: f64, way: (f64, f64), effects: &str) -> Scene {
     seeded(5, start_m, way, effects)
 }
@@ -77,8 +77,9 @@ fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
     assert!(100 * over <= passed, "{over} of {passed}");
 }
 
-/// A stuck head repeats one angle and one range; a head without returns keeps turning. In both cases, the advised speed
-/// is the speed for a silent head, the cause is a silent or stalled head, and an alert names the head.
+/// A stuck head repeats one angle and one range; a head without returns keeps turning. Both heads have the same
+/// consequences. The advised speed is that for a silent head, the cause is a silent or stalled head, and an alert names
+/// the head.
 #[test]
 fn head_without_returns_is_reported_as_silent() {
     let deaf = "stuck_range = { range_m = 0.3, from_s = 90, sensors = [\"sonar_1\"] }\n";

@@ -17,7 +17,7 @@ fn dive(start_m: f64, effects: &str) -> JudgedDive {
     )))
 }
 
-/// Samples sorted into strips of chainage, for a search that shares nothing with the triangulation.
+/// Samples sorted into strips of chainage, for a search that shares no method with the oracle's triangulation.
 struct Strips<'a> {
     truth: &'a Truth,
     from_m: f64,
@@ -62,7 +62,7 @@ fn true_holes_match_a_fine_grid() {
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The dive's ends are left out. They are far from all samples, so the grid search would take long there.
+    // The dive's ends are left out. They are far from all samples, so the grid search takes too long there.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {
@@ -73,8 +73,8 @@ fn true_holes_match_a_fine_grid() {
         };
         let grid_m = (0..=along).flat_map(|i| (0..around).map(move |j| place(i, j)));
         let grid_m = grid_m.map(|at| 2.0 * strips.clear_m(at)).fold(0.0, f64::max);
-        // Between grid points, the diameter of an empty circle changes by no more than twice the distance to the
-        // nearest grid point.
+        // From a point to the nearest grid point, the diameter of the empty circle changes by at most twice the
+        // distance.
         let off_m =
             math::hypot((to_m - from_m) / f64::from(along), dive.truth.perimeter_m / f64::from(around));
         let short_m = section.true_hole_m - grid_m;
@@ -97,7 +97,7 @@ fn outline_arc_lengths_match_the_profile() {
     for profile in profiles {
         let outline = Outline::of(&profile);
         for k in 0..5_000 {
-            // The tested points lie inside and outside the wall, all around it.
+            // The tested points lie on both sides of the wall, all around it.
             let off_m = 0.3 + 1.5 * math::wrap(0.37 * f64::from(k), 1.0);
             let [y, z] = profile.point_at(0.618 * profile.perimeter_m() * f64::from(k));
             let [y0, z0] = profile.reference();
@@ -111,13 +111,13 @@ fn outline_arc_lengths_match_the_profile() {
 
 /// Whether a section can be judged in this test.
 ///
-/// It must be at least 1.5 m beyond the start, because the position estimate has converged by then. Its true hole must
-/// be below 0.7 m; a larger hole means that the section is at the end of the dive.
+/// It must be at least 1.5 m beyond the start, because the position estimate has converged there. Its true hole must be
+/// below 0.7 m, because larger holes occur only at the end of the dive.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }
 
-/// As [`settled`], but with a limit of `hole_m` for the true hole.
+/// As [`settled`], but with the limit `hole_m` for the true hole.
 fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
     section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }
@@ -153,7 +153,7 @@ fn oracle_takes_only_returns_from_the_wall_as_samples() {
     }
 }
 
-/// A wrong cable count shifts a section along the tunnel. Its true hole is searched on the shifted stretch.
+/// A wrong cable count shifts a section along the tunnel. The section's true hole is searched on the shifted stretch.
 #[test]
 fn true_holes_are_searched_at_the_shifted_chainage_of_a_section() {
     let effects = "motion_within_turn = {}\ntether_slack = { reach_m = 0.4, period_s = 400 }\n";
@@ -166,8 +166,8 @@ fn true_holes_are_searched_at_the_shifted_chainage_of_a_section() {
     }
 }
 
-/// Heads with a minimum range of 10 cm receive echoes of their own vehicle, which hides a part of the wall. These
-/// echoes fill no hole.
+/// The vehicle hides a part of the wall. Heads with a minimum range of 10 cm receive echoes from the vehicle itself,
+/// which fill no hole.
 #[test]
 fn no_section_passes_because_of_echoes_from_the_vehicle() {
     let load = |name: &str| {

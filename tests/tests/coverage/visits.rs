@@ -1,5 +1,5 @@
-//! Places with several visits. A later visit can add to the coverage but never revokes a pass, and two visits
-//! combine.
+//! Places with several visits. A later visit can add to the coverage, but it never revokes a pass. The samples of two
+//! visits count together.
 
 use headrace_coverage::Verdict;
 use headrace_tests::{scenes, truth};
@@ -7,7 +7,8 @@ use headrace_tests::{scenes, truth};
 const SENSORS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.0006, attitude_deg = 0.2 }\n\
     imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.0003, tau_s = 300 }\nrange_noise = { sd_m = 0.01 }\n";
 
-/// A dive of `vita2-4` from 5 m along these legs (m, m/s). A negative distance means backward motion.
+/// A dive of `vita2-4` from chainage 5 m. Each leg is given by its length, m, and speed, m/s. A negative distance means
+/// backward motion.
 fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
     let leg = |(by_m, speed_mps): &(f64, f64)| {
         format!("[[trajectory.legs]]\ndistance_m = {by_m}\nspeed_mps = {speed_mps}\n")

@@ -1,7 +1,7 @@
 //! Only returns that are accepted as wall fill holes. The test compares these returns with the objects that the beams
 //! truly met.
 //!
-//! Cases are stuck and noisy heads, murk, boulders and caves.
+//! The dives have stuck or noisy heads, murk, boulders or caves.
 
 use headrace_coverage::Verdict;
 use std::collections::BTreeMap;
@@ -52,7 +52,7 @@ fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
 }
 
 /// Difference between the range of each ping and the true range of the object that its beam met, m. The list is in the
-/// loop's order; `None` if one of the two ranges is missing.
+/// loop's order. An element is `None` if one of the two ranges is missing.
 fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
     let scene = scenes::scene_from(scene, &|_| Ok(vehicle.as_bytes().to_vec()));
     let mut simulation = Simulation::with_truth(&scene).unwrap();
@@ -72,13 +72,14 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
 /// Returns and sections of a dive in murk, compared with the objects that the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Number of returns from the wall. The loop classified `met_doubtful` of them as doubtful.
+    /// Number of returns from the wall. `met_doubtful` counts those of them that the loop classified as doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Number of returns from objects other than the wall. The loop accepted `strays_wall` of them as wall.
+    /// Number of returns from objects other than the wall. `strays_wall` counts those of them that the loop accepted as
+    /// wall.
     strays: usize,
     strays_wall: usize,
-    /// Number of passed sections. `worst` is their largest ratio of true hole to target.
+    /// Number of passed sections. `worst` is the largest ratio of true hole to target in these sections.
     passed: usize,
     worst: f64,
 }
@@ -114,12 +115,14 @@ fn no_section_passes_with_a_head_stuck_at_one_range() {
     assert!(sound.report.summary.pass_m > 5.0, "{:?}", sound.report.summary);
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
-    // A constant range at the centre of a round pipe could be the wall of a pipe with another radius.
+    // A constant range from the centre of a round pipe could be true in a pipe with another radius, so only the profile
+    // is doubted.
     let kinds: Vec<_> = observed(&alone.report).into_iter().map(|alert| alert.kind).collect();
     assert_eq!(kinds, ["profile_contradicted"]);
 }
 
-/// In the centre of a pipe, two heads at one range seem to agree on a wider wall, whatever their noise.
+/// If two heads in the centre of a pipe are stuck at the same range, they seem to agree on a wall with another radius,
+/// whatever their noise.
 #[test]
 fn no_section_passes_with_all_heads_stuck_at_one_range() {
     for range_m in [0.78, 1.22] {
@@ -165,7 +168,7 @@ fn recovered_head_is_used_again() {
         .map(|ping| ping.received.since(dive.pings[0].received).as_secs_f64())
         .collect();
     assert!(doubtful.len() > 2000 && doubtful[0] > 58.0, "{} from {}", doubtful.len(), doubtful[0]);
-    // The loop accepts the head again after some turns over new wall.
+    // After some turns over new wall, the loop accepts the head's returns again.
     assert!(doubtful.last().unwrap() < &145.0, "{:?}", doubtful.last());
 }
 
@@ -186,7 +189,7 @@ fn head_with_random_ranges_passes_no_section_and_is_reported() {
     assert_eq!(named(&alone, "sonar_0")[0].kind, "head_scattered");
     let causes = alone.report.sections.iter().filter_map(|section| section.cause);
     let causes: Vec<&str> = causes.map(|evidence| evidence.cause.as_str()).collect();
-    // A head counts as silent if all of its returns are rejected.
+    // A head counts as silent if all of its returns are rejected, so the cause is `head_silent`.
     let silent = causes.iter().filter(|cause| **cause == "head_silent").count();
     assert!(causes.len() > 10 && 10 * silent >= 9 * causes.len(), "{causes:?}");
     let one_of_two = dive(2, &effects("sonar_1"));
@@ -248,9 +251,9 @@ fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
         assert!(wall > 50_000 && 200 * doubtful <= wall, "{name}: {doubtful} of {wall}");
         let all = observed(&dive.report);
         assert!(all.iter().all(|alert| alert.sensor.is_none()), "{all:?}");
-        let reported = dive.report.dive.samples_rejected.doubtful_returns;
-        assert_eq!(usize::try_from(reported).unwrap(), doubtful);
-        // No section fails because doubtful returns are missing.
+        let told = dive.report.dive.samples_rejected.doubtful_returns;
+        assert_eq!(usize::try_from(told).unwrap(), doubtful);
+        // No section fails only because its doubtful returns don't count.
         let all =
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);
         let wall = Wall::new(all, dive.profile.perimeter_m()).unwrap();

@@ -22,7 +22,7 @@ const BEGIN: MonoNs = MonoNs(1_000_000_000);
 /// Lowest sensor number of the second vehicle (see `Surroundings::vehicles`).
 pub(crate) const OTHERS: u8 = 128;
 
-/// Kind of a file; it determines the reader.
+/// Kind of a file. It determines which reader gets the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     Log,
@@ -35,7 +35,8 @@ pub(crate) enum Kind {
     Mcap,
     Vehicle,
     Scene,
-    /// Data of a device: sensor number, random seed for the split into pieces, and the device's bytes.
+    /// Data of a device: the number of its sensor, a random seed for splitting the data into pieces, and the device's
+    /// bytes.
     Line,
     /// A packet with an operator's command.
     Console,
@@ -76,8 +77,8 @@ pub(crate) struct File {
 
 pub(crate) struct Corpus {
     pub(crate) files: Vec<File>,
-    /// Messages of each intact log. A damaged version of a log must contain all messages of the intact log, unless a
-    /// loss is reported.
+    /// Messages of each intact log. If a reader reports no loss, a damaged log must still contain all messages of an
+    /// intact log.
     pub(crate) said: Vec<Said>,
 }
 
@@ -187,7 +188,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// Content of test message `number`: its bytes and its length differ from message to message.
+/// Content of test message `number`: both its bytes and its length depend on the number.
 fn content(number: u64) -> Vec<u8> {
     let mut random = Random(number);
     (0..=number % 40).map(|_| random.bits().to_le_bytes()[3]).collect()

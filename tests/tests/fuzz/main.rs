@@ -8,7 +8,7 @@
 //!     HEADRACE_FUZZ_SEED=42 HEADRACE_FUZZ_SECONDS=60 cargo test -p headrace_tests --test fuzz -- --ignored --nocapture
 //!
 //! A failing file is kept in the system's temporary folder and printed with seed, number and kind.
-//! `HEADRACE_FUZZ_FILE=path` tries a kept file again; its name contains its kind. Other fuzzers can call
+//! `HEADRACE_FUZZ_FILE=path` tries a kept file again. The name of the file contains its kind. Other fuzzers can call
 //! [`targets::try_one`].
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
@@ -35,9 +35,10 @@ use headrace_tests::random::Random;
 use corpus::{Corpus, Kind};
 use targets::{Surroundings, try_one};
 
-/// Largest memory for one file, whichever sizes the file claims, bytes (`docs/reference/limits.md`).
+/// Largest memory that a reader may use for one file, bytes, whichever sizes the file claims
+/// (`docs/reference/limits.md`).
 const MOST_MEMORY: usize = 200 << 20;
-/// Longest time for one file. Files usually take less than a hundredth of this time.
+/// Longest time for one file. A file usually takes less than a hundredth of this time.
 const LONGEST: DurNs = DurNs::from_millis(20_000);
 /// Number of damaged files tried in an ordinary test run.
 const FEW: u64 = 1500;
@@ -63,14 +64,14 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         HELD.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: as above.
+        // SAFETY: the caller upholds the allocator's contract.
         unsafe { System.dealloc(pointer, layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         took(size);
         HELD.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: as above.
+        // SAFETY: the caller upholds the allocator's contract.
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
@@ -117,7 +118,7 @@ impl Trial {
     }
 }
 
-/// Ends the program if a file takes too long, because nothing else can stop a hanging reader.
+/// Runs `work`. Ends the program if a file takes too long, because nothing else can stop a hanging reader.
 fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
     static NUMBER: AtomicUsize = AtomicUsize::new(0);
     let done = AtomicBool::new(false);
@@ -135,7 +136,7 @@ fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
                 }
             }
         });
-        // Every file is kept before it is tried, because a file that hangs can't be kept afterwards.
+        // Every file is kept before it is tried, because it can't be kept once its reader hangs.
         let result = work(&|trial, bytes| {
             NUMBER.fetch_add(1, Ordering::Relaxed);
             let name = format!("headrace-fuzz-last-{}.{}", std::process::id(), trial.kind.name());

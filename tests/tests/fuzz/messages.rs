@@ -5,7 +5,7 @@ use std::io::Cursor;
 
 use headrace_replay::log::{LogReader, MessageKind};
 
-/// Messages of a log: time and content of each message, with the number of times that it occurs.
+/// Messages of a log. The key is a message's time and content; the value tells how often the message occurs.
 pub(crate) type Said = BTreeMap<(u64, Vec<u8>), u32>;
 
 /// Reads a log. Returns its messages, and whether the log is reported as complete. Errors: the file isn't a log.

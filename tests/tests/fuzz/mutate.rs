@@ -13,7 +13,7 @@ fn part(random: &mut Random, len: usize) -> core::ops::Range<usize> {
     start..(start + random.below(most)).min(len)
 }
 
-/// Returns a false length or count that is likely to cause trouble.
+/// Returns a false length or count in place of `truth` that is likely to cause trouble.
 fn lie(random: &mut Random, truth: u64) -> u64 {
     match random.below(9) {
         0 => 0,
@@ -28,7 +28,7 @@ fn lie(random: &mut Random, truth: u64) -> u64 {
     }
 }
 
-/// Damages a file one to eight times; parts of `other` may be inserted.
+/// Damages the file `bytes` one to eight times. Parts of `other` may be inserted.
 pub(crate) fn broken(random: &mut Random, bytes: &[u8], other: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(4) * random.below(3) {
@@ -70,8 +70,8 @@ fn once(random: &mut Random, bytes: &mut Vec<u8>, other: &[u8]) {
     }
 }
 
-/// Replaces a number of four or eight bytes in either byte order. Prefers small numbers, because these are often
-/// lengths.
+/// Replaces a number of four or eight bytes in either byte order by a false number. Prefers small numbers, because
+/// these are often lengths.
 fn lengths(random: &mut Random, bytes: &mut [u8], at: usize) {
     let width = if random.below(2) == 0 { 4 } else { 8 };
     let big_endian = random.below(4) == 0;

@@ -89,8 +89,8 @@ impl Surroundings {
         Self { vehicle: read(VEHICLE), vehicles }
     }
 
-    /// One [`Taker`] for each sensor. The taker states the stream that contains the sensor's data. In tables and ROS
-    /// recordings this is the stream with the sensor's name, and in other files the only stream.
+    /// One [`Taker`] for each sensor. A taker states which stream contains the sensor's data. In tables and ROS
+    /// recordings it is the stream with the sensor's name. In other files it is the only stream.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
             Kind::Tlog => tlog::STREAM,
@@ -111,8 +111,8 @@ impl Surroundings {
             .collect()
     }
 
-    /// Maps the given topics to sensors; returns the feeds. Only topics of profiling heads take their times from header
-    /// stamps.
+    /// Maps the given topics to sensors; returns the feeds. Only messages for profiling heads get their times from the
+    /// timestamps in their headers.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {
@@ -151,7 +151,8 @@ pub(crate) fn try_one(
     if !silent || !is_vouched_for(bytes) {
         return Ok(());
     }
-    // The log reports no loss. So it must contain all messages of one intact log; it may also contain parts of others.
+    // The log reports no loss. It must therefore contain all messages of one of the intact logs. It may also contain
+    // parts of others.
     let holds =
         |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
     if corpus.said.iter().any(holds) {
@@ -161,7 +162,7 @@ pub(crate) fn try_one(
     }
 }
 
-/// Whether every checksum is present. A checksum of zero counts as missing; without one, a changed byte can't be
+/// Whether every checksum is present. A checksum of zero counts as missing. Without one, a changed byte can't be
 /// detected.
 fn is_vouched_for(log: &[u8]) -> bool {
     let mut rest = &log[8..];
@@ -198,7 +199,7 @@ pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
 
 /// Decodes a device's bytes both whole and in pieces; returns the number of readings.
 ///
-/// Errors: a reading isn't a finite number, the counts don't add up, or the readings depend on the pieces.
+/// Errors: a reading isn't a finite number, the counts don't add up, or the readings depend on how the bytes are split.
 fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let &[number, seed, ref line @ ..] = bytes else { return Ok(0) };
     let [first, second] = &around.vehicles;
@@ -232,7 +233,7 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     said.map(|()| count)
 }
 
-/// Reads a packet of operator input. Errors: the command changes when it is written and read again.
+/// Reads a packet of operator input. Errors: the command isn't the same after it has been written and read again.
 fn command(bytes: &[u8]) -> Result<u64, String> {
     let Ok(command) = console::Command::parse(bytes) else { return Ok(0) };
     let json = command.to_json();
@@ -260,7 +261,8 @@ fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
 /// Largest number of lines in the list of a file's errors, including the line that says that there are more.
 const MOST_ERRORS: usize = 101;
 
-/// Reads a vehicle file or a scene; returns its number of sensors. Errors: the list of errors in the file is faulty.
+/// Reads a vehicle file or a scene; returns its number of sensors. Errors: the reader's list of the errors in the file
+/// is itself faulty.
 fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
     let document = Document::new("file", text);
@@ -284,11 +286,11 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Imports a file into a log, and checks that the log is intact.
+/// Imports a file into a log, and checks that this log is intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // Among these kinds of file, only ROS recordings have an importer. So the fuzzer imports files of all these
-        // kinds as ROS recordings.
+        // Among these kinds of file, only ROS recordings have an importer. All of them are therefore imported as if
+        // they were ROS recordings.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());

@@ -23,7 +23,7 @@ fn with_profile(file: &str) -> String {
     vehicle
 }
 
-/// A file as name and content, the command that reads it, and the expected message.
+/// An oversized file: its name, its content, the command that reads it, and the expected message.
 type Bomb = (&'static str, String, &'static [&'static str], &'static str);
 
 /// All oversized files.
@@ -194,7 +194,7 @@ fn oversized_files_are_refused_with_the_limit() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Lists of names with one letter need the most memory per byte.
+/// The files contain long lists of names with one letter, which need the most memory per byte.
 #[test]
 fn dbc_files_of_any_length_stay_within_the_memory_limit() {
     let folder = Folder::new();

@@ -9,8 +9,8 @@ use crate::records::{
 pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
-    /// Words that the report of a replay must contain. Alternatives are separated by `|`.
-    pub(crate) expected_text: &'static str,
+    /// Words that the report of a replay must contain. A `|` separates alternatives.
+    pub(crate) told: &'static str,
 }
 
 const MIB: u64 = 1 << 20;

@@ -37,10 +37,9 @@ fn log_bombs_take_little_memory_and_are_reported() {
             continue;
         }
         for ran in [replayed, recovered] {
-            let is_reported = expected_text.split('|').any(|words| ran.stdout.contains(words));
-            // A replay ends with exit code 0 if the skipped records contain no packets of devices.
-            if (ran.code, is_reported) != (Some(3), true)
-                && !(expected_text.contains("over 4096") && ran.code == Some(0))
+            let is_told = told.split('|').any(|words| ran.stdout.contains(words));
+            // Some bombs skip only records that contain no packets of devices. Their replay ends with exit code 0.
+            if (ran.code, is_told) != (Some(3), true) && !(told.contains("over 4096") && ran.code == Some(0))
             {
                 let start: String = ran.stdout.chars().take(400).collect();
                 wrong.push(format!("{name}: {:?} {start} {}", ran.code, ran.stderr));
@@ -83,7 +82,7 @@ fn bytes_read_of_a_bomb_are_proportional_to_its_length() {
         drop(log);
         let len = bytes.len() as u64;
         println!("{name}: {len} bytes, {} read, {messages} messages", counted.read);
-        // The limit allows for the reader's buffer, which is filled again after each seek.
+        // The limit is larger than the log, because the reader fills its buffer again after each seek.
         assert!(counted.read <= (1 << 20) + 16 * len, "{name}: {} of {len}", counted.read);
         assert!(messages <= len / 31 + 100, "{name}: {messages} of {len} bytes");
     }

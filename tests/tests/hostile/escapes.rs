@@ -1,5 +1,5 @@
-//! Names from outside the program may contain terminal control codes. They are displayed escaped, each on a single
-//! line.
+//! Names from outside the program may contain terminal control codes. These codes are escaped on the display, so that
+//! each name stays on a single line.
 
 use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -7,8 +7,8 @@ use mcap::WriteOptions;
 use crate::records::{attachment, channel, log, message, metadata};
 use crate::run::run;
 
-/// Control codes in C0 and C1. They clear the screen, set the window title, ring the bell, return the carriage,
-/// change the text direction, and begin a new line.
+/// Control codes that hostile names contain. They clear the screen, set the window title, ring the bell, return the
+/// carriage, change the text direction, and begin a new line.
 const EVIL: &str = "a\x1b[2J\x1b]0;t\x07\rb\u{9b}31m\u{202e}c\u{2066}\ndigest 0000000000000000";
 
 #[track_caller]

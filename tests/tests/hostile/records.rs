@@ -93,7 +93,7 @@ pub(crate) fn zstd(window_log: u8, parts: &[Part<'_>]) -> Vec<u8> {
             }
         }
     }
-    // Header of an empty last block, which ends the zstd frame.
+    // These bytes are the header of an empty last block, which ends the zstd frame.
     frame.extend([1, 0, 0]);
     frame
 }

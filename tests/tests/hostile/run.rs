@@ -7,20 +7,20 @@ use headrace_geometry::time::DurNs;
 use headrace_ports::now;
 use headrace_tests::{Folder, program};
 
-/// Time limit of a run. Runs usually take seconds, so a run beyond the limit counts as one that never ends.
+/// Time limit of a run. Runs usually take seconds, so a longer run is taken to hang for ever.
 const HANGS_AFTER: DurNs = DurNs::from_millis(120_000);
 
 /// Result of a run of the program.
 pub(crate) struct Ran {
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
-    /// Lines of stderr without the program's own log messages.
+    /// Lines of stderr, except the program's own log messages.
     pub(crate) stderr: String,
     /// All of stderr.
     pub(crate) log: String,
     /// Peak resident memory, MiB.
     pub(crate) most_mib: u64,
-    /// Duration, s; tables print it, but no test judges it.
+    /// Duration of the run, s. It is printed in tables, but no test checks it.
     pub(crate) took_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Seeks in odd logs. After a seek, the reader must not know definitions that come later in the log.
+//! Seeks in odd logs. After a seek back, the reader must not know channels that are only defined later in the log.
 
 use std::io::Cursor;
 
@@ -21,7 +21,8 @@ fn with_a_late_channel() -> Vec<u8> {
     [&data, &summary, &footer, MAGIC].concat()
 }
 
-/// Messages in the rest of a log, and all losses that the reader has reported.
+/// Reads a log from the present position to its end. Returns the messages, and all losses that the reader has reported
+/// so far.
 fn rest(log: &mut LogReader<Cursor<Vec<u8>>>) -> (Vec<Vec<u8>>, Vec<String>) {
     let mut messages = Vec::new();
     while let Some(message) = log.next().unwrap() {
@@ -44,7 +45,7 @@ fn channel_defined_later_is_unknown_after_seeking_back() {
         log.go_to(&begin).unwrap();
         assert_eq!(rest(&mut log), straight);
     }
-    // A reader that seeks to the end before it reads anything knows both channels.
+    // This reader seeks to the end of the log before it reads anything. It must nevertheless know both channels.
     let mut other = LogReader::new(Cursor::new(with_a_late_channel()), "late".to_owned()).unwrap();
     other.go_to(&end).unwrap();
     assert_eq!((rest(&mut other), other.header().sources.len()), ((Vec::new(), straight.1), 1));

@@ -9,7 +9,7 @@ use super::workspace::root;
 
 /// Names of linked libraries that are written in other languages.
 const FOREIGN_LIBRARIES: [&str; 4] = ["hidapi", "lz4", "ring_core_0_17_14_", "zstd"];
-/// Crates that are never built for a supported system, because only web pages need them.
+/// Crates in the lock file that are never built, because only programs in web pages need them.
 const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
 
 /// All packages in the lock file that are needed if all features are enabled.
@@ -24,12 +24,12 @@ fn packages() -> Vec<Value> {
     metadata["packages"].as_array().unwrap().clone()
 }
 
-/// For each package of this tree, the crates on which it depends according to a lock file.
+/// The packages in a lock file of this repository, each with the crates on which it depends according to that file.
 fn locked_dependencies(lock_file: &str) -> BTreeMap<String, BTreeSet<String>> {
     let text = std::fs::read_to_string(root().join(lock_file)).unwrap();
     let lock: toml::Table = toml::from_str(&text).unwrap();
     let ours = lock["package"].as_array().unwrap().iter().filter(|package| package.get("source").is_none());
-    // A dependency with several versions is listed as "name version".
+    // If the lock file has several versions of a dependency, it lists the dependency as "name version".
     let name = |entry: &toml::Value| entry.as_str().unwrap().split(' ').next().unwrap().to_owned();
     let dependencies = |package: &toml::Value| {
         package.get("dependencies").map_or_else(Vec::new, |list| list.as_array().unwrap().clone())
@@ -115,7 +115,7 @@ fn crates_come_from_the_registry_or_this_tree() {
     }
 }
 
-/// With an old lock file, builds of `lab/` with `--locked` fail, and builds without `--locked` change the file.
+/// If the lock file of `lab/` is out of date, builds with `--locked` fail, and builds without it change the file.
 #[test]
 fn lock_file_of_the_lab_lists_the_dependencies_of_the_product() {
     let lab = locked_dependencies("lab/Cargo.lock");

@@ -38,7 +38,7 @@ fn read(file: &Path) -> String {
     std::fs::read_to_string(root().join(file)).unwrap_or_else(|why| panic!("{}: {why}", file.display()))
 }
 
-/// Targets of links in Markdown: `[text](target)`.
+/// Targets of the Markdown links in a text. A link has the form `[text](target)`.
 fn links(text: &str) -> impl Iterator<Item = &str> {
     text.split("](").skip(1).filter_map(|rest| rest.split(')').next())
 }
@@ -164,7 +164,7 @@ fn comments(text: &str) -> Vec<(usize, String)> {
 fn comments_and_documents_have_no_awkward_sentence() {
     let mut faults = Vec::new();
     for file in files(&["rs", "ts", "tsx"]) {
-        // This file contains the patterns themselves.
+        // This file contains the awkward words themselves.
         if file.ends_with("english.rs") {
             continue;
         }

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::workspace::{root, sources};
 
 const LIST: &str = "tests/tests/fuzz/entry_points";
-/// Signs that a file interprets external bytes: the traits of decoders and file formats, and the parsers of text and
+/// Texts that show that a file interprets external bytes: traits of decoders and file formats, and parsers of text and
 /// JSON.
 const SIGNS: [&str; 9] = [
     " Decoder for ",
@@ -19,7 +19,8 @@ const SIGNS: [&str; 9] = [
     "postcard::take_from",
     "from_utf8(",
 ];
-/// Files that interpret only text of this program, or text of a listed file.
+/// Files that needn't be listed, because they interpret only text that this program wrote or that a listed file has
+/// read.
 const OWN_TEXT: [&str; 14] = [
     "core/sampling/src/advice/answer.rs",
     "plugins/dashboard/src/assets.rs",
@@ -37,7 +38,7 @@ const OWN_TEXT: [&str; 14] = [
     "core/monitor/src/fixtures.rs",
 ];
 
-/// Whether a file has a sign outside its comments and unit tests.
+/// Whether a file has one of the [`SIGNS`] outside its comments and unit tests.
 fn interprets_bytes(text: &str) -> bool {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let mut lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));

@@ -31,8 +31,8 @@ fn json(path: PathBuf) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Every file in the image is named by the digest of its content. The image states its processor, and its labels are
-/// those that BlueOS reads.
+/// Every file in the image is named by the digest of its content. The image states its processor, and has the labels
+/// that BlueOS reads.
 #[test]
 fn blueos_image_contains_the_program() {
     let folder = Folder::new();
@@ -72,8 +72,8 @@ fn blueos_image_contains_the_program() {
     assert_eq!(read("permissions")["HostConfig"]["NetworkMode"], "host");
 }
 
-/// The image contains no libraries. So the script refuses programs that need a library, and files that aren't
-/// programs.
+/// The image contains no libraries. The script therefore refuses programs that need a library. It also refuses files
+/// that aren't programs.
 #[test]
 fn blueos_image_refuses_programs_that_cannot_start() {
     let folder = Folder::new();

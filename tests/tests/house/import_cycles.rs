@@ -1,8 +1,9 @@
-//! Finds import cycles between files of a crate, because such files can't be understood, tested or moved separately.
+//! Finds import cycles between files of a crate, because files in a cycle can't be understood, tested or moved
+//! separately.
 //!
 //! A file depends on the files of its child modules, and on the file of each module that its paths name. `pub use`
 //! counts like `use`, and an import of a reexported item depends on the file that reexports it. A path in code counts
-//! if it begins with `crate`, `super` or `self`. Modules for tests only don't count.
+//! if it begins with `crate`, `super` or `self`. Modules that exist only for tests don't count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -26,7 +27,7 @@ fn no_files_import_each_other_in_a_cycle() {
     assert!(found.is_empty(), "import cycles of files, with their imports: {found:#?}");
 }
 
-/// Path of a module: the names from the crate's root on.
+/// Path of a module, as its names from the crate's root on.
 type Module = Vec<String>;
 
 #[derive(Debug, Default)]
@@ -58,8 +59,8 @@ impl Sources {
             let text = load(&file).unwrap_or_else(|| panic!("no file {}", file.display()));
             let found = imports(&text);
             let folder = file.parent().unwrap();
-            // Modules declared in a root file or a mod.rs are in the same folder. Modules declared in another file
-            // are in a folder with that file's name.
+            // The modules that a root file or a mod.rs declares are in the folder of that file. The modules that any
+            // other file declares are in a folder with the file's name.
             let own = if module.is_empty() || file.ends_with("mod.rs") {
                 folder.to_owned()
             } else {
@@ -87,7 +88,8 @@ impl Sources {
         sources
     }
 
-    /// Converts a used path to a path from the crate's root; `None` if the path leads out of the crate.
+    /// Converts a path that the module `module` uses to a path from the crate's root; `None` if the path leads out of
+    /// the crate.
     fn absolute(&self, module: &[String], used: &Used) -> Option<Module> {
         let mut from = [module, &used.inside].concat();
         let mut path = used.path.as_slice();
@@ -110,7 +112,7 @@ impl Sources {
         Some(from)
     }
 
-    /// The module that a path from the crate's root names: its longest beginning that is a module with a file.
+    /// The module that a path from the crate's root names: the path's longest beginning that is a module with a file.
     fn named(&self, path: &[String]) -> Module {
         let is_module = |len: &usize| self.0.contains_key(&path[..*len]);
         path[..(1..=path.len()).take_while(is_module).last().unwrap_or(0)].to_vec()
@@ -145,7 +147,7 @@ impl Sources {
     }
 }
 
-/// Strongly connected components of a graph: the largest sets in which every node reaches every other (Tarjan 1972).
+/// Strongly connected components of a graph: largest sets of nodes in which each reaches all others (Tarjan 1972).
 fn components<N: Ord + Clone>(graph: &BTreeMap<N, BTreeSet<N>>) -> Vec<BTreeSet<N>> {
     let mut search = Search { graph, seen: BTreeMap::new(), stack: Vec::new(), found: Vec::new() };
     for node in graph.keys() {
@@ -166,7 +168,7 @@ struct Search<'a, N> {
 }
 
 impl<'a, N: Ord + Clone> Search<'a, N> {
-    /// Visits a node. Returns the smallest visit number on the stack that the node reaches.
+    /// Visits a node. Returns the smallest visit number of the nodes on the stack that this node reaches.
     fn visit(&mut self, node: &'a N) -> usize {
         let number = self.seen.len();
         self.seen.insert(node, number);

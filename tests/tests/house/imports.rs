@@ -6,7 +6,7 @@ enum Token<'a> {
     Word(&'a str),
     /// `::`
     Separator,
-    /// Content of a string literal that isn't raw.
+    /// Content of an ordinary string literal, not a raw one.
     Text(&'a str),
     Mark(char),
 }
@@ -25,12 +25,12 @@ pub(crate) struct Declared {
 /// A path (such as `crate::a::b`) that a file imports or names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Used {
-    /// Names of the inline modules around the path.
+    /// Names of the inline modules in which the path stands.
     pub(crate) inside: Vec<String>,
     pub(crate) path: Vec<String>,
 }
 
-/// Declarations and imports of a file, except those for tests only.
+/// Declarations and imports of a file, except those that exist only for tests.
 #[derive(Debug, Default)]
 pub(crate) struct Imports {
     pub(crate) modules: Vec<Declared>,
@@ -42,7 +42,7 @@ pub(crate) struct Imports {
 pub(crate) fn imports(text: &str) -> Imports {
     let tokens = tokens(text);
     let mut found = Imports::default();
-    // Enclosing inline modules, each with the brace depth outside the module.
+    // The inline modules around the current token, each with the brace depth outside it.
     let mut around: Vec<(&str, usize)> = Vec::new();
     let (mut depth, mut at) = (0_usize, 0);
     while at < tokens.len() {
@@ -71,7 +71,7 @@ pub(crate) fn imports(text: &str) -> Imports {
                     }
                 }
             }
-            // A module whose name is an argument of a macro definition.
+            // A module in a macro definition whose name is an argument of the macro.
             [Word("mod"), Mark('$'), Word(name), Mark('{'), ..] => {
                 around.push((name, depth));
                 depth += 1;
@@ -172,7 +172,7 @@ fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<Vec<&'a s
             });
             parts.for_each(|part| tree(part, &path, leaves));
         }
-        // `self` means the module itself, even if it is the target of a glob.
+        // `self` and a glob both mean the module itself.
         [Word("self"), ..] | [Mark('*')] => leaves.push(path),
         [Word(word), ..] => leaves.push([path, vec![word]].concat()),
         _ => {}

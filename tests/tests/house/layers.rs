@@ -1,4 +1,5 @@
-//! Checks the rules of layers, a core without I/O and locks, and the metadata of each crate.
+//! Checks that crates use only crates of allowed layers, that the core has no I/O and no locks, and the metadata of
+//! each crate.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +15,7 @@ const FOR_DEVICES: [&str; 1] = ["sensor"];
 /// Crates that the ports crate may use. The ports crate connects devices with the loop.
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
-/// Crates of `replay/` and plugins that each crate in `replay/` may use in addition to the core.
+/// Each crate in `replay/`, with the crates of `replay/` and the plugins that it may use in addition to the core.
 const FOR_REPLAY: [(&str, &[&str]); 3] = [
     ("replay/simulator", &[]),
     ("replay/player", &["replay/simulator"]),
@@ -42,7 +43,8 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// The crate that lists all device kinds. It may use the crates of all devices, and the core as these crates do.
+/// The crate that lists all device kinds. It may use the crates of all devices, and the crates of the core that these
+/// may use.
 const DEVICES: &str = "plugins/devices";
 
 /// Rust packages in the workspace `lab`.
@@ -144,11 +146,11 @@ fn core_has_no_io_and_no_locks() {
     assert!(said.is_empty(), "{said:#?}");
 }
 
-/// A test must not print a skip with `println!`. Cargo hides the output of passing tests, so `.ci/count-skipped`
-/// wouldn't count it.
+/// A test must not report with `println!` that it was skipped. Cargo hides the output of passing tests, so
+/// `.ci/count-skipped` misses such a report.
 #[test]
 fn skipped_tests_are_reported_only_by_the_helper() {
-    // The text is split, so that this file itself isn't found.
+    // The searched text is split here, so that the search doesn't find this file itself.
     let printed = ["println!(\"", "skipped: "].concat();
     for folder in ["src", "core", "plugins", "replay", "tests"].into_iter().chain(LAB) {
         for (path, text) in sources(&root().join(folder)) {
@@ -195,7 +197,7 @@ fn versions_and_lints_are_only_in_the_root_manifest() {
 fn documents_in(text: &str) -> impl Iterator<Item = &str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
     text.split(move |c: char| !is_part(c)).map(|word| word.trim_end_matches('.')).filter(|word| {
-        // The extension is split, so that this file names no document.
+        // The extension is split here, so that this file itself seems to name no document.
         word.strip_suffix(["m", "d"].concat().as_str())
             .and_then(|stem| stem.strip_suffix('.'))
             .is_some_and(|stem| !stem.is_empty())

@@ -11,7 +11,7 @@ pub(crate) use headrace_tests::root;
 pub(crate) struct Package {
     /// Folder of the package, relative to the root.
     pub(crate) place: PathBuf,
-    /// Packages of this workspace on which the package depends, without packages that only its tests need.
+    /// Packages of this workspace on which the package depends, except packages that only its tests need.
     pub(crate) needs: Vec<String>,
     /// Root files of the package's libraries, programs, tests and benches.
     pub(crate) targets: Vec<PathBuf>,

@@ -1,7 +1,7 @@
 //! Validation: foreign logs become headrace logs, which the ordinary decoders read.
 //!
-//! Recordings made by others are in `recordings/`, trimmed. If `HEADRACE_RECORDINGS` is set, they are also read at
-//! full length.
+//! `recordings/` has trimmed recordings made by others. If `HEADRACE_RECORDINGS` is set, these recordings are also read
+//! at full length.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -79,7 +79,8 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
     let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
-    // Four camera frames have checksums that match no definition, so data is lost.
+    // Four frames of a camera have checksums that match no message definition. The exit code is 3, because data is
+    // lost.
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     let shown = json(&answer);
     assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);
@@ -265,7 +266,7 @@ fn imported_table_becomes_the_bytes_of_its_sensors() {
     let heard =
         |id: &str| sources.iter().find(|source| source["id"] == id).unwrap()["frames"].as_u64().unwrap();
     assert_eq!((heard("imu"), heard("ping_left"), heard("tether")), (12, 3, 4));
-    // Three raw pressures, calibrated with the constants from the sensor's memory.
+    // The depth sensor's raw readings become three pressures, calibrated with the constants from the sensor's memory.
     assert_eq!(counts["depth"], heard("depth"));
     assert!(heard("depth") > 3);
     std::fs::remove_file(folder.path("out.mcap")).unwrap();
@@ -283,8 +284,8 @@ fn imported_table_becomes_the_bytes_of_its_sensors() {
 
 /// Faulty rows are reported, and none of their values is assigned to a wrong column.
 ///
-/// Faults are truncated rows, decimal commas beside separators, and ranges beyond the setting. A byte order mark is not
-/// part of the first column's name.
+/// Faults are truncated rows, decimal commas beside separators, and ranges beyond the setting. A byte order mark before
+/// the header is no fault.
 #[test]
 fn rows_that_contradict_the_header_are_skipped_and_reported() {
     let folder = Folder::new();

@@ -1,9 +1,9 @@
 //! Validation: headrace's decoders read recorded dives of other vehicles.
 //!
-//! `small.tlog` is a dive of a BlueROV2 with ArduSub at the surface, in waves (`recordings/bluerov2_ardusub_logs`).
-//! The trimmed copy has the first 40 s. If `HEADRACE_RECORDINGS` is set, all 263 s are read, too. With `--nocapture`
-//! the tests print counts and ranges. Expected values come from `oracles/tlog.py`, an independent reader of the same
-//! files. The crates `ping1d` and `imagenex881` test Ping360 frames and Imagenex 852 logs.
+//! `small.tlog` is a dive of a BlueROV2 with ArduSub at the surface, in waves (`recordings/bluerov2_ardusub_logs`). The
+//! copy in this repository has the first 40 s. If `HEADRACE_RECORDINGS` is set, all 263 s are also read. With
+//! `--nocapture` the tests print counts and ranges. Expected values come from `oracles/tlog.py`, another reader of the
+//! same files. The crates `ping1d` and `imagenex881` test Ping360 frames and Imagenex 852 logs.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ use headrace_tests::recordings;
 /// Number of camera frames (component 100) with a checksum that matches no definition.
 const BAD: u64 = 4;
 
-/// Expected values of a file, from `oracles/tlog.py`. Pairs are minimum and maximum; angles are in radians with the
+/// Expected values of a file, from `oracles/tlog.py`. Pairs are minimum and maximum. Angles are in radians with the
 /// autopilot's signs.
 struct Wanted {
     frames: u64,
@@ -27,8 +27,8 @@ struct Wanted {
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Number of accelerometer readings (specific force). The gyros and the first pressure sensor have as many
-    /// readings.
+    /// Number of accelerometer readings (specific force). The gyros have the same number of readings, and so has the
+    /// first pressure sensor.
     forces: usize,
     mean_force_g: f64,
     /// Number of readings of the second pressure sensor.
@@ -140,7 +140,7 @@ fn check_imu(path: &Path, wanted: &Wanted) {
 
 /// Angle between the measured force and the upward direction by the latest attitude, degrees.
 ///
-/// If the vehicle hardly moves, this angle is small only if the axes of both sensors are right.
+/// While the vehicle hardly moves, this angle is small if the axes of both measurements are right.
 fn up(
     attitudes: &[(MonoNs, Rot<headrace_sensor::reading::Level, headrace_geometry::frames::Sensor>)],
     at: MonoNs,
@@ -181,7 +181,8 @@ fn check_pressures(path: &Path, wanted: &Wanted) {
         let pressure = spread(water.iter().map(|water| water.pressure_pa));
         let temperature = spread(water.iter().map(|water| water.temperature_degc));
         println!("{message:?}: {count} pressures {pressure:.1?} Pa, {temperature:.2?} degrees Celsius");
-        // The vehicle is at the surface, so only weather and half a metre of water change the pressure.
+        // The vehicle is at the surface, so the pressure differs from the standard atmosphere only by the weather and
+        // half a metre of water.
         assert!(pressure.0 > 100_000.0 && pressure.1 < 102_000.0, "{pressure:?}");
         if message == PressureMessage::Second {
             let [least, most] = wanted.pressure_hpa.map(|hpa| 100.0 * hpa);

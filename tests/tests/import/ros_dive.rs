@@ -1,5 +1,5 @@
-//! Validation: a simulated dive is written as a ROS 2 recording and imported. The import gives the same bytes, times
-//! and digest.
+//! Validation: a simulated dive is written as a ROS 2 recording and imported. The imported log has the same bytes and
+//! times, and its replay gives the same digest.
 //!
 //! The recording is written by the code in this file.
 
@@ -15,8 +15,8 @@ use headrace_sensor::reading::{Packet, Reading};
 use headrace_tests::{Folder, raw_messages};
 use mcap::{Message, WriteOptions};
 
-/// Plain CDR in little-endian order. Four bytes of encapsulation come first; the numbers are aligned relative to the
-/// fifth byte.
+/// Plain CDR in little-endian order. Four bytes of encapsulation come first. Numbers are aligned relative to the fifth
+/// byte.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
@@ -54,7 +54,7 @@ impl Cdr {
     }
 }
 
-/// Topic, type and CDR of the ROS message for a device's message; `None` if the device's message needs none.
+/// Topic, type and content of the ROS message that a device's message becomes; `None` if it becomes none.
 type Written = Option<(String, &'static str, Cdr)>;
 
 struct Translator {
@@ -191,6 +191,6 @@ fn imported_ros_recording_equals_its_original_dive() {
     for (got, wanted) in got.iter().zip(&wanted) {
         assert_eq!(got, wanted);
     }
-    // The original log replays by its ticks, and the imported one by time.
+    // The two digests are equal although the original log replays by its ticks, and the imported log by time.
     assert_eq!(folder.digest("out.mcap", &[]), folder.digest("dive.mcap", &[]));
 }

@@ -1,5 +1,5 @@
-//! Validation: recordings written by Python's `rosbags` (tests/ros/make.py) give the same messages as tables with the
-//! same values.
+//! Validation: recordings written by Python's `rosbags` (tests/ros/make.py) give the same messages as CSV tables with
+//! the same values.
 //!
 //! Faults of a recording are reported.
 
@@ -21,8 +21,8 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// A folder with recordings, tables, the vehicle file and a mapping. In the mapping, `further` is added to the table of
-/// each topic.
+/// A folder with recordings, tables, the vehicle file and a mapping. `further` is added to the table of each topic in
+/// the mapping.
 fn folder(further: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -45,7 +45,7 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message of an imported log: topic, nanoseconds since 1970 (by the log's clock anchor), and bytes.
+/// A message of an imported log: topic, time in nanoseconds since 1970 (by the clock metadata of the log), and bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -110,12 +110,12 @@ fn recordings_of_all_kinds_match_the_tables() {
                 "{name}: {topic}"
             );
         }
-        // The import computes angles from points. A beam without a return has no point, so these messages are left
-        // out.
+        // The import computes angles from points. A beam without a return has no point, so messages of such beams are
+        // left out of the comparison.
         let wanted: Vec<_> =
             of(&tables, "/raw/sonar_1").into_iter().filter(|(_, _, bytes)| bytes[8..10] != [0, 0]).collect();
         assert_eq!(of(&got, "/raw/sonar_1"), wanted, "{name}");
-        // A table can't contain a missing return, so ping numbers differ, and only distance and confidence are
+        // A CSV table can't contain a missing return, so ping numbers differ. Only distance and confidence are
         // compared.
         let distances = |all: &[Heard]| -> Vec<_> {
             let pings = of(all, "/raw/ping_left").into_iter();
@@ -145,7 +145,7 @@ fn stamps_in_another_time_base_are_reported_and_usable_on_request() {
     assert!(!answer.stderr.contains("/cable"), "{}", answer.stderr);
     let recorded = heard(&folder);
     assert_eq!(of(&followed, "/raw/imu"), of(&recorded, "/raw/imu"));
-    // The stamp of a scan is the time of its first beam, but the scan is recorded when its last beam is complete.
+    // A scan's timestamp is the time of its first beam, but the scan is recorded when its last beam is complete.
     assert_eq!(import(&folder, "humble.mcap", "header.toml").code, Some(0));
     assert_eq!(of(&heard(&folder), "/raw/sonar_0"), of(&recorded, "/raw/sonar_0"));
     let answer = import(&folder, "boot_time.mcap", "header.toml");
@@ -233,7 +233,7 @@ fn wrong_mappings_are_refused() {
     );
 }
 
-/// Imports a file after the bytes were modified by `change`; returns exit code and output.
+/// Imports a file after `change` has modified its bytes. Returns exit code and output.
 fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (Option<i32>, String) {
     let mut bytes = fixture(name);
     change(&mut bytes);
@@ -305,8 +305,8 @@ fn damage_of_a_recording_is_reported() {
     let (code, said) = changed(&folder, "none.bag", longer);
     assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
-        // Changes the number of the first connection definition inside a chunk. The definition at the end of the file
-        // remains.
+        // Changes the number of the first connection definition inside a chunk, but not in its copy at the end of the
+        // file.
         let chunk = find(bytes, b"compression=", 0);
         let at = find(bytes, b"conn=", chunk);
         bytes[at + 5] = 99;
@@ -365,7 +365,7 @@ fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
     file.into_inner()
 }
 
-/// Encapsulation, a stamp with the record's time, a frame name of three letters, and doubles.
+/// A message of encapsulation, a timestamp equal to the record's time, a frame name of three letters, and doubles.
 fn stamped(seconds: u32, frame: &str, values: &[f64]) -> Vec<u8> {
     let head = [&[0, 1, 0, 0][..], &(1_700_000_000 + seconds).to_le_bytes(), &[0; 4], &[4, 0, 0, 0]].concat();
     let values: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -436,7 +436,7 @@ fn missing_and_odd_values_are_reported() {
         assert!(answer.stderr.contains(words), "{words:?} is not in {}", answer.stderr);
     }
     let shown: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // Four samples: times, orientation of the first sample, four rates, and three forces.
+    // The four samples give four messages with times, one with an orientation, four with rates and three with forces.
     assert_eq!(shown["messages"]["imu"], 4 + 1 + 4 + 3);
     let (_, report) = folder.replay("out.mcap", &[]);
     assert!(report["sources"].as_array().unwrap().iter().all(|source| source["bad_frames"] == 0));

@@ -142,7 +142,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
     for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
-    // An alert requires no action once its condition is over.
+    // Once the condition of an alert is over, the alert requires no action.
     let around = expected.view().surroundings();
     let asks = |alert: &&ListedAlert| !alert.advice(&around).is_empty();
     let (holding, over): (Vec<_>, Vec<_>) =
@@ -204,23 +204,23 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
             changes.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
-    // The second too-fast alert follows only after the way back, because any speed is allowed on the way back.
+    // On the way back any speed is allowed, so the second too-fast alert follows only after the way back.
     let too_fast = raised(ListKind::TooFast);
     assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
-    // After the fast stretch, the too-fast alert still shows the speed that was too fast, not a later speed.
+    // After the fast stretch, the too-fast alert still shows the speed that was too fast, not the later, lower speed.
     let fast = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
     let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };
     assert!(figures.speed_mps > 1.2 * figures.v_max_mps, "{figures:?}");
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };
-    // The alert for the dead head is raised 2 s after the head's last reading, plus one update. No latch time is
+    // The alert for the dead head is raised 2 s after the head's last reading, at the next update. No latch time is
     // configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
     let head = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
     assert_eq!(head.state, AlertState::Rectified, "the head returned, and the alert is unacknowledged");
-    // The missed stretch has one alert, although a later pass has filled a part of it.
+    // The missed stretch has a single alert, although a later pass has filled a part of the stretch.
     let missed = raised(ListKind::Missed);
     let runs = dive.view().coverage().sections.runs().all();
     assert!(missed.len() <= runs.len() && !missed.is_empty(), "{missed:?}, {} runs", runs.len());
@@ -253,7 +253,7 @@ fn silence_of_all_sensors_raises_one_alert_in_time() {
     assert_eq!(dive.view().span().unwrap().1, last, "operator input counts as a sensor");
 }
 
-/// A command from another thread gets its timestamp from the dive's clock.
+/// If another thread gives a command, the command gets its timestamp from the dive's clock.
 #[test]
 fn commands_from_any_thread_reach_the_loop() {
     let scene = scenes::scene(SCENE);
@@ -336,7 +336,7 @@ fn recorded_acknowledgements_are_equal_in_replay_and_verify() {
     let lines = folder.headrace(&["replay", "live.mcap", "--json-lines"]).stdout;
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).cloned().collect::<Vec<_>>();
-    // The voice note is listed again, now with its duration.
+    // The list also has the voice note a second time, with its duration.
     assert_eq!(of("note").len(), 4);
     assert!(of("alert_change").iter().any(|line| line["change"] == "acknowledged"));
     let states = of("state");
@@ -344,8 +344,7 @@ fn recorded_acknowledgements_are_equal_in_replay_and_verify() {
     assert_eq!((&last["left"]["battery_pct"], &last["alerts_hidden"]), (&19.5.into(), &0.into()));
 }
 
-/// A dive of 20 s with a velocity log, whose reports are sent 15 s after their measurements, and an inertial unit on
-/// a CAN bus.
+/// A dive of 20 s with a velocity log and an inertial unit on a CAN bus. `change` changes the bytes of each packet.
 fn withheld_dive(change: fn(&str, &mut Vec<u8>)) -> (Scene, Vec<Packet>) {
     let log = "\n[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\nconnect = \"tcp:127.0.0.1:9\"\n";
     let load = |name: &str| {
@@ -402,12 +401,12 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     );
     assert!((sent - 3..=sent).contains(&count), "{count} of {sent}");
     assert_eq!(action, "restart it");
-    // Other alerts about a sensor would contradict this one.
-    let of_sensors = changes.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+    // An alert that a sensor is silent would contradict the alert about withheld readings.
+    let of_sensors = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
     assert_eq!(of_sensors, 0);
     let state = late.view().live_state_json();
     let dvl = state.sensors.iter().find(|sensor| sensor.id == "dvl").unwrap();
-    // The live state also counts reports since the last update of the alerts.
+    // The numbers of readings differ, because the live state also counts reports since the last update of the alerts.
     let after = dvl.withheld.as_ref().unwrap().split_once(' ').unwrap().1;
     assert_eq!((dvl.state.as_str(), after), ("withheld", text.splitn(3, ' ').nth(2).unwrap()));
     let report = Report::of(&late);
@@ -424,7 +423,7 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     }
 }
 
-/// At several rates, because the first withheld report comes one period after the last reading.
+/// The test tries several rates, because the first withheld report comes one period after the last reading.
 #[test]
 fn velocity_log_that_becomes_late_during_the_dive_is_never_called_silent() {
     for keep_one_of in [1, 5, 10] {
@@ -448,7 +447,7 @@ fn velocity_log_that_becomes_late_during_the_dive_is_never_called_silent() {
     }
 }
 
-/// Without any reading, only the commands that state the time let alerts be raised.
+/// Without any reading, only commands that state the time make the loop's time advance, so that alerts can be raised.
 #[test]
 fn can_frames_without_a_known_id_are_alerted_although_no_sensor_has_a_reading() {
     let (scene, mut packets) = withheld_dive(make_foreign);

@@ -79,7 +79,8 @@ fn each_difference_from_the_expected_report_is_named() {
     let (_, mut report) = folder.replay("dive.mcap", &["--report", "golden.json"]);
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
 
-    // Only a different file name of the log is allowed; any change of a hole's diameter counts as a difference.
+    // A different file name of the log is the only difference that is allowed. Any change of a hole's diameter counts
+    // as a difference.
     report["log"]["path"] = "elsewhere.mcap".into();
     folder.write("golden.json", report.to_string());
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 const DIVE: [&str; 4] = ["run", "vehicle.toml", "--source", "dive.mcap"];
 
-/// Runs the program in a folder through another program, such as strace.
+/// Runs the program in a folder under another program, such as strace.
 fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     let [above, options @ ..] = command else { panic!("no command") };
     let mut below = Command::new(above);
@@ -19,7 +19,7 @@ fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     below
 }
 
-/// Whether strace is available. It can make chosen system calls of a process fail.
+/// Whether strace is available. The program strace can make chosen system calls of a process fail.
 fn has_strace() -> bool {
     let can = Command::new("strace").args(["-o", "/dev/null", "true"]).output();
     let can = can.is_ok_and(|output| output.status.success());
@@ -30,7 +30,7 @@ fn has_strace() -> bool {
 }
 
 /// Records a dive while strace injects this fault into system calls. The dive is long enough for several syncs. Returns
-/// exit code and report.
+/// exit code and report of the dive.
 fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
     let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
     let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
@@ -84,7 +84,7 @@ fn failed_recording_is_reported_live_and_until_the_end() {
     }
     let strace = ["strace", "-f", "-qq", "-o", "trace.txt", "-e", "trace=fdatasync"];
     let strace = [&strace[..], &["-e", "inject=fdatasync:error=EIO:when=2"]].concat();
-    // The dive takes four seconds, so that even on a loaded machine the second sync ends before the dive.
+    // The dive takes four seconds, so that the second sync ends before the dive does, even on a loaded machine.
     let arguments = ["--record", "log.mcap", "--speed", "5x", "--json-lines"];
     let output = below(&folder, &strace, &arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(3));
@@ -327,8 +327,8 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        // Twice a second, a sync makes the file longer. After four syncs, the file certainly contains data whose loss
-        // can be detected.
+        // The file grows at each sync, twice a second. After four syncs, it surely contains data whose loss can be
+        // detected.
         (0..4).fold(0, |len, _| wait_for_more(&log, len, &mut dive));
         take();
         let output = dive.wait_with_output().unwrap();
@@ -373,7 +373,7 @@ fn moved_recording_is_complete() {
     let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     wait_for(&folder.path("log.mcap"), &mut dive);
     std::fs::rename(folder.path("log.mcap"), folder.path("moved.mcap")).unwrap();
-    // The recorder can't read the moved file back by its old name, and the report counts this as a loss.
+    // The file was moved, so the recorder can't read it back by its old name. The report counts this as a loss.
     assert_eq!(dive.wait_with_output().unwrap().status.code(), Some(3));
     assert!(!folder.path("log.part002.mcap").exists());
     assert_eq!(folder.digest("moved.mcap", &[]), digest);

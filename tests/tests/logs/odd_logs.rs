@@ -6,7 +6,7 @@ use headrace_tests::{Answer, Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 
 const WITH_VEHICLE: [&str; 2] = ["--vehicle", "vehicle.toml"];
-/// Nanoseconds from 1970 to autumn 2026.
+/// Nanoseconds from 1970 to a time in autumn 2026.
 const UTC_OF_OUR_ZERO_NS: u64 = 1_790_000_000_000_000_000;
 
 fn replay(folder: &Folder, log: &str) -> Answer {
@@ -34,7 +34,8 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     insta::assert_snapshot!(loss_lines(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years after those of most messages"#);
 
-    // The result is the same if the messages with times of the other clock come first, because the majority decides.
+    // The majority of messages decides which clock is right. The result is therefore the same if the messages with
+    // times of the other clock come first.
     for message in &mut messages {
         message.log_time = match message.channel.topic.as_str() {
             "/raw/depth" => message.log_time - UTC_OF_OUR_ZERO_NS,
@@ -74,7 +75,7 @@ fn messages_too_late_to_be_ordered_are_counted() {
     let mut bytes = folder.read("lying.mcap");
     let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
     let (one, later) = (&chunks[chunks.len() / 2], &chunks[chunks.len() / 2 + 2]);
-    // The test makes the chunk's header state a start time later than the true one.
+    // Changes the start time in the chunk's header to a time later than the true one.
     let place = usize::try_from(one.chunk_start_offset).unwrap() + 9;
     bytes[place..][..8].copy_from_slice(&later.message_start_time.to_le_bytes());
     bytes[place + 8..][..8].copy_from_slice(&later.message_end_time.to_le_bytes());
@@ -93,7 +94,7 @@ fn attached_vehicle_file_with_an_unknown_plugin_is_refused() {
     let answer = folder.headrace(&["replay", "foreign.mcap"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
     insta::assert_snapshot!(answer.stderr, @r#"headrace: foreign.mcap/vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50; did you mean "bar100"?"#);
-    // With another vehicle file, the log can be read even if its channels name an unknown plugin.
+    // If another vehicle file is given, the log can be read although its channels name an unknown plugin.
     assert_eq!(replay(&folder, "foreign.mcap").code, Some(0));
 }
 

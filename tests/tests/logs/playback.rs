@@ -99,7 +99,7 @@ fn headrace_logs_replay_in_recorded_order_but_other_logs_in_order_of_time() {
     }
 }
 
-/// Plays a log with these commands, and makes a snapshot after each `interval` of computing time. Returns the stops and
+/// Plays a log with these commands. A snapshot is made after each `interval` of computing time. Returns the stops and
 /// the result.
 fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Duration) -> (Stops, Outcome) {
     let mut dive = armed(&vehicle());
@@ -130,8 +130,8 @@ fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     (ticks, Outcome::of(&dive, &player))
 }
 
-/// The dive in three forms: from the simulator (replays by time), from the recorder (replays by ticks), and in
-/// several parts.
+/// A folder with logs of one dive in three forms: from the simulator, which replays by time; from the recorder, which
+/// replays by ticks; and from the recorder in several parts.
 fn logs() -> Folder {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "ticks.mcap", &[]);
@@ -146,7 +146,7 @@ fn every_seek_reaches_the_state_of_a_straight_replay() {
     for log in ["dive.mcap", "ticks.mcap", "parts"] {
         let (ticks, outcome) = through(&folder, log);
         assert!(outcome.losses.is_empty(), "{:?}", outcome.losses);
-        // Seeks end before the last two ticks, because a single step from there would reach the end of the log.
+        // Seeks end before the last two ticks, because a single step from there reaches the end of the log.
         let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
         let span = late.since(begun).0;
         for interval in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
@@ -194,7 +194,7 @@ fn playback_waits_at_the_end_for_a_seek() {
     ];
     let (stops, ended) = play(&folder, "ticks.mcap", &commands, Duration::from_millis(5));
     let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
-    // Playback stops each time it reaches the end or is resumed there.
+    // Playback stops each time it reaches the end of the log, and each time it is resumed there.
     let expected = [
         at(before, false),
         at(last, false),
@@ -210,8 +210,8 @@ fn playback_waits_at_the_end_for_a_seek() {
     assert_eq!(ended, outcome);
 }
 
-/// Damages one byte in each of three chunks of a log. Two of these chunks are adjacent and in the middle of the log;
-/// the third one comes later.
+/// Damages one byte in each of three chunks of a log. Two of these chunks are adjacent and in the middle of the log.
+/// The third one comes later.
 fn damage(folder: &Folder, log: &str) {
     let mut bytes = folder.read(log);
     let mut chunks = Vec::new();
@@ -242,8 +242,8 @@ fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
         assert_eq!(outcome.losses.len(), if log == "parts" { 6 } else { 3 }, "{log}: {:?}", outcome.losses);
         let at = |share: usize| PlaybackCommand::Seek(ticks[(ticks.len() - 1) * share / 100].0);
         for interval in [Duration::from_millis(5), Duration::MAX] {
-            // Seeks lead to the end, to a time before the damage, to a snapshot after it, and between the damaged
-            // places.
+            // The seeks lead to the end of the log, to a time before the damage, to a snapshot after the damage, and
+            // between the damaged places.
             for jumps in [&[95, 10][..], &[100, 20, 90, 10], &[60, 5, 58, 96, 56]] {
                 let mut commands = vec![PlaybackCommand::Pause];
                 commands.extend(jumps.iter().map(|share| at(*share)));
@@ -253,7 +253,7 @@ fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
             }
         }
     }
-    // Report and exit code must also equal those of a replay without pauses and seeks.
+    // The report and the exit code must also be the same as for a replay without pauses and seeks.
     for log in ["ticks.mcap", "parts"] {
         let (code, straight) = folder.replay(log, &[]);
         assert_eq!(code, Some(3));
@@ -282,9 +282,10 @@ fn damage_seen_before_seeking_back_is_reported_at_the_end() {
         "pause\nseek 1h\nback 10s\nback 1h\nend\n",
         "pause\nseek 19s\nseek 1s\ngo\n",
     ] {
-        // Only the number of losses is compared, because their times may be known more exactly at the end of the log.
-        let (code, listed) = losses(lines);
-        assert_eq!((code, listed.as_array().unwrap().len()), (Some(3), 3), "{lines}: {listed}");
+        // Only the number of losses is compared. Their times may be known more exactly after the whole log has been
+        // read.
+        let (code, told) = losses(lines);
+        assert_eq!((code, told.as_array().unwrap().len()), (Some(3), 3), "{lines}: {told}");
     }
 }
 
@@ -316,8 +317,8 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
     program.wait_with_output().unwrap()
 }
 
-/// Other targets are judged in a second replay of the whole log. An unfinished replay covers less of the dive, so the
-/// figures wouldn't be comparable.
+/// Other targets are judged in a second replay of the whole log. A replay that is stopped covers less of the dive, so
+/// its figures for the first target aren't comparable with theirs.
 #[test]
 fn stopped_replay_reports_the_first_target_only() {
     let folder = logs();

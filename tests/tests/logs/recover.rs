@@ -42,7 +42,7 @@ fn damaged_log_and_its_recovery_have_the_same_digest() {
         let losses = |report: &Value| report["log"]["losses"].as_array().unwrap().len();
         assert_eq!(losses(&recovered), losses(&damaged), "{name}: {}", recovered["log"]["losses"]);
     }
-    // The recovered log also keeps the results that were published live.
+    // The recovered log also keeps the results that were recorded during the dive.
     let answer = folder.headrace(&["verify", "cut-fixed.mcap", "--json"]);
     let report: Value = serde_json::from_str(&answer.stdout).unwrap();
     assert_eq!(answer.code, Some(3), "{report}");
@@ -90,7 +90,7 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
                 assert!(report["log"]["losses"][0].is_string(), "case {case}");
                 lost += 1;
             }
-            // Exit code 2: the vehicle file in the log is damaged, or the cut removes it.
+            // Exit code 2 is right if the vehicle file in the log is damaged or cut off.
             Some(2) => assert!(answer.stderr.contains("no vehicle file"), "case {case}: {}", answer.stderr),
             code => panic!("case {case}: {code:?}: {}", answer.stderr),
         }
@@ -98,13 +98,13 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
     assert!(lost > 20, "{lost} of 40");
 }
 
-/// Records the short dive on a disk of this size, and then moves the log to another disk. Returns `None` if the small
-/// disk can't be created.
+/// Records the short dive on a small disk of this size, and then copies the log to another disk. Returns exit code,
+/// report and stderr. Returns `None` if the small disk can't be created.
 fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)> {
     std::fs::create_dir_all(folder.path("disk")).unwrap();
     let program = headrace_tests::program();
     let program = program.get_program().to_str().unwrap();
-    // The small disk is a private mount of the shell, and ends with the shell.
+    // The small disk is a private mount of the shell. It disappears when the shell ends.
     let script = format!(
         "mount -t tmpfs -o size={kilobytes}k none disk || exit 99
         '{program}' run vehicle.toml --source dive.mcap --record disk/log.mcap --speed max --json > report.json 2> said.txt
@@ -121,7 +121,8 @@ fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)>
 fn recording_drops_echoes_on_a_nearly_full_disk_and_ends_on_a_full_disk() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
-    // The first disk is nearly full, with room for all small messages. The second one has room for a few seconds.
+    // The first disk becomes nearly full, but has room for all small messages. The second disk has room for only a few
+    // seconds of the dive.
     for (kilobytes, words) in [(20_000, "echo returns"), (80, "recording failed")] {
         let Some((code, report, said)) = on_a_disk_of(&folder, kilobytes) else {
             headrace_tests::skipped("unshare and mount are not allowed here");

@@ -1,5 +1,5 @@
-//! A dive that was interrupted is rebuilt from its log. Meanwhile, new packets are only recorded. The dive then gives
-//! the same results as a dive that was not interrupted, bit for bit.
+//! A dive that was interrupted is rebuilt from its log. While it is rebuilt, new packets are only recorded. Afterwards
+//! the dive gives the same results as a dive that was not interrupted, bit for bit.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -59,7 +59,7 @@ fn record_and_cut(scene: &Scene, packets: &[Packet], log: &Path) -> usize {
     readable
 }
 
-/// A loop whose ports haven't been taken.
+/// A loop whose ports are still in it.
 fn with_ports(scene: &Scene) -> Loop {
     let mut app = App::new(scene.vehicle.mission());
     for sensor in &scene.vehicle.sensors {
@@ -68,7 +68,7 @@ fn with_ports(scene: &Scene) -> Loop {
     app.arm(scene.vehicle.navigation()).unwrap()
 }
 
-/// An interrupted dive, with the expected results of the whole dive.
+/// A dive that was interrupted, with the expected results of the whole dive.
 struct Interrupted {
     scene: Scene,
     log: PathBuf,
@@ -99,8 +99,8 @@ impl Interrupted {
         Self { scene, log, before, after, expected, digest }
     }
 
-    /// Continues the dive. `held` packets arrive while the dive is rebuilt, and `waiting` packets are in the rings when
-    /// the dive goes on.
+    /// Continues the dive. `held` packets arrive while the dive is rebuilt. `waiting` packets are still in the rings
+    /// when the dive goes on.
     fn resume(&self, held: usize, waiting: usize, saved: &Path) -> (Loop, Rebuilt) {
         let unfinished = Unfinished::read(&self.log).unwrap().unwrap();
         assert_eq!(unfinished.files, std::slice::from_ref(&self.log));
@@ -136,7 +136,7 @@ impl Interrupted {
     #[track_caller]
     fn is_as_expected(&self, dive: &Loop, which: &str) {
         assert_eq!(dive.view().digest(), self.digest, "{which}");
-        // The beginning of a state has the number of ticks, which the interruption changes.
+        // The beginning of a state isn't compared. It contains the number of ticks, which the interruption changes.
         let state = dive.save().unwrap();
         let tail = self.expected.len().min(state.len()) - 64;
         assert_eq!(state.len(), self.expected.len(), "{which}");
@@ -179,7 +179,8 @@ fn saved_state_shortens_the_replay_only_if_it_fits_the_log() {
     assert_eq!(rebuilt.saved_packets, part as u64);
     dive.is_as_expected(&resumed, "a state that fits");
 
-    // States that don't fit: one packet differs, more packets than in the log, a damaged file, and another program.
+    // Saved states that don't fit the log: one with a different packet, one with more packets than the log, damaged
+    // ones, and one of another program.
     let mut other = dive.before[..part].to_vec();
     other[part / 2].bytes[0] ^= 1;
     let longer: Vec<Packet> = dive.before.iter().chain(&dive.after[..2300]).cloned().collect();

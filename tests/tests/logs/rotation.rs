@@ -69,7 +69,7 @@ fn dive_in_parts_replays_and_verifies_as_one() {
     assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
     assert_eq!(folder.digest("joined.mcap", &[]), whole["digest"].as_str().unwrap());
 
-    // One missing part is reported as a loss. If all parts but one are missing, each of them is reported.
+    // One missing part is reported as a loss. If all parts except one are missing, each missing part is reported.
     std::fs::remove_file(folder.path("parts/dive.part002.mcap")).unwrap();
     let (code, report) = folder.replay("parts", &[]);
     let losses = report["log"]["losses"].to_string();
@@ -85,8 +85,8 @@ fn dive_in_parts_replays_and_verifies_as_one() {
 #[test]
 fn live_report_lists_the_parts_of_the_recording() {
     let folder = Folder::with_dive();
-    // Devices may or may not exist at the vehicle file's addresses. In either case, the data is too little for a second
-    // log part.
+    // There may or may not be devices at the addresses in the vehicle file. In either case, they send too little data
+    // for a second part of the log.
     let arguments =
         ["run", "vehicle.toml", "--record", "live.mcap", "--rotate", "1GiB", "--for", "1", "--json"];
     let answer = folder.headrace(&arguments);
@@ -127,7 +127,7 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
         let name = format!("killed-{number}");
         std::fs::create_dir(folder.path(&name)).unwrap();
         let log = format!("{name}/dive.mcap");
-        // Each part covers a twentieth of a second of real time.
+        // Each part covers one second of the dive, which takes a twentieth of a second of real time.
         let mut dive = headrace_tests::program()
             .args(["run", "vehicle.toml", "--source", "dive.mcap", "--record", &log])
             .args(["--rotate", "1s", "--speed", "20x"])
@@ -146,12 +146,13 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
             assert!(early.iter().any(|words| answer.stderr.contains(words)), "{name}: {}", answer.stderr);
             continue;
         };
-        assert_eq!(report["differences"], Value::Array(Vec::new()), "{name}: {report}");
-        let lost = report["losses"].as_array().unwrap();
-        // After a kill, only the log part that was being written and a part that had just begun may have lost data.
-        assert!(lost.len() <= 2, "{name}: {report}");
-        assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {report}");
-        same += report["same_records"].as_u64().unwrap();
+        assert_eq!(told["differences"], Value::Array(Vec::new()), "{name}: {told}");
+        let lost = told["losses"].as_array().unwrap();
+        // After a kill, data may be lost from two parts of the log: the one that was being written, and one that had
+        // just begun.
+        assert!(lost.len() <= 2, "{name}: {told}");
+        assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {told}");
+        same += told["same_records"].as_u64().unwrap();
         assert!(Path::new(&folder.path(&name)).exists());
     }
     println!("{KILLS} kills, {parts} parts, {same} results the same");
@@ -163,7 +164,7 @@ fn part_named_twice_is_read_once() {
     let folder = Folder::with_dive();
     record(&folder, &["--record", "a.mcap", "--rotate", "5s"]);
     let digest = folder.digest("a.mcap", &[]);
-    // If writing a part fails, the first part may have the plain name of the recording.
+    // After a failed write, the first part may have the plain name of the recording.
     std::fs::rename(folder.path("a.part001.mcap"), folder.path("a.mcap")).unwrap();
     let mut names: Vec<String> = std::fs::read_dir(folder.path(""))
         .unwrap()

@@ -75,8 +75,8 @@ pub(crate) fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     }
 }
 
-/// Saves a dive at many moments. Another loop runs from each saved state to the next one and must reach the same
-/// state.
+/// Saves a dive at many moments. From each saved state, another loop runs to the next moment, and must reach the same
+/// state there.
 fn goes_on_from_anywhere(scene: &Scene) {
     let packets = packets(scene);
     let (mut whole, mut other) = (armed(&scene.vehicle), armed(&scene.vehicle));
@@ -112,7 +112,7 @@ pub(crate) const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\nd
 pub(crate) const EFFECTS: &str = "[effects]\nrange_noise = { sd_m = 0.02 }\nmissing_returns = { share = 0.1, mean_run = 5 }\n\
     pilot_drift = { across_m = 0.4, yaw_deg = 4 }\n";
 
-/// An inertial unit with a DBC file that defines its frames, as in the README of its crate.
+/// Keys of an inertial unit whose frames a DBC file defines, as in the README of its crate.
 const DBC: &str = "dbc = \"sbg_ellipse.dbc\"\naxes = \"frd\"\nsignals.rate = [\"GyroX\", \"GyroY\", \"GyroZ\"]\n\
     signals.force = [\"AccX\", \"AccY\", \"AccZ\"]\nsignals.quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"]\n\
     signals.rate_valid = { signal = \"ImuStatus\", mask = 0x2E1 }\nsignals.sample_time = \"ImuTime\"";

@@ -1,6 +1,6 @@
 //! Replays on several threads, and loops that share a navigation, give the same ticks as one thread, bit for bit.
 //!
-//! The ticks are the same whichever way the feed ends.
+//! The ticks are the same whether the feed ends normally, with an error or by a panic.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -105,7 +105,7 @@ fn of_tick(dive: &Loop) -> u64 {
     hasher.finish()
 }
 
-/// Result of a dive on some number of threads: hash of each tick, error at the end, report and final state.
+/// Result of a dive on some number of threads: each tick's hash, the error at the end, the report and the final state.
 #[derive(PartialEq)]
 struct Dived {
     ticks: Vec<u64>,
@@ -120,7 +120,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     let (mut ticks, tick) = (Vec::new(), DurNs::from_millis(tick_ms));
     let mut note = |dive: &Loop| ticks.push(of_tick(dive));
     let driven = match threads {
-        // Zero threads select the plain function `drive`, which is the reference for the tested `drive_on`.
+        // Zero threads mean the plain function `drive`, whose result is the reference for `drive_on`.
         0 => drive(&mut dive, &mut feed, Pace { tick, speed: None }, &mut note),
         threads => drive_on(threads, &mut dive, &mut feed, tick, &mut note),
     };
@@ -188,7 +188,7 @@ fn panicking_thread_gives_an_error_and_does_not_block_the_loop() {
             "{words}"
         );
     }
-    // A panic in the caller's function is passed on, and all threads end.
+    // If the caller's function panics, the panic is passed on and all threads end.
     let mut feed = Feed { packets, next: 0, end: End::Last };
     let mut dive = armed(&scene.vehicle, None);
     let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -197,7 +197,7 @@ fn panicking_thread_gives_an_error_and_does_not_block_the_loop() {
     assert!(caught.is_err());
 }
 
-/// An outlet that falls behind at times, so that the loop must hold packets back.
+/// An outlet that falls behind at times. The loop must then hold packets back.
 #[derive(Clone, Default)]
 struct Behind(Arc<AtomicU64>);
 

@@ -1,5 +1,5 @@
-//! Trimmed logs. Without a cut, they contain the same dive. With a cut, they keep the verdicts of the stretch that is
-//! left. Anonymous logs contain no names.
+//! Trimmed logs. If nothing is cut off, they contain the same dive. Otherwise they keep the verdicts of the stretch
+//! that is left. Anonymous logs contain no names.
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -17,7 +17,6 @@ distance_m = 24
 speed_mps = 0.2
 "#;
 
-/// Records a dive live.
 fn recorded(scene: &str, vehicle: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle);
@@ -86,7 +85,7 @@ fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
         assert!(answer.stdout.contains("this log is an extract"), "{}", answer.stdout);
     }
-    // The log states a cut at its start or end only if data was removed there.
+    // A trimmed log states a cut at its start or end only if data was removed there.
     for (name, further, said, unsaid) in [
         ("later.mcap", ["--from", "20s"], "earlier data was cut off", "later data was cut off"),
         ("earlier.mcap", ["--to", "20s"], "later data was cut off", "earlier data was cut off"),
@@ -103,7 +102,7 @@ fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
 
 #[test]
 fn trim_removes_echoes_and_keeps_ranges() {
-    // Heads that send their echo (252 bytes) with the range.
+    // The heads in this dive send their echo (252 bytes) with each range.
     let folder = recorded(headrace_tests::SCENE, VEHICLE);
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);

@@ -3,7 +3,6 @@
 use headrace_tests::{Folder, VEHICLE};
 use serde_json::Value;
 
-/// Records a dive live.
 fn recorded() -> Folder {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
@@ -35,8 +34,8 @@ fn verify_passes_at_any_tick_length() {
 #[test]
 fn verify_reports_a_tiny_mount_change_with_tick_sensor_field_and_bits() {
     let folder = recorded();
-    // The change of the mount moves a sample's position by about two units in the last place. `verify` names the
-    // sensor.
+    // The mount's angle of 1e-13 degrees moves a sample's position by about two units in the last place. `verify` names
+    // the sensor.
     let other = VEHICLE.replacen("mode = \"fastest\"", "mode = \"fastest\"\nangles_deg = [0, 0, 1e-13]", 1);
     folder.write("other.toml", other);
     let (code, report) = verified(&folder, &["live.mcap", "--vehicle", "other.toml"]);

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// A vehicle with two heads and all sensors for the position. Beam widths are small, because these scenes simulate
-/// beams as rays.
+/// The vehicle file of a vehicle with two heads and all sensors for the position. Its beam widths are small, because
+/// these scenes simulate beams as rays.
 fn vehicle(front: &str, aft: &str, zero_at_m: f64) -> String {
     let pings = [("left", "0, 90"), ("right", "0, -90"), ("up", "-90, 0"), ("down", "90, 0")];
     let pings = pings.map(|(id, angles)| {
@@ -53,7 +53,7 @@ zero_at_m = {zero_at_m}
     )
 }
 
-/// The vehicle file that headrace reads. The simulated vehicle may have other mounts.
+/// The vehicle file that headrace reads. The mounts of the simulated vehicle may differ from it.
 fn filed() -> String {
     vehicle("position_m = [0.1, 0, 0]", "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 180]", 0.0)
 }
@@ -182,8 +182,8 @@ fn calibrate_finds_only_the_late_head() {
     let answer = folder.headrace(&["calibrate", "dive.mcap", "--json"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let report: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // A head answers before its next ping, so its latency in the vehicle file must be below 32 ms. The latency found
-    // here is longer, so no line is proposed.
+    // A head answers before its next ping, so a latency of 32 ms or more isn't allowed in the vehicle file. The latency
+    // that is found here is longer, so no line is proposed.
     let untold = report["untold"].as_array().unwrap();
     let why = untold.iter().find(|row| row["of"] == "front" && row["what"] == "latency").unwrap()["why"]
         .as_str()
@@ -199,8 +199,8 @@ fn calibrate_finds_only_the_late_head() {
     assert_eq!(report["untold"][0]["of"], "water");
 }
 
-/// All walls seem too near or too far. No other setting may be changed to explain this. The speed of sound that
-/// explains it is reported, because either this setting or the wall is wrong.
+/// All walls seem too near or too far. No mount or other setting may be changed to explain this. The speed of sound
+/// that explains the ranges is reported, because either this setting or the wall's design is wrong.
 #[test]
 fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     for (share, says) in
@@ -218,7 +218,8 @@ fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     }
 }
 
-/// Without a stationary phase in the log, no mount and no zero is found. In a very short log, nothing is found.
+/// If the log has no stationary phase, no mount and no zero of the cable counter is found. In a very short log, nothing
+/// is found.
 #[test]
 fn calibrate_without_a_stationary_phase_says_so() {
     let folder = folder(false, &filed(), "");

@@ -1,4 +1,4 @@
-//! The filter compared with the truth of simulated dives, and with the navigation of the paper on the same data.
+//! The filter compared with the truth of simulated dives, and with the navigation of Jorge et al. on the same data.
 
 use headrace_fusion::direct::DirectNavigation;
 use headrace_fusion::filter::sources::Consistency;
@@ -21,7 +21,7 @@ fn mean_of(all: &[Figures], pick: Pick) -> f64 {
     rms(all.iter().map(pick))
 }
 
-/// Results of one simulated dive: with the filter, without the filter, and the errors of the reported holes.
+/// Results of one simulated dive: the tracks with and without the filter, and the errors of the reported holes.
 struct Dives {
     filter: Track,
     without: Figures,
@@ -57,8 +57,8 @@ fn file_bytes(name: &str) -> Result<Vec<u8>, String> {
 }
 
 /// Smallest allowed share of sections whose hole error is within two standard deviations if heads are far apart along
-/// the hull. The goal is 0.9. With a noisy unit, the walls correct the attitude only partly. Neighbouring passes then
-/// have less yaw error in common than the filter assumes.
+/// the hull. The goal is 0.9. It isn't reached because the walls correct the attitude of a noisy inertial unit only
+/// partly. Neighbouring passes then have less yaw error in common than the filter assumes.
 const LEAST_APART: f64 = 0.8;
 
 /// If heads are mounted far apart along the hull, they pass neighbouring lines on the wall at quite different times.
@@ -78,7 +78,7 @@ fn hole_errors_of_separately_mounted_heads_are_within_reported_bounds() {
         let scene = scenes::seeded(&text, &file_bytes, Some(seed));
         let ours = dive(&scene, filter(&scene), Silence::default());
         let errors = hole_errors(&ours, &tracking::true_dive(&scene));
-        // Sections at the ends of the dive are left out, because they have no neighbours on one side.
+        // Sections at the ends of the dive are left out, because they have no neighbouring sections on one side.
         all.extend(errors.iter().skip(12).rev().skip(12).copied());
     }
     holes_within_their_bounds(&all, LEAST_APART);
@@ -102,8 +102,8 @@ fn filter_is_accurate_and_consistent_in_field_dives() {
 /// Checks the filter's errors. Lateral and vertical errors are at most 5 cm, and the lateral error is at most a third
 /// of that without the filter.
 ///
-/// Averaged over the dives, the error of the displacement during a turn must be below 3 cm or 2 % of the distance T_x
-/// per turn, whichever is larger.
+/// Averaged over the dives, the error of the displacement during a turn must be below 3 cm, or below 2 % of the
+/// distance [`T_X_M`] per turn if that is larger.
 fn accuracy(all: &[Dives]) {
     let ours: Vec<Figures> = all.iter().map(|dives| figures(&dives.filter)).collect();
     let theirs: Vec<Figures> = all.iter().map(|dives| dives.without).collect();
@@ -131,14 +131,14 @@ fn accuracy(all: &[Dives]) {
 }
 
 /// Checks the NEES (normalised estimation error squared) of the pose. Its average over the dives must be within the 95
-/// % bounds in three of four epochs. Its mean over all epochs must be at most 6.9; the ideal is 6.
+/// % bounds in three of four epochs. Its mean over all epochs must be below 6.9. The ideal is 6.
 fn consistent_estimates(all: &[Dives]) {
     let epochs = all.iter().map(|dives| dives.filter.epochs.len()).min().unwrap();
     let runs = all.len() as f64;
     let means: Vec<f64> = (SETTLED..epochs)
         .map(|epoch| all.iter().map(|dives| nees(&dives.filter.epochs[epoch])).sum::<f64>() / runs)
         .collect();
-    // Wilson-Hilferty approximation: close to the chi-square bounds for this many degrees of freedom.
+    // Bounds of chi-square by the Wilson-Hilferty approximation, which is accurate for so many degrees of freedom.
     let freedom = runs * POSE.len() as f64;
     let bound = |z: f64| {
         let cube = 1.0 - 2.0 / (9.0 * freedom) + z * math::sqrt(2.0 / (9.0 * freedom));
@@ -151,15 +151,17 @@ fn consistent_estimates(all: &[Dives]) {
         bound(-1.96),
         bound(1.96)
     );
-    // The estimate is slightly overconfident, because the filter learns noise from the same data.
+    // The mean may exceed 6, because the filter learns noise from the same data and is therefore slightly
+    // overconfident.
     assert!(within > 0.75 && mean < 6.9, "{within}, {mean}");
 }
 
 /// Checks the NIS (normalised innovation squared) of each kind of sensor.
 ///
-/// The mean must be within 0.2 of one, because the filter learns the noise. The average over ten seconds and all dives
-/// must be within the 95 % bounds at least a third of the time. A sensor with less noise than assumed may be below the
-/// bounds. Such sensors are those whose rounding is treated as noise, and a compass without steel nearby.
+/// The mean must be within 0.2 of one, because the filter learns the noise. Only that of the cable counter may be
+/// lower. The average over ten seconds and all dives must be within the 95 % bounds at least a third of the time. A
+/// sensor with less noise than assumed may be below the bounds. This applies to sensors whose rounding is treated as
+/// noise, and to a compass without steel nearby.
 fn consistent_innovations(all: &[Dives]) {
     for (name, sources, both_sides) in [
         ("head", 0..1, true),
@@ -184,8 +186,8 @@ fn consistent_innovations(all: &[Dives]) {
         let (sum, count) = bins.iter().fold((0.0, 0), |(sum, n), (s, c)| (sum + s, n + c));
         let mean = sum / count as f64;
         println!("NIS of {name}: mean {mean:.3}, within bounds at {within:.2} of times");
-        // Several readings of a counter share one rounding error. So each reading gets less weight than it would get
-        // alone.
+        // Several readings of a counter share one rounding error. Each of these readings therefore gets less weight
+        // than a single reading would get.
         let least = if name == "tether" { 0.1 } else { 0.8 };
         assert!(within > 0.3 && (least..1.2).contains(&mean), "{name}: {mean} {z:.1?}");
     }
@@ -207,8 +209,8 @@ fn add_to_bins(bins: &mut [(f64, u64)], track: &Track, source: usize) {
     }
 }
 
-/// Checks that the hole diameter D is within two standard deviations of its true value in a share of `least` to 0.99 of
-/// the sections. The true value is D with the same returns at their true places.
+/// Checks that the hole diameter D is within two standard deviations of its true value in enough sections: their share
+/// is from `least` to 0.99. The true value is D with the same returns at their true places.
 fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
     let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
@@ -221,9 +223,9 @@ fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
 
 /// Simulates a dive with silent sensors.
 ///
-/// Returns three results. The first one tells for each error of each epoch whether it is within three standard
-/// deviations. The others are the largest ratio of an error to its standard deviation, and the fraction of pings
-/// without a fix.
+/// Returns three results. The first tells for each error of each epoch whether it is within three standard deviations.
+/// The second is the largest ratio of an error to its standard deviation. The third is the fraction of pings without a
+/// fix.
 fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     let scene = field(seed, 40.0);
     let track = dive(&scene, filter(&scene), silence);
@@ -234,8 +236,8 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
 }
 
-/// Each sensor is silent for a while in some dives, and until the end in another dive. The errors must stay within
-/// their reported bounds.
+/// In some dives a sensor is silent for a while, and in another one until the end. The errors must stay within their
+/// reported bounds.
 #[test]
 fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
     for (name, sources) in [
@@ -249,8 +251,8 @@ fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
         ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
     ] {
         for to_s in [70.0, 120.0, f64::INFINITY] {
-            // In some dives, the motion guessed during the silence biases the learnt range noise. The bias becomes
-            // visible when the unit returns.
+            // While the inertial unit is silent, the filter must guess the motion. In some dives this biases the range
+            // noise that it learns, which becomes visible when the unit returns. Several seeds are therefore tried.
             let seeds = if name == "the inertial unit" && to_s.is_finite() { 1..=6 } else { 3..=3 };
             let dives: Vec<_> = seeds
                 .map(|seed| silenced(seed, Silence { sources: sources.clone(), from_s: 60.0, to_s }))
@@ -261,8 +263,8 @@ fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
             println!(
                 "{name} from 60 to {to_s} s: within 3 sigma {within:.4}, worst {worst:.1}, no fix {lost:.2}"
             );
-            // About 0.3 % of normally distributed errors exceed three standard deviations. In a sample of this size
-            // none exceeds them by much.
+            // About 0.3 % of normally distributed errors exceed three standard deviations. In a sample of this size,
+            // none is much larger than that.
             assert!(within > 0.997 && worst < 5.0, "{name} to {to_s}: {within}, {worst}");
             let is_needed = sources.contains(&7) && !sources.contains(&6) && to_s > 100.0;
             assert_eq!(

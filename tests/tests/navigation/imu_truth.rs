@@ -1,8 +1,8 @@
 //! Validation: attitude from gyros and accelerometers alone, compared with optical motion capture.
 //!
-//! The filters of Madgwick and Mahony (crate `ahrs`) run on the same samples. The recording is trial 12 of BROAD:
-//! slow hand motion within about a metre (`recordings/imu_broad`). The trimmed copy has the first 105 s. If
-//! `HEADRACE_RECORDINGS` is set, all 196 s are used, too. With `--nocapture` the test prints the inclination error
+//! The filters of Madgwick and Mahony (crate `ahrs`) run on the same samples. The recording is trial 12 of BROAD: slow
+//! hand motion within about a metre (`recordings/imu_broad`). The copy in this repository has the first 105 s. If
+//! `HEADRACE_RECORDINGS` is set, all 196 s are also used. With `--nocapture` the test prints the inclination error
 //! while the unit moves and the heading drift over the recording, in degrees.
 
 use std::fs::File;
@@ -32,15 +32,15 @@ const SAMPLE_S: f64 = 0.0105;
 const EPOCH: usize = 10;
 /// Number of inertial samples per second in the recording.
 const SECOND: usize = 95;
-/// Usual speed of a hand, m/s. It is the prior for the velocity, which nothing measures.
+/// Usual speed of a hand, m/s. The filter expects velocities of this size, because no sensor measures the velocity.
 const HAND_MPS: f64 = 0.5;
-/// A unit is stationary if its rate varies by no more than this within a second, and its force by no more than
-/// `STILL_MPS2`. Both values are a few times the noise.
+/// The inertial unit counts as stationary if its turn rate varies by no more than this within a second, and its force
+/// by no more than `STILL_MPS2`. Both values are a few times the noise.
 const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;
 
-/// An inertial sample in the axes of the body. The tunnel's axes stand for east, north and up.
+/// An inertial sample in the axes of the body. In this test, the tunnel's axes stand for east, north and up.
 #[derive(Clone, Copy)]
 struct Sample {
     rate_radps: Vec3<Body>,
@@ -132,10 +132,10 @@ struct Alone {
 }
 
 impl Alone {
-    /// Creates the navigation with the usual settings for a unit with a noise of 0.011 deg/s and 0.0045 m/s^2 per
-    /// root hertz.
+    /// Creates the navigation with the usual settings. The noise of the unit is 0.011 deg/s and 0.0045 m/s^2 per root
+    /// hertz.
     ///
-    /// These figures come from stationary samples. The settings aren't tuned to this recording.
+    /// These two figures come from samples of the stationary unit. The settings aren't tuned to this recording.
     fn new(attitude: Rot<Tunnel, Body>) -> Self {
         let settings = Settings::default();
         let mut sds = [1e-3; ERRORS];
@@ -179,8 +179,8 @@ impl Alone {
         leg.disturb(&self.settings, &transition, &mut self.factors);
     }
 
-    /// Constrains the velocity once a second: to the speed of a hand, or to zero if the unit is stationary. A
-    /// stationary unit also shows its gyro biases.
+    /// Constrains the velocity once a second. It is constrained to zero if the unit is stationary, and else to the
+    /// speed of a hand. A stationary unit also shows its gyro biases.
     fn end_second(&mut self) {
         let rates = self.second.iter().map(|sample| sample.rate_radps);
         let forces = self.second.iter().map(|sample| sample.force_mps2);
@@ -271,7 +271,7 @@ fn say(name: &str, off: &Off) {
     println!("{name:<60} {:>6.3} {:>7.3} {:>8.2}", off.inclination_rms, off.inclination_max, off.drift);
 }
 
-/// The same samples without the gyro bias. The bias is the mean rate during the rest before the motion.
+/// The samples without the gyro bias. The bias is the mean turn rate while the unit rests before the motion.
 fn unbiased(samples: &[Sample]) -> Vec<Sample> {
     let rest = samples.iter().take_while(|sample| !sample.moving);
     let bias = mean(rest.map(|sample| sample.rate_radps));
@@ -299,7 +299,7 @@ fn no_worse_than_published_filters(samples: &[Sample]) {
         assert!(ours.inclination_rms <= off.inclination_rms, "{name}: {off:?}; ours {ours:?}");
         assert!(ours.drift.abs() <= off.drift.abs(), "{name}: {off:?}; ours {ours:?}");
     }
-    // Without gyro bias, the published filters come as close only if their gains are tuned to this recording.
+    // Even without gyro bias, the published filters are as accurate only if their gains are tuned to this recording.
     let unbiased = unbiased(samples);
     for (name, off) in usual_peers(&unbiased) {
         say(&format!("{name}, bias removed"), &off);

@@ -1,4 +1,4 @@
-//! A vehicle with a velocity log, and with an autopilot that has the inertial unit, the pressure sensor and the
+//! A vehicle with a velocity log and an autopilot. The autopilot has the inertial unit, the pressure sensor and the
 //! distance sensors.
 //!
 //! The crates of these devices are used unchanged. The tests cover all steps from the simulator's bytes to the
@@ -44,14 +44,13 @@ fn autopilot_sensors_and_a_velocity_log_are_fused() {
             assert_eq!(source[nothing], 0, "{id}: {source}");
         }
     }
-    // Devices without noise agree if axes, lever arm and delay are right. With one axis reversed, the NIS (normalised
-    // innovation squared) would be
-    // 0.08.
+    // Devices without noise agree if axes, lever arm and delay are right. If one axis were reversed, the NIS
+    // (normalised innovation squared) would be 0.08.
     let dvl = &source(&report, "dvl")["navigation"];
     println!("velocity log: {dvl}");
     assert_eq!(dvl["gated"], 0, "{dvl}");
-    // The first reading arrives 100 ms after its ping, so the ping precedes the filter's start. There are two
-    // readings a second, with three components each.
+    // The first reading arrives 100 ms after its ping. Its ping may therefore be before the filter's start, which makes
+    // the reading late. There are two readings a second, with three components each.
     assert!(dvl["late"].as_u64().unwrap() <= 1 && dvl["used"].as_u64().unwrap() > 220, "{dvl}");
     assert!(dvl["nis"].as_f64().unwrap() < 0.001, "{dvl}");
     let dive = &report["dive"];

@@ -9,11 +9,12 @@ use serde_json::Value;
 
 const LEG: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.197\n";
 
-/// Replays a four-head dive of 12 m without the data of `source` between two times, seconds on the source's clock. An
-/// empty name means all sources.
+/// Replays a dive of 12 m with four heads, without the data that `source` sends between two times. The times are
+/// seconds on the clock of the source. An empty name means all sources.
 fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
-    // The simulated heads have no bodies that could hide the wall. So the paper's speed meets the target.
+    // The simulated heads have no bodies that could hide the wall. The speed by the formula of Jorge et al. therefore
+    // meets the target.
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197")
         .replace("[navigation]", &format!("[navigation]\nway = \"{way}\""));
@@ -60,8 +61,8 @@ fn short_tether_silence_is_bridged() {
     }
 }
 
-/// The dive is interrupted for half a minute, in which the vehicle drives on. Wall that no head
-/// saw does not pass. The stretch before is judged as usual.
+/// The dive is interrupted for half a minute, in which the vehicle drives on. Wall that no head sampled does not pass.
+/// The stretch before the interruption is judged as usual.
 #[test]
 fn wall_unseen_during_an_interruption_does_not_pass() {
     for way in ["direct", "filter"] {

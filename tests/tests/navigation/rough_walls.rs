@@ -1,7 +1,7 @@
 //! Walls that deviate from the design.
 //!
-//! A stationary vehicle sees the same bumps in every turn, which must not make its heading more certain. A fallen
-//! vault must not bias the estimate.
+//! A stationary vehicle sees the same bumps in every turn of its heads. This must not make its heading more certain. A
+//! fallen vault must not bias the estimate.
 
 use headrace_fusion::filter::state::{ATTITUDE, POSITION};
 use headrace_geometry::math;
@@ -52,8 +52,8 @@ fn stationary_vehicle_at_a_rough_wall_keeps_a_consistent_heading_sd() {
     assert!(ratio < 1.0 && largest_sd_rad.to_degrees() < 0.8, "{ratio}, {largest_sd_rad}");
 }
 
-/// The edge of the fallen vault is a slope of some centimetres, which looks like a change of height. With these seeds,
-/// an earlier filter followed the slope.
+/// The edge of the fallen vault is a slope of some centimetres, which looks like a change of height. The seeds are
+/// chosen because an earlier version of the filter followed the slope.
 #[test]
 fn fallen_vault_does_not_bias_the_estimate() {
     let text = include_str!("../../../deploy/scenes/collapse.toml").replace("../vehicles/", "");

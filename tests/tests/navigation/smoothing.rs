@@ -17,7 +17,7 @@ use headrace_tests::tracking::{self, Epoch, Silence, Track, dive, filter};
 use headrace_vehicle::NavigationConfig;
 
 const SEEDS: u64 = 3;
-/// Capacity of the journal of filter steps, enough for a dive of ten minutes.
+/// Capacity of the journal of filter steps. It is enough for a dive of ten minutes.
 const STEPS: usize = 1 << 13;
 
 struct Smoothed {
@@ -55,11 +55,11 @@ fn smoothed(scene: &Scene, silence: &Silence) -> Smoothed {
 
 type Pick = fn(&Figures) -> f64;
 
-/// Allowed ratio of the smoothed error along the tunnel to the error of the filter. The error is due to cable slack,
+/// Allowed ratio of the smoother's error along the tunnel to the filter's error. Both errors are due to cable slack,
 /// which no other sensor observes.
 ///
-/// In the scene, slack follows a spline without components faster than its period. This differs from the filter's model
-/// of slack, so smoothing need not reduce the error.
+/// In the scene, slack follows a spline without components faster than its period. The filter's model of slack is
+/// different, so smoothing need not reduce the error.
 const SLACK: f64 = 1.25;
 
 struct Dives {
@@ -71,9 +71,9 @@ struct Dives {
 
 /// Dives with a configured slack time of 8 s. The model then assumes that a quarter of the slack remains after a turn.
 ///
-/// A smoother depends more on its model than a filter does. The filter also works with a slack time of 15 s, so that
-/// more than half of the slack remains. But with the smoother, the hole diameter D is then within two standard
-/// deviations in only 88.9 % of the sections.
+/// A smoother depends more on its model than a filter does. The filter also works with a slack time of 15 s, although
+/// its model then assumes that more than half of the slack remains. With the smoother, however, the hole diameter D is
+/// then within two standard deviations in only 88.9 % of the sections.
 fn dives(seed: u64) -> Dives {
     let scene = field_with(seed, 65.0, &SETTINGS.replace("slack_time_s = 15", "slack_time_s = 8"), "");
     let smoothed = smoothed(&scene, &Silence::default());
@@ -104,7 +104,7 @@ fn smoothing_reduces_errors_and_stays_consistent() {
     let by_filter: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.filter)).collect();
     let smoothed: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.dive)).collect();
     println!("| rms over {SEEDS} dives | filter | smoothed |\n|---|---|---|");
-    // The last number of a row is the largest allowed ratio of the smoother's error to the filter's error.
+    // The number in each row is the largest allowed ratio of the smoother's error to the filter's error.
     let rows: [(&str, Pick, f64); 8] = [
         ("across, m", |f| f.across_m, 0.5),
         ("up, m", |f| f.up_m, 0.5),
@@ -139,13 +139,12 @@ fn smoothing_reduces_errors_and_stays_consistent() {
             "D of {} sections, {name}: error {error_m:.4} m, sigma {arc_m:.4} m, within two: {within:.3}",
             holes.len()
         );
-        // The configured slack time is shorter than the true one, so the standard deviations are larger than
-        // necessary.
+        // The configured slack time is shorter than the true one, so reported standard deviations are too large.
         assert!((0.9..=0.998).contains(&within), "{name}: {within}");
     }
 }
 
-/// The shipped vehicle file assumes large errors. With these settings, smoothing loses no fix of the filter, and
+/// The shipped vehicle file assumes large errors. With its settings, smoothing loses no fix that the filter has, and
 /// increases no error.
 #[test]
 fn smoothing_increases_no_error_of_the_shipped_vehicle() {
@@ -159,7 +158,7 @@ fn smoothing_increases_no_error_of_the_shipped_vehicle() {
     }
 }
 
-/// Root mean square of an error between two times, and the largest ratio of the error to its standard deviation.
+/// Root mean square of one component of the error between two times, and its largest ratio to its standard deviation.
 fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64) {
     let inside = epochs.iter().filter(|epoch| {
         let at_s = epoch.at.since(START).as_secs_f64();
@@ -175,8 +174,8 @@ fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64)
 fn smoothing_bridges_a_silence_with_readings_from_before_and_after() {
     let scene = field(3, 33.0);
     let from_s = 80.0;
-    // The silence of all sonars is short. Without walls, the filter drops its estimate after half a minute, and then
-    // the readings after the silence couldn't help.
+    // The sonars are silent only briefly. Without ranges to the walls, the filter drops its estimate after half a
+    // minute, and then the readings after the silence are of no help.
     for (name, sources, errors, to_s) in [
         ("the tether", vec![7], vec![0], from_s + 60.0),
         ("all sonars", vec![0, 1, 2, 3, 4], vec![1, 2], from_s + 10.0),
@@ -199,7 +198,8 @@ fn smoothing_bridges_a_silence_with_readings_from_before_and_after() {
     }
 }
 
-/// Verdicts depend on the displacement during a turn. Here the configured cable is taut.
+/// Verdicts depend on the displacement during a turn of a head. In this test, the vehicle file says that the cable is
+/// taut.
 #[test]
 fn smoothed_displacements_are_accurate_on_a_taut_cable() {
     let settings = SETTINGS.replace("slack_sd_m = 0.085", "slack_sd_m = 0.001");

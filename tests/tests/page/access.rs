@@ -82,7 +82,7 @@ fn invalid_messages_are_refused_and_the_page_goes_on() {
     closes(Message::Text("[1,2]".into()));
     closes(Message::Binary(vec![1, 2, 3].into()));
     closes(Message::Text(format!("{{\"do\":\"{}\"}}", "x".repeat(5000)).into()));
-    // Valid messages, but too many per second.
+    // This viewer sends valid messages, but too many per second.
     let mut flood = Viewer::connect(&serving, "", &[]).unwrap();
     flood.until_type("ready");
     let mut sent = 0;

@@ -1,4 +1,5 @@
-//! Crowds of other clients, drawn from seeds, neither delay an operator nor change a live dive or its recording.
+//! Crowds of other clients are drawn from seeds. They neither delay an operator, nor change a live dive or its
+//! recording.
 //!
 //! The page's server needs real sockets and time, so the simulated world of `tests/tests/world.rs` has no crowds.
 
@@ -33,7 +34,7 @@ enum Client {
     Silent,
     /// Sends half of a request's head.
     HalfSent,
-    /// Reads the lines of the feed slowly.
+    /// Requests the lines of the feed and reads them slowly.
     SlowReader,
     /// Requests the lines of the feed and reads nothing.
     UnreadLines,
@@ -60,7 +61,7 @@ fn drawn(seed: u64) -> Vec<Group> {
 }
 
 impl Group {
-    /// Returns the bytes that a client sends, with this URL query.
+    /// Returns the bytes that a client of this group sends. `query` is the URL query of its request.
     fn request(self, query: &str) -> String {
         match self.client {
             Client::Silent => String::new(),
@@ -75,14 +76,14 @@ impl Group {
         }
     }
 
-    /// Keeps the group's connections open until the dive has ended; replaces the oldest one in each turn.
+    /// Keeps the group's connections open until the dive has ended. In each turn, the oldest connection is replaced.
     fn stay(self, address: &str, query: &str, has_ended: &AtomicBool) {
         let mut open = std::collections::VecDeque::new();
         while !has_ended.load(Ordering::SeqCst) {
             while open.len() < self.members
                 && let Ok(mut stream) = TcpStream::connect(address)
             {
-                // The server may close the connection at once for a newer one.
+                // Sending may fail, because the server may close this connection at once in favour of a newer one.
                 let _closed = stream.write_all(self.request(query).as_bytes());
                 stream.set_nonblocking(true).unwrap();
                 open.push_back(stream);
@@ -108,7 +109,7 @@ struct Among {
     code: Option<i32>,
 }
 
-/// Runs a live dive with its page among a crowd. The crowd's clients show a token by this URL query.
+/// Runs a live dive with its page among a crowd. The clients use the URL query `query`, which may have a token.
 fn dive_among(folder: &Folder, crowd: &[Group], query: &str) -> Among {
     drop(std::fs::remove_file(folder.path("live.mcap")));
     let arguments = ["run", "vehicle.toml", "--source", "dive.mcap", "--record", "live.mcap"];

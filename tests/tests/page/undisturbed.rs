@@ -44,7 +44,7 @@ fn stalled_viewer_is_dropped_while_others_are_served() {
         line.unwrap().parse::<u64>().unwrap()
     };
     // After each seek, the server sends the whole dive again. This fills the socket buffer of the stalled viewer. Ten
-    // seconds later, the viewer is dropped.
+    // seconds after that, the server drops the viewer.
     let to_s = viewer.state["playback"]["to_s"].as_f64().unwrap();
     for jump in 0..600 {
         let to_s = to_s - f64::from(jump % 2) * 2.0;

@@ -1,4 +1,5 @@
-//! Voice notes. The loop keeps the note, and the log keeps its sound recording. Each works without the other.
+//! Voice notes. The loop keeps the note, and the log keeps the note's sound recording. The note works without the
+//! recording, and the recording without the note.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -16,8 +17,8 @@ const OPERATOR: &str = "Authorization: Bearer operator-0123456789abcdef";
 const WEBM: &str = "Content-Type: audio/webm;codecs=opus";
 const LOG: &str = "headrace-demo/dive.mcap";
 
-/// Returns a sound recording with all properties of a browser's recording that are checked. Its content is random, so
-/// it can't be compressed.
+/// Returns a sound recording. Like a browser's recording, it has all the properties that the program checks. Its
+/// content is random, so it can't be compressed.
 fn webm(seed: u64, bytes: usize) -> Vec<u8> {
     let mut random = Random(seed);
     let noise = (4..bytes).map(|_| random.byte());
@@ -54,7 +55,7 @@ fn interrupt(serving: Serving, viewer: &mut Viewer) -> Value {
     end
 }
 
-/// Voice recordings in a log: id of the note, and the bytes after the header.
+/// Voice recordings in logs, each with the id of its note and the bytes after its header.
 fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     let files: Vec<_> = logs.iter().map(|log| folder.path(log)).collect();
     let mut log = DiveLog::open(&files).unwrap();
@@ -69,7 +70,7 @@ fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     found
 }
 
-/// Whether a message of a log contains these bytes after decompression.
+/// Whether any message of a log contains the text `words` after decompression.
 fn mentions(folder: &Folder, log: &str, words: &str) -> bool {
     let mut log = DiveLog::open(&[folder.path(log)]).unwrap();
     let mut is_found = false;
@@ -322,7 +323,7 @@ fn voice_note_is_in_the_log_part_of_its_time() {
     speak(7, &audio[0]);
     // No device is connected, so the dive records nothing but operator commands.
     while !folder.path("parts/dive.part002.mcap").exists() {
-        // The test sends commands as fast as the page allows an operator to send them.
+        // The commands make the log grow. They are sent as fast as the page allows an operator to send them.
         let (status, answer) = serving.ask("POST", "/actions/silence", &[], "{}");
         assert!([200, 429].contains(&status), "{answer}");
     }

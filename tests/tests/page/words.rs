@@ -1,4 +1,4 @@
-//! The page's table of words equals the program's table, and has every code of the live state.
+//! The page's table of displayed words equals the program's table, and has words for every code of the live state.
 
 use headrace_monitor::page_words::table;
 use headrace_tests::root;

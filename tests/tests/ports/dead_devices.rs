@@ -1,4 +1,4 @@
-//! Tests the screen after all devices have died during a dive. The displayed age grows although no data arrives.
+//! Tests the screen after all devices have died during a dive. The displayed age of the data grows.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::Stdio;
@@ -33,7 +33,7 @@ fn screen_shows_growing_age_after_all_devices_die() {
     assert!(of_old.iter().all(|status| status.starts_with("\x1b[1;31m")), "in red: {of_old:#?}");
     let last = written.split("\r\x1b[K").last().unwrap();
     assert!(!last.contains("ok up to"), "{last}");
-    // A single word, such as the path of a serial port, can't be broken.
+    // A line of a single long word, such as the path of a serial port, is allowed, because it can't be broken.
     let is_wide = |line: &String| line.chars().count() >= 60 && line.trim().contains(' ');
     let wide: Vec<_> = shown_lines(&written).into_iter().filter(is_wide).collect();
     assert!(wide.is_empty(), "{wide:#?}");

@@ -42,7 +42,7 @@ fn emulator(keys: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head: None, site: Site::default(), polled: false })
 }
 
-/// An emulated device on a port. It runs until this value is dropped.
+/// An emulated device on a port. The device runs until this value is dropped.
 struct Device {
     connect: Connect,
     stopping: Arc<AtomicBool>,
@@ -105,7 +105,7 @@ fn asked(device: &Device) -> Answer {
     probe(&device.connect, &mut probes()).unwrap()
 }
 
-/// Identity that a device states when probed. The probe is repeated if the machine is too busy for an answer in time.
+/// Identity that a device states when probed. If the machine is too busy to answer in time, the probe is repeated.
 fn identity(device: &Device) -> Option<String> {
     (0..TRIES).find_map(|_| match asked(device) {
         Answer::Is(identity) => Some(identity),

@@ -12,7 +12,7 @@ use headrace_tests::garbling::{EachFrame, Garbled, flipped, of_head, of_ping, th
 use headrace_tests::random::Random;
 use headrace_tests::rig::{COUNTER, DEPTH, HEAD, PING, Rig, Sensor};
 
-/// A sensor on a line without faults, which other sensors' faults must not disturb.
+/// A sensor on a line without faults. The faults of other sensors must not disturb it.
 fn healthy() -> Sensor {
     Sensor { text: COUNTER, end: End::udp(), fault: Box::new(Healthy) }
 }
@@ -21,7 +21,7 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// Beginnings of statuses that a sensor without faults has only because the machine is busy. The tests ignore these
+/// On a busy machine, a sensor without faults may have statuses that begin with these texts. The tests ignore such
 /// statuses.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
@@ -33,7 +33,8 @@ const OF_A_BUSY_MACHINE: [&str; 3] = [
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {
-        // Reading from an unplugged port and writing to it give different messages, and either one may come first.
+        // An unplugged port gives different messages when it is read and when it is written, and either message may
+        // come first.
         let status = status.replace("the port is gone", "Broken pipe");
         let is_news = status != "running" && !OF_A_BUSY_MACHINE.iter().any(|begin| status.starts_with(begin));
         if is_news && !all.contains(&status) {
@@ -178,8 +179,8 @@ fn lost_bytes_lose_only_their_own_frames() {
     garbled(thinned);
 }
 
-/// A line that inserts garbage between frames. The garbage ends with the header of a longer frame, whose bytes never
-/// come.
+/// A line that inserts garbage between frames. The garbage ends with the header of a longer frame, but the rest of that
+/// frame never comes.
 fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     let mut random = Random(seed);
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
@@ -196,8 +197,7 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // The frame headers in the garbage announce an echosounder profile of 1200 strengths and a head's return of 500
-    // points.
+    // The garbage announces long frames: an echosounder profile of 1200 strengths, and a head's return of 500 points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -216,8 +216,8 @@ fn bursts_of_garbage_lose_no_frame() {
     ended.untroubled(2);
 }
 
-/// A device that stalls in the middle of every third frame. The stall is shorter than the usual pause between frames,
-/// or longer than it, or lasts for ever.
+/// A device that stalls in the middle of every third frame. Some stalls are shorter than the usual pause between
+/// frames, some are longer, and some last for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -413,8 +413,8 @@ impl Fault for DeafAtFirst {
     }
 }
 
-/// The drivers of both devices share the line. While one of them waits for an answer that never arrives, the other one
-/// sends nothing.
+/// The drivers of both devices share the line. While one driver waits for an answer that never arrives, the other
+/// driver sends nothing.
 #[test]
 fn two_devices_on_one_line_start_although_first_answers_are_lost() {
     let end = End::tcp();

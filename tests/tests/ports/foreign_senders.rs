@@ -1,5 +1,5 @@
-//! `headrace run` with foreign senders: open ports, other MAVLink systems, two sensors on one device, and logs of
-//! older firmware.
+//! `headrace run` with foreign senders of data: ports that anybody can send to, other MAVLink systems, two sensors on
+//! one device, and a serial port that another program has locked.
 
 use std::net::UdpSocket;
 use std::os::unix::fs::symlink;
@@ -44,8 +44,8 @@ fn report(folder: &Folder) -> Value {
 
 /// Runs a dive on a local port with a device and a foreign sender.
 ///
-/// The first frames come from another system. The device sends after the host has sent to it. Returns the report and
-/// the number of recorded pressures.
+/// The first frames come from a foreign system. The right device sends only after the host has sent to it. Returns the
+/// report and the number of recorded pressures.
 fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     let folder = Folder::new();
     let place = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();

@@ -1,8 +1,8 @@
 //! Linux's own behaviour on which the drivers rely: CAN interfaces that go down, and counters that are unplugged.
 //!
-//! CAN interfaces and `/dev/uhid` need root and modules. So these tests are ignored by default and run on the kernel
-//! of a virtual machine: `tests/vm/run -- PROGRAM kernel_can_hid:: --ignored --test-threads=1`, where PROGRAM is the
-//! built `ports` test. `.ci/run` does so.
+//! CAN interfaces and `/dev/uhid` need root and modules. These tests are therefore ignored by default, and run on the
+//! kernel of a virtual machine: `tests/vm/run -- PROGRAM kernel_can_hid:: --ignored --test-threads=1`, where PROGRAM is
+//! the built `ports` test. `.ci/run` does so.
 
 use std::fs::File;
 use std::io::ErrorKind;
@@ -17,7 +17,7 @@ use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, Stand
 
 /// Longest time that a test waits for expected data.
 const LONG: Duration = Duration::from_secs(10);
-/// Time to wait for data that must not arrive.
+/// Time for which a test waits for data that must not arrive.
 const SHORT: Duration = Duration::from_millis(100);
 
 const ENODEV: i32 = 19;
@@ -26,7 +26,7 @@ const ENETDOWN: i32 = 100;
 const VENDOR_ID: u16 = 0x1209;
 const PRODUCT_ID: u16 = 0x0001;
 
-/// Runs `ip link` with these words, which are separated by spaces.
+/// Runs `ip link` with the arguments in `words`, which are separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
@@ -59,7 +59,7 @@ fn frame(first: u8) -> CanFrame {
     CanFrame::new(StandardId::new(0x123).unwrap(), &[first, 2, 3]).unwrap()
 }
 
-/// Error number and kind of a read that must not return a frame.
+/// Error number and kind that a read returns, which must not return a frame.
 fn refused(read: std::io::Result<CanFrame>) -> (Option<i32>, ErrorKind) {
     let error = read.unwrap_err();
     println!("CAN: {error:?}");
@@ -82,12 +82,12 @@ fn frame_carries_the_kernel_receive_time() {
     let (sender, stamped, plain) = (vcan.socket(), vcan.socket(), vcan.socket());
     stamped.set_recv_timestamp(true).unwrap();
 
-    // Whether a frame's timestamp is earlier than the time of reading it. The kernel begins to stamp frames only a
-    // moment after stamping is enabled. Until then, frames get the time of reading.
+    // Sends a frame, and tells whether its timestamp is earlier than the time of reading it. The kernel begins to stamp
+    // frames only a moment after stamping is enabled. Until then, a frame's timestamp is the time of reading.
     let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();
-        // Once one socket has received the frame, the kernel has also received it for the other socket.
+        // Once the other socket has received the frame, the kernel has also received it for the tested socket.
         assert_eq!(plain.read_frame().unwrap().data(), [number, 2, 3]);
         let received_by = SystemTime::now();
         thread::sleep(Duration::from_millis(5));
@@ -168,7 +168,7 @@ fn report(count: i32) -> Vec<u8> {
     report
 }
 
-/// The counter with this serial number in the kernel's current list.
+/// The counter with this serial number, as the kernel lists it at present.
 fn listed(api: &mut HidApi, serial: &str) -> Option<DeviceInfo> {
     api.refresh_devices().unwrap();
     let ours = |device: &&DeviceInfo| (device.vendor_id(), device.product_id()) == (VENDOR_ID, PRODUCT_ID);
@@ -256,7 +256,7 @@ fn unplugged_counter_may_return_under_another_device_number() {
     println!("HID: opening an absent device: {missing:?}");
     drop(reader);
 
-    // Before the counter is plugged in again, another counter takes its device number.
+    // Another counter is plugged in first, and takes the device number that the unplugged counter had.
     let _other = plug(uhid(), "HR-0005");
     let (_other_reader, other_path) = open(&mut api, "HR-0005");
     assert_eq!(other_path, first_path);

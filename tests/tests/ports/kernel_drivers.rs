@@ -1,8 +1,8 @@
 //! The CAN and HID drivers on a real kernel, with emulated devices.
 //!
-//! All sent data is decoded. If an interface or counter disappears, the other sensor goes on. A returning interface or
-//! counter is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
-//! --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
+//! All sent data is decoded. If the CAN interface or the counter disappears, the other sensor goes on. When it returns,
+//! it is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run --with
+//! target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -31,9 +31,9 @@ const TETHER: usize = 1;
 
 /// Longest time that a test waits for expected data.
 const LONG: DurNs = DurNs::from_millis(20_000);
-/// A line that is silent for this time has no more data.
+/// If a line is silent for this time, no more data is expected on it.
 const SETTLED: DurNs = DurNs::from_millis(200);
-/// Number of messages sent at once. It is smaller than the number of reports that the kernel buffers for a counter.
+/// Number of messages sent at once. The kernel buffers more reports than this for a counter.
 const BURST: usize = 20;
 
 const COUNTER: &str = "hid:1209:0001:HR-0001";
@@ -63,7 +63,7 @@ counts_per_metre = 2000
 const WAY: &str =
     "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 20\nspeed_mps = 0.2\n";
 
-/// Runs `ip link` with these words, which are separated by spaces.
+/// Runs `ip link` with the arguments in `words`, which are separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
@@ -114,7 +114,8 @@ struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// Starts supervisor and loop with these addresses of the sensors. `change` may wrap the driver of each sensor.
+    /// Starts supervisor and loop. `connects` are the addresses of the two sensors. `change` may wrap the driver of
+    /// each sensor.
     fn new(connects: [&str; 2], change: &dyn Fn(usize, Box<dyn Driver>) -> Box<dyn Driver>) -> Self {
         let scene = scenes::scene_from(WAY, &|_| Ok(TWO_SENSORS.as_bytes().to_vec()));
         let vehicle = &scene.vehicle;
@@ -204,7 +205,7 @@ impl Rehearsal {
         }
     }
 
-    /// Sends messages to a sensor's driver until one arrives. Messages sent before the line is open are lost.
+    /// Sends messages to a sensor's driver until the loop gets one. Messages sent before the line is open are lost.
     #[track_caller]
     fn call(&mut self, source: usize, stand: &mut EmulatedPort) {
         let before = self.settle(source);
@@ -216,14 +217,14 @@ impl Rehearsal {
         }
     }
 
-    /// Sends `count` messages and checks that all of them, and nothing else, are decoded.
+    /// Sends `count` messages and checks that the program decodes all of them and nothing else.
     #[track_caller]
     fn exactly(&mut self, source: usize, stand: &mut EmulatedPort, count: usize) {
         let before = self.settle(source);
         self.exactly_after(before, source, stand, count);
     }
 
-    /// As [`Self::exactly`], but without a wait before sending; `before` messages have already been decoded.
+    /// As [`Self::exactly`], but sends at once. `before` messages have already been decoded.
     #[track_caller]
     fn exactly_after(&mut self, before: u64, source: usize, stand: &mut EmulatedPort, count: usize) {
         for burst in (0..count).step_by(BURST) {
@@ -272,7 +273,7 @@ fn every_can_frame_and_every_hid_report_is_decoded() {
     assert!(histories.iter().all(|history| history.lost == 0), "{histories:?}");
 }
 
-/// A slow driver, which records the timestamp of each message and the time of reading it.
+/// A slow driver. It records the timestamp of each message and the time at which it read the message.
 struct Dawdler {
     driver: Box<dyn Driver>,
     noted: Arc<SegQueue<(MonoNs, MonoNs)>>,
@@ -333,8 +334,7 @@ fn late_read_does_not_change_a_frame_timestamp() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // The tolerance is needed because the stamps come from another clock, and the two clocks can't be read at the same
-    // moment.
+    // The tolerance is needed because the timestamps come from another clock, and two clocks can't be read at once.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
         assert!(
@@ -365,8 +365,8 @@ fn every_frame_is_read_after_a_can_interface_was_down() {
             Phase::Closed,
             "opening vcan3: the interface is down; sudo ip link set vcan3 up",
         );
-        // During the outage, messages of the inertial unit are lost. The second outage is longer than the silence
-        // timeout.
+        // Messages that the inertial unit sends during the outage are lost. The second outage is longer than the
+        // silence timeout.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
         if round == 1 {
@@ -417,7 +417,7 @@ fn replugged_can_adapter_is_used_again() {
     rehearsal.send(IMU, &mut imu, 3);
     rehearsal.exactly(TETHER, &mut tether, 60);
     let vcan = Interface::up("vcan6");
-    // The inertial unit's end of the line existed before the new interface, and continues to work.
+    // The inertial unit's end of the line was opened before the interface was made again, and still works.
     rehearsal.call(IMU, &mut imu);
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");
@@ -446,7 +446,8 @@ fn replugged_counter_is_used_again_under_another_device_number() {
     assert!(rehearsal.said.iter().any(lost), "{:?}", rehearsal.said);
     rehearsal.exactly(IMU, &mut imu, 100);
 
-    // Another counter takes the old number. The first counter gets a new number, and only this counter is read.
+    // Another counter takes the device number of the first one. The first counter gets a new number, and is still the
+    // only one that is read.
     let mut other = counter("HR-0002");
     assert_eq!(path("HR-0002"), first);
     let mut tether = counter("HR-0001");

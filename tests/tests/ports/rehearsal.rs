@@ -9,7 +9,8 @@ use std::process::{Child, Command, Stdio};
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Four heads, two of them on serial lines; echosounders on serial lines and on UDP; all other sensors on UDP.
+/// A scene with four heads, two of them on serial lines, and with echosounders on serial lines and on UDP. All other
+/// sensors are on UDP.
 pub(crate) fn scene(distance_m: f64) -> String {
     let vehicle = headrace_tests::root().join("deploy/vehicles/vita2-4.toml");
     format!(
@@ -134,7 +135,8 @@ fn sections(report: &Value) -> BTreeMap<String, &Value> {
     sections.map(|section| (format!("{:9.3}", section["start_m"].as_f64().unwrap()), section)).collect()
 }
 
-/// Allowed difference between a hole in the live dive and in the replay of its scene, m.
+/// Allowed difference between the diameters of a section's hole in the live dive and in the replay of the simulated
+/// scene, m.
 const APART_M: f64 = 0.12;
 /// Target of the scene, m. `CONFIDENCE_SD` is the number of standard deviations by which a hole must be below the
 /// target to pass.
@@ -149,7 +151,8 @@ fn is_near(section: &Value) -> bool {
 
 /// Differences between the sections of the live dive and those of the replay. The last 0.7 m of the dive are ignored.
 ///
-/// At the end, the last updates and turns decide how far the dive reaches and whether its last section is judged.
+/// They are ignored because the last updates and turns decide how far the dive reaches, and whether its last section is
+/// judged.
 fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value>) -> Vec<String> {
     let last = live.keys().max().max(replay.keys().max()).unwrap();
     let last_m: f64 = last.trim().parse().unwrap();
@@ -164,7 +167,7 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
         };
         let hole_m = |section: &Value| section["hole_m"].as_f64().unwrap_or(f64::NAN);
         // In the two dives, the heads have slightly different phases, which changes a hole by some millimetres at most.
-        // But if the machine stalls for a quarter of a second, the hole truly becomes larger.
+        // If the machine stalls for a quarter of a second, however, the hole in the live dive truly becomes larger.
         let apart_m = (hole_m(ours) - hole_m(theirs)).abs();
         if apart_m > APART_M {
             different.push(format!("{start} m: holes are {apart_m:.3} m apart"));
@@ -172,7 +175,7 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
         let near = [ours, theirs].iter().any(|section| is_near(section));
         let (ours, theirs) = (&ours["verdict"], &theirs["verdict"]);
         println!("{start} m  live {ours}, replay {theirs}, holes {apart_m:.3} m apart");
-        // A section that passes with a small margin in one dive may stay undecided in the other.
+        // If a section passes with a small margin in one of the two dives, it may stay undecided in the other one.
         let barely = near
             && [ours, theirs].contains(&&"pass".into())
             && [ours, theirs].contains(&&"cannot_say".into());
@@ -185,8 +188,8 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
 
 /// Rehearses a dive and compares it with its replay.
 ///
-/// On a busy machine, lines may close and sections may differ. So `keeps_time` is set only in tests that have the
-/// machine to themselves.
+/// On a busy machine, lines may close and sections may differ. Only tests that have the machine to themselves therefore
+/// set `keeps_time`.
 fn rehearse(distance_m: f64, keeps_time: bool) {
     let folder = Folder::new();
     let scene_file = folder.path("scene.toml");
@@ -206,7 +209,7 @@ fn rehearse(distance_m: f64, keeps_time: bool) {
     let different = differences(&ours, &theirs);
     assert!(different.is_empty() || !keeps_time, "{different:#?}");
     assert!(!ours.is_empty(), "no section was judged");
-    // The replay of the recording must give the displayed results.
+    // The replay of the live dive's recording must give the same results as the live dive.
     let (again_code, again) = replay(&folder, &folder.path("live.mcap"), "again.json");
     assert_eq!((again_code, &again["digest"]), (code, &live["digest"]));
     assert_eq!(again["sections"], live["sections"]);

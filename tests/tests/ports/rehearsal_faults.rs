@@ -1,4 +1,4 @@
-//! Faults that a person causes during a rehearsal: by lines on standard input of `emulate`, and by keys.
+//! Faults that a person causes during a rehearsal, by typing lines or keys into `emulate`.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::UdpSocket;
@@ -11,7 +11,7 @@ use rustix::process::Signal;
 
 use crate::rehearsal::{Running, headrace, scene};
 
-/// A program with its output, and with its input if it reads commands.
+/// A running program with its output. It also has the program's input, if the program reads commands.
 struct Piped {
     process: Running,
     commands: ChildStdin,
@@ -46,7 +46,7 @@ impl Piped {
         line.unwrap_or_else(|| panic!("no line {start:?} with {text:?}"))
     }
 
-    /// Sends a command, and waits until its effect is shown.
+    /// Sends a command, and waits until the program shows the command's effect.
     #[track_caller]
     fn order(&mut self, line: &str, id: &str, effect: &str) {
         writeln!(self.commands, "{line}").unwrap();
@@ -62,7 +62,7 @@ fn unplugged_stalled_and_restarted_devices_are_reported_and_come_back() {
     let mut run =
         Piped::start(&folder, &["run", "rehearsal/vehicle.toml", "--no-record", "--no-page", "--for", "200"]);
     emulator.until("all sensors are connected", "");
-    // A pseudoterminal gets another name when it is plugged in again; TCP and UDP ports keep their numbers.
+    // A pseudoterminal gets another name when it is plugged in again, but TCP and UDP ports keep their numbers.
     for id in ["sonar_2", "sonar_0", "ping_left"] {
         emulator.order(&format!("unplug {id}"), id, "unplugged");
         run.until("SENSOR", &format!("{id} closed: "));

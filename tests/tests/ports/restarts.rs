@@ -14,7 +14,7 @@ use crate::rehearsal::{emulate, headrace, interrupt, report, scene};
 
 /// Number of restarts, unless the environment sets another one.
 const RESTARTS: u64 = 6;
-/// Longest time from the start of the program until the dive goes on, on a busy machine.
+/// Longest allowed time from the start of the program until the dive goes on. It allows for a busy machine.
 const RESUMED_WITHIN: Duration = Duration::from_secs(30);
 
 #[expect(clippy::disallowed_methods, reason = "how long a restart takes is wall time")]
@@ -22,14 +22,15 @@ fn wall_clock() -> Instant {
     Instant::now()
 }
 
-/// Element `n` of a fixed sequence of pseudorandom numbers.
+/// The pseudorandom number `n` of a fixed sequence.
 fn random(n: u64) -> u64 {
     let word = (n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     word ^ (word >> 27)
 }
 
-/// Starts the dive. Returns the process once the process shows that the dive has begun or goes on.
+/// Starts the dive. Returns the process as soon as its output shows that the dive has begun or goes on. Also returns
+/// the time that this took.
 fn start(folder: &Folder, vehicle: &str, (how, logs): (&str, &[&str])) -> (Child, Duration) {
     let begun = wall_clock();
     let mut run = headrace()
@@ -54,8 +55,8 @@ fn with_verdict(report: &Value, verdict: &str) -> BTreeSet<String> {
     these.map(|section| format!("{:9.3}", section["start_m"].as_f64().unwrap())).collect()
 }
 
-/// Kills and resumes a dive with these recordings. Checks that the dive's report equals the report of a replay, and
-/// returns the folder.
+/// Kills and resumes a dive that is recorded to the logs `logs`. Checks that the dive's report equals the report of a
+/// replay, and returns the folder.
 fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     let folder = Folder::new();
     folder.write("scene.toml", scene(20.0 + restarts as f64));
@@ -80,7 +81,8 @@ fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     assert_eq!(status.code(), Some(3), "data of the gaps is lost");
     let live = report(&folder.path("live.json"));
     let losses = live["log"]["losses"].as_array().unwrap();
-    // The report lists each interruption of its own recording, and the last interruption of each other recording.
+    // The report lists every interruption of the recording that it belongs to. Of each other recording, it lists only
+    // the last interruption.
     assert_eq!(
         losses.len() as u64 + 1,
         restarts + logs.len() as u64,
@@ -129,8 +131,8 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     assert_eq!(verified.code, Some(3), "{}{}", verified.stdout, verified.stderr);
 }
 
-/// A kill may leave one recording longer than the other. The dive goes on from the longer one. So later live results
-/// may differ from a replay of the shorter one.
+/// A kill may leave one recording longer than the other. The dive goes on from the longer one. Results of the resumed
+/// dive may therefore differ from those of a replay of the shorter recording.
 #[ignore = "takes a minute at real speed; .ci/run runs it beside other tests"]
 #[test]
 fn dive_with_two_recordings_goes_on_in_both() {
@@ -160,9 +162,9 @@ fn run_refuses_to_begin_beside_an_unfinished_dive_without_resume_or_new() {
     assert_eq!(offered.code, Some(2), "{}", offered.stdout);
     insta::assert_snapshot!(offered.stderr, @"headrace: run: the last dive, first.mcap, did not end in order; --resume continues it in a further part, --new begins another dive");
     assert!(!folder.path("second.mcap").exists());
-    // Without data there is nothing to judge, so the exit code is 1.
+    // No device sends data, so nothing is inspected and the exit code is 1.
     assert_eq!(run(&["--record", "second.mcap", "--new"]).code, Some(1));
-    // The second dive ended in order, so nothing is offered any more, and --resume begins a new dive.
+    // The second dive ended in order, so there is nothing to resume. --resume therefore begins a new dive.
     assert_eq!(run(&["--record", "third.mcap", "--resume"]).code, Some(1));
     assert!(folder.path("third.mcap").exists());
     let named = run(&["--record", "fourth.mcap", "--resume=second.mcap"]);

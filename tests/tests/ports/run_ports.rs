@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use crate::rehearsal::Running;
 
-/// Sensors with invalid addresses. Each address has a different fault.
+/// Sensors with invalid addresses. Each address is wrong in another way.
 const WRONG: [(&str, &str, &str); 7] = [
     ("no_colon", HEAD, "192.168.0.5"),
     ("no_port", HEAD, "tcp:192.168.0.5"),
@@ -144,7 +144,8 @@ fn dive_without_any_sensor_fails_with_each_reason() {
     }
 }
 
-/// Waits for the end of a dive with a blocked terminal. The limit is ten times the program's own wait.
+/// Waits for the end of a dive with a blocked terminal. The time limit is ten times as long as the program itself waits
+/// for the terminal.
 fn ends_and_reports(mut run: Running, folder: &Folder) {
     let code = (0..300).find_map(|_| {
         std::thread::sleep(Duration::from_millis(100));
@@ -188,8 +189,8 @@ fn dive_ends_even_if_its_output_pipe_blocks_at_any_byte() {
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let whole = folder.headrace(&RUN).stdout.len();
     assert!((200..PIPE).contains(&whole), "{whole} bytes");
-    // In the first case the pipe is full from the start. In the other cases it becomes full within the output, in the
-    // last case within the summary.
+    // In the first case, the pipe is full from the start. In the other cases, it becomes full in the middle of the
+    // output. In the last case, this happens in the summary.
     let lines = [0, whole - 150, whole - 100, whole - 50, whole - 10].map(|room| ("", room));
     let json = ["--json", "--json-lines"].map(|how| (how, 0));
     let runs = lines.into_iter().chain(json).map(|(how, room)| {
@@ -230,7 +231,7 @@ fn unavailable_required_sensor_ends_the_dive() {
     "#);
 }
 
-/// A device whose HID reports are too short, like the reports of another maker's counter.
+/// A device with too short HID reports. A counter of another maker may send such reports.
 struct Short;
 
 impl Fault for Short {

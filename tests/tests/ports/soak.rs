@@ -17,7 +17,7 @@ const LOOK: Duration = Duration::from_secs(5);
 const LOOKS_A_FAULT: usize = 7;
 /// Duration of each freeze of a device.
 const FREEZE: Duration = Duration::from_millis(1_500);
-/// Number of resource samples at the start that are left out of the checks of open files and threads.
+/// Number of resource samples at the start of the test that don't count in the checks of open files and threads.
 const WARM_UP: usize = 12;
 
 /// Resources that a process uses at a moment.
@@ -44,7 +44,7 @@ fn look(pid: u32) -> Option<Look> {
     Some(Look { resident_kib: field("VmRSS:")?, files, threads: field("Threads:")?, cpu_ticks })
 }
 
-/// Slope of a line fitted to equally spaced values, per step.
+/// Slope of the straight line that fits equally spaced values best, per step.
 fn slope(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let (mean_at, mean) = ((count - 1.0) / 2.0, values.iter().sum::<f64>() / count);
@@ -104,8 +104,9 @@ fn soak_neither_leaks_nor_drops() {
     let resident: Vec<f64> = warm.iter().map(|look| look.resident_kib / 1024.0).collect();
     let tenths: Vec<String> =
         (0..=10).map(|tenth| format!("{:.1}", resident[tenth * (resident.len() - 1) / 10])).collect();
-    // Memory growth is checked only in the second half of the soak test. Rings, lists and sections are allocated at the
-    // start of the dive, but their memory becomes resident only when it is first used.
+    // Memory growth is checked only in the second half of the soak test. In the first half, memory of rings, lists and
+    // sections becomes resident. It is allocated at the start of the dive, but becomes resident only when it is first
+    // used.
     let later = &resident[resident.len() / 2..];
     let (first, last) = (warm[0], warm[warm.len() - 1]);
     // Linux counts CPU time in ticks of 10 ms.

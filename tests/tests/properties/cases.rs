@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use headrace_geometry::math;
 use headrace_tests::random::Random;
 
-/// Number of random cases of each subject in ordinary tests. `SEED_OF_FEW` is the seed of the first case.
+/// Number of random cases that ordinary tests try of each subject. `SEED_OF_FEW` is the seed of the first case.
 const FEW: u64 = 3000;
 const SEED_OF_FEW: u64 = 20_260_901;
 /// Default number of cases in a long run, for all subjects together.
@@ -87,7 +87,7 @@ pub(crate) fn few(subject: &str, property: Property<'_>) {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Checks a property in a long run, with this subject's share of the cases.
+/// Checks a property in a long run. It tries this subject's share of all cases.
 #[track_caller]
 pub(crate) fn many(subject: &str, property: Property<'_>) {
     let number = |name: &str| {
@@ -103,7 +103,7 @@ pub(crate) fn many(subject: &str, property: Property<'_>) {
     println!("{subject}: {count} cases hold");
 }
 
-/// The property has a planted fault. The run must find it and report its seed.
+/// The property in this test fails on purpose in some cases. The run must find such a case and report its seed.
 #[test]
 fn failing_case_is_reported_and_repeatable() {
     let rare = |case: &mut Case| if case.below(500) == 7 { Err("seven".to_owned()) } else { Ok(()) };

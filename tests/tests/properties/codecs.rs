@@ -1,5 +1,5 @@
-//! Device bytes with changed, lost and inserted bytes. All readings are finite. They don't depend on the split of the
-//! bytes into packets, and the counts add up.
+//! Device bytes with changed, lost and inserted bytes. All readings are finite. They don't depend on how the bytes are
+//! split into packets. The counts of bytes and frames add up.
 
 use headrace_config::Document;
 use headrace_devices::KINDS;

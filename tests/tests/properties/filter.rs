@@ -1,5 +1,5 @@
-//! Random steps on a factored covariance. It stays a valid covariance, and each measurement changes it by the scalar
-//! formula.
+//! Random steps on a factored covariance. The covariance must stay valid, and each measurement must change its
+//! variances as the formula for scalars says.
 
 use headrace_fusion::filter::factors::Factors;
 use headrace_geometry::math;
@@ -7,8 +7,9 @@ use headrace_geometry::math;
 use crate::cases::{Case, few, many};
 
 const N: usize = 6;
-/// Relative tolerance of variances. Correlated errors with variances of 1e-10 and 1e+10 give factors with a ratio of
-/// 1e10. In two million cases, four errors were over 1e-9, and the largest was 3e-8.
+/// Relative tolerance of variances. The tolerance is large because correlated errors with variances of 1e-10 and 1e+10
+/// give factors with a ratio of 1e10. In a run of two million cases, four errors were over 1e-9, and the largest was
+/// 3e-8.
 const SHARE: f64 = 1e-6;
 
 fn row(case: &mut Case) -> [f64; N] {
@@ -53,7 +54,8 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 if (gain.variance / sum - 1.0).abs() > SHARE {
                     return Err(format!("innovation {} is not {sum}", gain.variance));
                 }
-                // The tolerance depends on the terms of the variance h P h^T, because these can be large and cancel.
+                // The tolerance depends on the terms of the variance h P h^T, because large terms can cancel each
+                // other.
                 if (after - left).abs() > SHARE * left + SHARE * size {
                     return Err(format!(
                         "{after:e} is left, not {left:e}; before {before:e}, noise {noise:e}"
@@ -72,8 +74,8 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 }
             }
             3 => {
-                // Each state error grows by dt times the next state error, as a position error grows by dt times the
-                // velocity error.
+                // In this step, each state error grows by dt times the next state error. A position error grows in the
+                // same way by dt times the velocity error.
                 let dt = case.of_any_size(-9, 2).abs();
                 p.shear(|column, len| {
                     for i in 0..len.saturating_sub(1) {

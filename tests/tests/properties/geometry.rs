@@ -1,12 +1,12 @@
-//! Hits of rays on the walls of random cross-sections, compared with the formula for each edge.
+//! Hits of rays on the walls of random cross-sections, compared with a formula that is applied to each edge.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use crate::cases::{Case, few, many, within};
 
-/// Tolerance, m. On edges of a micrometre, hits are exact to some nanometres. To find the side of the ray on which an
-/// edge's end lies, the program subtracts nearly equal numbers. The error is then comparable with the edge's length.
+/// Tolerance, m. On edges with a length of a micrometre, hits are exact to some nanometres only. The program subtracts
+/// nearly equal numbers to find on which side of the ray an end of the edge lies.
 const OFF_M: f64 = 1e-8;
 
 /// Corners of a polygon that is star-shaped about (0, 3). Some corners coincide, or are 1e-12 or 1e-7 of a turn apart.
@@ -92,7 +92,8 @@ fn rays(case: &mut Case) -> Result<(), String> {
                 nearest.distance_m
             ));
         }
-        // If a ray goes through a corner or along an edge, rounding decides which of two walls it hits.
+        // If a ray goes through a corner or along an edge, rounding decides which of two edges it hits. Such rays
+        // aren't compared.
         if let Some((t, sine)) = meets(&given, origin, ray)
             && sine > 1e-3 * math::hypot(ray[0], ray[1])
         {
@@ -111,8 +112,8 @@ fn rays(case: &mut Case) -> Result<(), String> {
     inverses(case, &profile)
 }
 
-/// Converts an arc length to a place on the wall and back, in a polygon and in a shape made of arcs. Checks that the
-/// direction from the reference point stays the same.
+/// Converts an arc length to a place on the wall and back, in the given polygon and in a shape made of arcs. Checks
+/// that the direction from the reference point stays the same.
 fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
     let width_m = case.between(0.5, 12.0);
     let shape = match case.below(3) {
@@ -124,8 +125,8 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
         let arc_m = case.unit() * profile.perimeter_m();
         let place = profile.point_at(arc_m);
         let back = profile.point_at(profile.arc_of(place));
-        // Directions are compared instead of arc lengths, because all points of an edge towards the reference point
-        // have the same direction.
+        // Directions are compared instead of arc lengths, because all points of an edge that points at the reference
+        // point have the same direction.
         let [to, from] =
             [place, back].map(|at| [at[0] - profile.reference()[0], at[1] - profile.reference()[1]]);
         let turned_rad = math::atan2(to[0] * from[1] - to[1] * from[0], to[0] * from[0] + to[1] * from[1]);

@@ -5,8 +5,8 @@ use headrace_oracle::wall::Wall;
 
 use crate::cases::{Case, few, many};
 
-/// Draws samples on the wall: at random, on a lattice, on a line, all at one place, partly coincident, or closer
-/// together than those of any vehicle.
+/// Draws samples on the wall. They are at random places, on a lattice, on a line, all at one place, partly coincident,
+/// or closer together than the samples of any vehicle.
 fn samples(case: &mut Case, perimeter_m: f64) -> Vec<[f64; 2]> {
     let count = 1 + case.below(24);
     let kind = case.below(7);
@@ -59,7 +59,7 @@ fn hole(case: &mut Case) -> Result<(), String> {
     if !numbers.iter().all(|number| number.is_finite()) {
         return Err(format!("{hole:?}"));
     }
-    // At a large chainage, positions of samples are rounded, so the oracle gets the rounded positions.
+    // At a large chainage, the positions of samples are rounded. The oracle therefore gets the rounded positions.
     let wall = Wall::new(samples.iter().map(|[x_m, arc_m]| [(x_m + along_m) - along_m, *arc_m]), perimeter_m)
         .map_err(|why| why.to_string())?;
     let ends = [(from_m + along_m) - along_m, (to_m + along_m) - along_m];

@@ -1,5 +1,5 @@
-//! The paper's equations with random arguments. Each result is a named error, or a finite number that the inverse
-//! equation confirms.
+//! The paper's equations with random arguments. Each result is either a named error, or a finite number that the
+//! inverse equation confirms.
 
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
 use headrace_sampling::head::Turn;
@@ -90,7 +90,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err("a speed where there is none".to_owned());
     }
 
-    // The vehicle's advance in a turn is the sum of its advances in the turn's pings, with one step per turn or with
+    // The vehicle's advance in a turn is the sum of its advances in the turn's pings, whether the turn has one step or
     // thousands.
     let steps = 1 + case.count_below(3000);
     let turn = Turn::new(TAU / f64::from(steps), ping_s).map_err(|why| why.to_string())?;
@@ -99,8 +99,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("{steps} steps: {} and {}", spiral.pitch_m(), spiral.advance_m()));
     }
 
-    // A start angle lies within one turn. The inverse computation, with the opposite turning rate, gives the phase
-    // again.
+    // A start angle lies within one turn. Turned back at the same rate, it gives the phase again.
     let (phase, rate) = (case.between(0.0, TAU), case.between(0.1, 3.0));
     let (x, v) = (case.between(-2.0, 2.0), case.power_of_ten(-9.0, 1.0));
     if let Ok(start) = start_rad(phase, rate, x, v) {

@@ -1,8 +1,8 @@
-//! The advice is right: simulated vehicles that follow the advice meet the target, and vehicles a tenth faster miss the
-//! target.
+//! The advice is right. Simulated vehicles that follow it meet the target, and vehicles that are a tenth faster miss
+//! the target.
 //!
-//! Heads that are apart along the hull start in phase for the advised speed of their mode. They keep their turn times
-//! and start phases when the pilot drives at another speed.
+//! If heads are mounted at different places along the hull, they start in phase for the advised speed of their mode.
+//! They keep their turn times and start phases when the pilot drives at another speed.
 
 use headrace_coverage::Verdict;
 use std::fmt::Write as _;
@@ -18,15 +18,15 @@ const TICK: DurNs = DurNs(20_000_000);
 /// Chainage at which dives begin, m. `JUDGED_M` is the length of the part that the test evaluates.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// Cases whose median hole exceeds this fraction of the predicted spacing T must fail sections at a speed that is a
-/// tenth higher.
+/// If the median hole of a case exceeds this fraction of the predicted spacing T, sections must fail at a speed that is
+/// a tenth higher.
 const NEAR: f64 = 0.95;
 /// The test ignores this number of advice updates at the end of a dive, because the vehicle is stopping.
 const BRAKING: usize = 15;
 /// Simulator effect: the heading oscillates by 10 degrees, as if a pilot steered.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
 
-/// A test case: a vehicle with its mode, target, offset and heading in the tunnel.
+/// A test case: a vehicle with its mode and target, its offset from the centre line, and its heading.
 #[derive(Clone, Copy)]
 struct Case {
     what: &'static str,
@@ -87,8 +87,8 @@ const SWINGING: [Case; 6] = [
 ];
 
 impl Case {
-    /// Length of the stretch at either end of the dive where the test ignores sections, m. Not all heads have passed
-    /// these stretches.
+    /// Length of the stretch at either end of the dive in which the test ignores sections, m. They are ignored because
+    /// not all heads have passed them.
     fn ends_m(&self) -> f64 {
         1.2 * self.target_m + 1.0 + 8.0 * self.yaw_deg.to_radians()
     }
@@ -128,15 +128,16 @@ impl Case {
         dive(&self.scene(planned_mps, speed_mps, length_m), self.dumb, TICK)
     }
 
-    /// Speed at which the heads are in phase. It is the advised speed for their mode, computed for heads that are in
-    /// phase at that same speed.
+    /// Speed at which the heads are in phase. It is the advised speed for the mode of the heads, if they are in phase
+    /// at just this speed.
     fn planned_mps(&self) -> f64 {
         let first = dive(&self.scene(0.1, 0.1, 3.0), self.dumb, TICK);
         let alternatives = first.entries.last().unwrap().advice.alternatives;
         alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
-    /// Advised speed during a dive, and results of one dive at this speed and one at a tenth more.
+    /// Determines the advised speed, and the results of two dives: one at this speed, and one at a speed that is a
+    /// tenth higher.
     fn followed(&self) -> Followed {
         let planned_mps = self.planned_mps();
         let v_max_mps = self.dive(planned_mps, planned_mps).median(v_max_mps);
@@ -153,11 +154,11 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// Results of the evaluated part of a dive, which excludes the ends.
+/// Results of the evaluated part of a dive. The ends of the dive are left out.
 struct Judged {
     failing: f64,
     passing: f64,
-    /// Predicted spacing T at the driven speed, m; median of all updates.
+    /// Predicted spacing T at the driven speed, m. It is the median of all updates.
     predicted_t_m: f64,
     /// Ratio of the hole diameter to the predicted spacing T: median and maximum over the sections.
     holes: [f64; 2],
@@ -215,13 +216,13 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
         if at.failing > 0.02 || at.passing < 0.98 {
             broken.push(format!("{}: {:.3} fail when it is followed", case.what, at.failing));
         }
-        // Advice and forecast agree until the vehicle slows down at the end.
+        // The displayed forecast must agree with the advice until the vehicle slows down at the end.
         let forecast = |dive: &Advised| {
             let settled = &dive.settled()[..dive.settled().len() - BRAKING];
             settled.iter().filter(|entry| entry.advice.will_exceed).count() as f64 / settled.len() as f64
         };
-        // If heads are apart along the hull, the spacing T has its minimum at one speed. Rounding of counter and angles
-        // can keep T above the target there.
+        // If heads are mounted at different places along the hull, the spacing T has a minimum at one speed. Even
+        // there, the rounding of counter and angles can keep T above the target.
         let met = at.predicted_t_m <= case.target_m;
         within += usize::from(met);
         if met && forecast(&dives[0]) > 0.0 || forecast(&dives[1]) < 1.0 {
@@ -236,8 +237,8 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
                 ));
             }
         }
-        // In the cases below `NEAR`, holes are smaller than predicted, and fewer sections fail. In no case may a hole
-        // be larger than predicted.
+        // In cases with smaller holes (below `NEAR`), fewer sections fail. In no case may a hole be larger than
+        // predicted.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -247,8 +248,8 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// The vehicle misses sections because it is a third faster than advised. The speed for repeating these sections must
-/// be near the advised speed, because one screen shows both speeds.
+/// The vehicle misses sections because it is a third faster than advised. One screen shows the advised speed and the
+/// speed for repeating the missed sections, so the two must be similar.
 #[test]
 fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
@@ -307,8 +308,8 @@ fn advice_compensates_lost_returns() {
     let mut broken = Vec::new();
     for case in &LOSSY {
         let sound_mps = Case { effects: "", ..*case }.planned_mps();
-        // The loop detects the losses only some turns after they began. This vehicle is slow, so it hasn't moved far by
-        // then.
+        // The loop detects the losses only some turns after they began. This vehicle is slow, so that it hasn't moved
+        // far when they are detected.
         let v_max_mps = case.dive(sound_mps, 0.5 * sound_mps).median(v_max_mps);
         let dives = [v_max_mps, sound_mps].map(|speed_mps| case.dive(sound_mps, speed_mps));
         let [at, as_before] = [0, 1].map(|k| Judged::of(case, &dives[k]));
@@ -331,8 +332,7 @@ fn advice_compensates_lost_returns() {
                 case.what, as_before.passing
             ));
         }
-        // The speed advised for repeating sections must be near the present speed limit, because one screen shows both
-        // speeds.
+        // One screen shows the speed limit and the speed for repeating sections, so the two must be similar.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!(
                 "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",
@@ -341,7 +341,7 @@ fn advice_compensates_lost_returns() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // Lost returns that are isolated have little effect on the advice.
+    // Returns that are lost singly, not in runs, have little effect on the advice.
     let few = Case { effects: "missing_returns = { share = 0.05 }\n", ..VITA1 };
     let [sound_mps, mps] = [VITA1, few].map(|case| case.dive(0.1, 0.1).median(v_max_mps));
     assert!((0.85..0.99).contains(&(mps / sound_mps)), "{mps} of {sound_mps}");
@@ -362,7 +362,7 @@ fn advice_says_so_if_a_lower_speed_does_not_help() {
     let Some(Remedy::Mode(mode)) = coarse.dive(0.1, 0.1).settled()[0].advice.remedy else { panic!() };
     let finer = Case { mode: mode.as_str().to_owned().leak(), ..coarse };
     assert!(finer.followed().at.failing <= 0.02, "{mode:?}");
-    // No other head covers the sector of a silent head.
+    // In this layout, no other head covers the sector of the silent head.
     let unseen = Case { layout: "sector_offset", dumb: Some("sonar_1"), ..TWO }.dive(0.1, 0.1);
     let last = unseen.settled()[0].advice;
     assert_eq!((last.reason, last.v_max_mps), (Reason::AngularStep, 0.0));
@@ -391,7 +391,7 @@ fn a_minute(entries: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry
 #[test]
 fn advice_in_the_field_changes_slowly_enough_to_read() {
     let text = include_str!("../../../deploy/scenes/vita1-field.toml").replace("../vehicles/", "");
-    // At this speed, about half of the updates meet the target.
+    // The scene is changed to a speed at which about half of the updates meet the target.
     let shorter = text.replace("distance_m = 130\nspeed_mps = 0.16", "distance_m = 50\nspeed_mps = 0.197");
     assert_ne!(text, shorter);
     let scene = scenes::scene(&shorter);
@@ -410,7 +410,7 @@ fn advice_in_the_field_changes_slowly_enough_to_read() {
     );
     assert!(jumps <= 1.0 && reasons <= 0.2, "{jumps} and {reasons}");
     assert!(crossings > 10.0 && forecasts < 0.5 * crossings, "{forecasts} of {crossings}");
-    // A forecast is displayed for at least a second before it is withdrawn.
+    // Once displayed, a forecast must stay for at least a second.
     let mut since = None;
     for (k, entry) in entries.iter().enumerate() {
         match (entry.advice.will_exceed, since) {

@@ -58,7 +58,7 @@ fn advised_speeds_match_the_largest_passing_speeds() {
     assert!(ratios.iter().all(|ratio| (0.899..1.001).contains(ratio)), "{ratios:?}");
 }
 
-/// The driven speeds are near the advised one, and must not change the advice.
+/// The vehicle drives at several speeds near the advised one. The advice must be the same in all these dives.
 #[test]
 fn advice_does_not_depend_on_the_driven_speed() {
     let outing = Outing::steady(VEHICLES[3], 1);

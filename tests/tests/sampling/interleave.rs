@@ -1,7 +1,7 @@
 //! Interleaving of several heads by the paper's §5. The tests step the heads ping by ping along a straight tunnel.
 //!
-//! They collect the chainages at which each head looks at a given angle. Each head is stepped by its own ping-by-ping
-//! schedule (`HeadProgram`). So the test doesn't check the layout formulas with the same formulas.
+//! The tests collect the chainages at which each head looks at a given angle. Each head is stepped by its own
+//! ping-by-ping schedule (`HeadProgram`). The layout formulas are therefore not checked against themselves.
 
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math::{PI, TAU, floor_to_i64};
@@ -66,7 +66,7 @@ impl Rig {
     }
 
     /// Simulates a dive at `speed_mps` with heads laid out for `planned_mps`. The dive is longer than the hull by the
-    /// distance of some turns.
+    /// distance covered in some turns.
     fn dive(&self, layout: HeadLayout, planned_mps: f64, speed_mps: f64) -> Dive {
         let [back_m, front_m] = ends(&self.hull_m);
         let ping_m = speed_mps * self.ping_s();
@@ -102,7 +102,7 @@ fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// Angles of a head at its pings, counted on over several turns (not reduced to one turn).
+/// Angles of a head at its pings. They continue to grow over several turns, and are not reduced to one turn.
 fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     let mut step_rad = if program.growing { step_rad } else { -step_rad };
     let Some((least, size)) = program.sector else {
@@ -121,7 +121,7 @@ fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     angles
 }
 
-/// Motion of a head: its start, and its angle in the body frame at each ping.
+/// Motion of a head: its start, the distance between pings, and its angle in the body frame at each ping.
 struct Track {
     x_m: f64,
     ping_m: f64,
@@ -129,8 +129,8 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which the head looks at an angle of the body frame. If the head turns back at this angle, this pass
-    /// counts once.
+    /// Chainages at which the head looks at an angle of the body frame. If the head turns back exactly at this angle,
+    /// the two passes count as one.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();
@@ -199,7 +199,7 @@ impl Dive {
             let angle = TAU * (k as f64 + share) / heads as f64;
             let mut own = self.tracks[k].passes(angle);
             if [0.0, 1.0].contains(&share) {
-                // Where a head turns back, two of its passes coincide.
+                // At the ends of its sector the head turns back, so two of its passes coincide.
                 own = own.iter().flat_map(|&m| [m, m]).collect();
             } else {
                 let by = |track: &&Track| !track.passes(angle).is_empty();
@@ -223,7 +223,7 @@ fn gaps(passes: &[f64]) -> Vec<f64> {
     passes.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// Hulls with all heads at one place, with evenly spaced heads, and with unevenly spaced heads in mixed order.
+/// Hulls with all heads at one place, with evenly spaced heads, and with unevenly spaced heads that aren't in order.
 fn hulls(heads: usize) -> [Vec<f64>; 3] {
     let uneven = [0.4, -0.71, 1.102, 0.05, -0.33, 0.62];
     [vec![0.3; heads], (0..heads).map(|k| -0.3 * k as f64).collect(), uneven[..heads].to_vec()]
@@ -256,8 +256,8 @@ fn sector_heads_stay_in_phase_and_their_pass_distances_alternate() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;
-            // The distances between heads are whole numbers of pings, so that all heads pass a chainage at the same
-            // steps.
+            // The distances between heads are whole numbers of pings, so that all heads pass any chainage at the same
+            // steps of their turns.
             let hull_m =
                 [37, 0, 251, 90, 90, 163].map(|pings| -f64::from(pings) * pitch_m / f64::from(STEPS));
             let rig = Rig::new(&hull_m[..heads], facing, 21.6);
@@ -266,10 +266,11 @@ fn sector_heads_stay_in_phase_and_their_pass_distances_alternate() {
             dive.assert_in_step(1e-7);
             for k in 0..heads {
                 dive.assert_two_distances(k, pitch_m);
-                // At the border of two sectors, both heads turn back. They do so at evenly spaced chainages.
+                // At the border of two sectors, the heads of both turn back. They do so at evenly spaced chainages.
                 dive.assert_even(TAU * (k + 1) as f64 / heads as f64, pitch_m / heads as f64);
             }
-            // With other distances, a head may reach the end of its sector up to one ping early or late.
+            // If the distances between heads aren't whole numbers of pings, a head may reach the end of its sector up
+            // to one ping early or late.
             for hull_m in hulls(heads) {
                 let rig = Rig::new(&hull_m, facing, 21.6);
                 rig.dive(SectorOffset, speed_mps, speed_mps).assert_in_step(rig.step_rad());
@@ -298,7 +299,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_head_at_the_same_chainage() {
         let program = HeadProgram { start_rad: 0.0, growing: true, sector: Some((0.0, size)) };
         let ping_m = speed_mps * rig.ping_s();
         let lead = Track { x_m: 0.0, ping_m, body: walk(&program, rig.step_rad(), 8 * STEPS) };
-        // The tested chainages begin where both heads have been, and are 1.37 pings apart.
+        // The tested chainages begin at a place that both heads have passed, and are 1.37 pings apart.
         for now_m in (0..150).map(|n| 3.8 + f64::from(n) * 1.37 * ping_m) {
             let state = |m: f64| (lead.body_at(m), lead.body_at(m + SAME_M) > lead.body_at(m));
             let ((angle_rad, growing), (along, outward)) = (state(now_m), state(now_m - behind_m));
@@ -309,7 +310,7 @@ fn algorithm_1_gives_a_head_the_angle_of_the_lead_head_at_the_same_chainage() {
                 let off = wrapped(body - along - number as f64 * size);
                 assert!(off.abs() < 1e-8, "{sector:?} {off} off, lead at {angle_rad} {growing}");
                 assert!((0.0..TAU).contains(&got.angle_rad), "{got:?}");
-                // Where a head turns back, both directions of motion are right.
+                // At the places where a head turns back, either direction of its motion is right.
                 if along > 1e-5 && along < size - 1e-5 {
                     assert_eq!(got.growing, outward != reversed, "{sector:?}, lead {angle_rad} {growing}");
                 }
@@ -325,8 +326,8 @@ fn pass_gaps_above_the_planned_speed_differ_by_the_phase_errors() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
-            // Delay of a head at position x along the hull, in addition to its planned phase, in turns: x / (v T) - x /
-            // (v' T), with planned speed v, driven speed v' and turn time T.
+            // Delay of a head at position x along the hull, in turns: x / (v T) - x / (v' T), with planned speed v,
+            // driven speed v' and turn time T. It adds to the head's planned phase.
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {
@@ -342,8 +343,8 @@ fn pass_gaps_above_the_planned_speed_differ_by_the_phase_errors() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        // The random seed is fixed, because one start angle in a million is so close to a step that rounding decides
-        // which ping reaches it.
+        // The random seed is fixed. With other seeds, one start angle in a million is so close to a step that rounding
+        // decides which ping reaches it.
         cases: 100, failure_persistence: None, rng_seed: RngSeed::Fixed(881), ..ProptestConfig::default()
     })]
 
@@ -353,7 +354,7 @@ proptest! {
         rig.dive(PhaseShift, speed_mps, speed_mps).assert_even(angle, apart_m);
     }
 
-    /// The speed differs from the planned one, so that the gaps between passes differ from each other.
+    /// The driven speed differs from the planned one, so that the gaps between passes are not all equal.
     #[test]
     fn shifting_or_reversing_all_heads_does_not_change_the_pass_gaps(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]),
@@ -396,7 +397,7 @@ fn sector_of_12_5_steps_ends_with_a_half_step() {
     let sweep: Vec<f64> = out.clone().chain(out.map(|degrees| 90.0 - degrees)).collect();
     for (n, degrees) in (0..1000).zip(sweep.iter().cycle()) {
         // A head must keep a ping's angle from the ping's exact nanosecond until a microsecond before the next ping.
-        // Rounding must not change this: 0.3 / 0.1 is below 3.
+        // Rounding could break this, because 0.3 / 0.1 is below 3 in floating point.
         for ns in [100_000_000 * n, 100_000_000 * n + 99_999_000] {
             let got = schedule.angle_rad(0, DurNs(ns)).unwrap().to_degrees();
             assert!((got - degrees).abs() < 1e-6, "{got} for {degrees} at {ns} ns");

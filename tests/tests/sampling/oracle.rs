@@ -1,9 +1,9 @@
 //! Sampling theory compared with values of 50 digits, which `oracles/sampling.py` computed with mpmath
 //! (`oracles/sampling.csv`).
 //!
-//! The inputs are doubles and count as exact. So the tolerance only covers rounding in the computation. It is some
-//! units in the last place. It is multiplied by the condition number if the computation magnifies the rounding of an
-//! intermediate value.
+//! The inputs are doubles and count as exact. The tolerance therefore covers only the rounding in the computation. It
+//! is some units in the last place. If the computation magnifies the rounding of an intermediate value, the tolerance
+//! is multiplied by the condition number.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
@@ -89,12 +89,12 @@ fn rows(cases: &[&str]) -> Vec<Row> {
     found
 }
 
-/// Factor by which rounding of an angle near 90 degrees is magnified.
+/// Factor by which the tangent of an angle near 90 degrees magnifies the rounding of the angle.
 fn condition(angle_rad: f64) -> f64 {
     1.0 + angle_rad / (FRAC_PI_2 - angle_rad).abs()
 }
 
-/// Near 90 degrees, tangents are very large, so a formula that subtracts two tangents would lose all digits.
+/// Near 90 degrees, tangents are very large, so a formula that subtracts two tangents loses all digits.
 #[test]
 fn wall_steps_near_90_degrees_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -105,7 +105,7 @@ fn wall_steps_near_90_degrees_match_the_oracle() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// If the ping distance T_y is close to the target, a formula that subtracts the squares of both would lose digits.
+/// If the ping distance T_y is close to the target, a formula that subtracts the squares of the two loses digits.
 #[test]
 fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
@@ -119,7 +119,7 @@ fn speeds_near_the_limit_match_the_oracle() {
     found_at("sampling.speed", magnified, worst, 8.0 * ULP);
 }
 
-/// At a crawl, a head makes very many turns until the vehicle has brought it to the place of another head.
+/// At a very low speed, a head makes very many turns before the vehicle has moved it to the place of another head.
 #[test]
 fn head_phases_at_very_low_speed_match_the_oracle() {
     let (mut worst_rad, mut turned_most) = (0.0_f64, 0.0_f64);
@@ -139,8 +139,8 @@ fn cross_section_matches_the_oracle() {
     for row in rows(&["eq5", "eq6", "eq7", "eq8", "eq10", "eq22"]) {
         match row.case.as_str() {
             "eq5" => row.ulps(section::t_y1_m(row.i(1), row.i(2)).unwrap(), 8.0),
-            // These values are computed with twice a double's precision, so errors aren't magnified, even near 90
-            // degrees.
+            // The program computes these values with twice a double's precision. Errors are therefore not magnified,
+            // even near 90 degrees.
             "eq6" => row.ulps(section::t_y2_m(row.i(1), row.i(2), row.count(3)).unwrap(), 8.0),
             "eq7" => row.ulps(section::t_c_m(row.i(1), row.i(2)).unwrap(), 4.0),
             "eq8" => row.ulps(section::t_y2_mean_m(row.i(1), row.i(2), row.count(3)).unwrap(), 8.0),
@@ -233,7 +233,7 @@ fn beam_wall_hits_match_the_oracle() {
     for row in rows(&["cast_x", "cast_y", "cast_z", "cast_sigma"]) {
         let profile = shape(row.i(1));
         let hit = sounding(&profile, &row, row.i(6));
-        // At oblique incidence, the rounding of a beam's direction moves its end along the wall by a larger factor.
+        // The more oblique the incidence, the farther the rounding of a beam's direction moves its end along the wall.
         let tolerance = 64.0 * ULP * (3.0 + hit.range_m()) / hit.squareness;
         match row.case.as_str() {
             "cast_x" => row.near(hit.beam.x(), tolerance),

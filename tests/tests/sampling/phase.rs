@@ -1,5 +1,5 @@
-//! Heads that are apart along the hull are in phase at one speed only. At any other speed the advice reports their
-//! phase error.
+//! Heads that are mounted at different places along the hull are in phase at one speed only. At any other speed the
+//! advice reports their phase error.
 
 use headrace_tests::Folder;
 use serde_json::Value;
@@ -12,7 +12,7 @@ const PLANNED_MPS: f64 = 0.197;
 
 /// Advice in a dive at constant speed, without the first seconds.
 ///
-/// No effect disturbs the sensors, so the vehicle has no filter. A filter would add a margin for cable slack.
+/// No effect disturbs the sensors. The vehicle has no filter, because a filter adds a margin for cable slack.
 fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
     let folder = Folder::new();
     let direct = "[navigation]\nway = \"direct\"\n";
@@ -42,7 +42,7 @@ fn phase_error_matches_the_difference_from_the_planned_speed() {
         for entry in &advice {
             let error_deg = entry["phase_error_deg"].as_f64().unwrap();
             let off = (error_deg / 360.0 - turns + 0.5).rem_euclid(1.0) - 0.5;
-            // The tolerance covers the head's steps of 0.9 degrees, and start angles rounded to 0.3 degrees.
+            // The tolerance covers the head's steps of 0.9 degrees, and the rounding of start angles to 0.3 degrees.
             assert!(off.abs() * 360.0 < 1.5, "{speed_mps} m/s: {error_deg} degrees, not {}", turns * 360.0);
         }
     }

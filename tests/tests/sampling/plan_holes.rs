@@ -2,8 +2,8 @@
 //!
 //! The test steps the heads by their schedule, casts their beams, and searches the largest empty circle. To find
 //! occlusion by the vehicle, it follows each beam in small steps. The search can only underestimate the circle, so no
-//! found circle may exceed the planned size. The planned size may not be far larger than the circle either, because
-//! that would waste the crew's time.
+//! circle that it finds may exceed the planned size. Neither may the planned size be far larger than the circle,
+//! because the crew then drives more slowly than necessary.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::math::{self, PI, TAU};
@@ -92,8 +92,8 @@ const VEHICLE_M: f64 = 1.6;
 fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
     let (spec, _) = &inspection.heads[number];
     let from = spec.mount.position;
-    // Angle 0 points down, and angles grow clockwise as seen from behind the head. A head that faces aft is turned
-    // about the vertical.
+    // Angle 0 points down, and angles grow clockwise as seen from behind the head. The mount of a head that faces aft
+    // is turned about the vertical.
     let (sine, cosine) = math::sin_cos(angle_rad);
     let towards = spec.mount.rotation * Vec3::new(0.0, sine, -cosine);
     let others = || inspection.heads.iter().enumerate().filter(|(other, _)| *other != number);
@@ -101,7 +101,7 @@ fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
         let in_head = others().any(|(_, (other, _))| {
             let HeadBody { radius_m, ahead_m, behind_m } = other.body;
             let off = at + other.mount.position.scaled(-1.0);
-            // Heads look forward or aft here, so their axes are the vehicle's.
+            // All heads in this test face forward or aft, so their axes are parallel to the vehicle's.
             let along_m = (other.mount.rotation * Vec3::new(1.0, 0.0, 0.0)).x() * off.x();
             radius_m > 0.0
                 && (-behind_m..=ahead_m).contains(&along_m)
@@ -258,7 +258,8 @@ fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     wall.hole_m(from_m, to_m, target_m / 8.0) / target_m
 }
 
-/// Checks for each case that the ratio of the found hole to the planned one is from `least` to 1.
+/// Checks for each case that the ratio of the found hole to the target is from `least` to 1. The vehicle drives at the
+/// speed that the plan gives for the target.
 fn hold(cases: Vec<(&str, Inspection, &str, f64, Way)>, least: f64) {
     let mut broken = Vec::new();
     for (what, inspection, mode, target_m, way) in cases {
@@ -334,7 +335,7 @@ fn planned_hole_size_is_an_upper_bound_for_an_askew_vehicle() {
 
 #[test]
 fn planned_hole_size_is_an_upper_bound_for_a_swinging_or_drifting_vehicle() {
-    // An oscillation with an amplitude of 5 degrees and a period of 30 s has a largest rate of 1.05 degrees per second.
+    // An oscillation with an amplitude of 5 degrees and a period of 30 s has a rate of at most 1.05 degrees per second.
     let swings = |yaw_deg: f64, rate_degps: f64, heads| Inspection {
         yaw_rad: yaw_deg.to_radians(),
         yaw_rate_radps: rate_degps.to_radians(),
@@ -343,7 +344,8 @@ fn planned_hole_size_is_an_upper_bound_for_a_swinging_or_drifting_vehicle() {
     let swinging = |heads| swings(5.0, 1.05, heads);
     let swing: Way = |t| (0.0, f64::to_radians(5.0) * math::sin(TAU * t / 30.0));
     // The oscillation has an amplitude of 15 degrees and a period of 20 s. At its largest rate, the heading would
-    // change by 51 degrees in a turn of MEDIUM. In fact it changes by at most 30 degrees.
+    // change by 51 degrees in a turn of MEDIUM. It can change by at most 30 degrees, however, because this is the whole
+    // swing.
     let swing_wide: Way = |t| (0.0, f64::to_radians(15.0) * math::sin(TAU * t / 20.0));
     let drifting = |heads| Inspection { drift_m: 1.5, ..ceran(heads, PhaseShift) };
     hold(

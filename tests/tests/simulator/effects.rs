@@ -1,4 +1,5 @@
-//! A scene's dive has only the effects that the scene names. Other effects cost no time and change no bit.
+//! The simulation of a scene has only the effects that the scene names. All other effects cost no time and change no
+//! bit.
 
 use std::collections::BTreeMap;
 
@@ -65,7 +66,7 @@ fn random_draws_of_an_effect_do_not_depend_on_others() {
     let together = lines(&folder, &format!("{others}\n{noise}"), &[]);
     assert_eq!(alone["/raw/sonar_0"], together["/raw/sonar_0"]);
     assert_ne!(alone["/raw/imu"], together["/raw/imu"]);
-    // The order of effects in the scene doesn't matter either.
+    // The order in which the scene names the effects doesn't matter either.
     assert_eq!(lines(&folder, &format!("{noise}\n{others}"), &[]), together);
 }
 
@@ -102,7 +103,7 @@ fn truth_output_does_not_change_the_log() {
     assert_eq!(pings, plain["/raw/sonar_0"].len());
     let number = |row: &Vec<&str>, name| row[column(name)].parse::<f64>().unwrap();
     for row in rows.iter().filter(|row| row[column("sense")] == "profiling_head") {
-        // The tunnel's radius is 3 m, with its centre 3 m above the floor.
+        // The tunnel is a circle with a radius of 3 m, so its centre is 3 m above the floor.
         let (y, z) = (number(row, "wall_y_m"), number(row, "wall_z_m"));
         assert!((headrace_geometry::math::hypot(y, z - 3.0) - 3.0).abs() < 1e-9, "{row:?}");
         let noise = number(row, "measured_range_m") - number(row, "true_range_m");
@@ -132,8 +133,8 @@ fn only_named_effects_have_systems_components_and_streams() {
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));
 }
 
-/// Effects that a scene's conditions imply are listed with their reasons. They are simulated only if the scene requests
-/// them.
+/// Effects that a scene's descriptions imply are listed with their reasons. They are simulated only if the scene
+/// requests them.
 #[test]
 fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
     let folder = folder();
@@ -161,7 +162,7 @@ fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
         (fate("beam_cone"), fate("imu_bias"), fate("occlusion")),
         ("left".into(), "as named".into(), "taken".into())
     );
-    // Descriptions of water and cable that no effect uses change no byte.
+    // If no effect uses the descriptions of water and cable, they change no byte.
     let plain = lines(&folder, "", &[]);
     let described = "\n[water]\ntemperature_degc = 4\n[[water.murk]]\nfrom_m = 1\nto_m = 9\nsilt_gpl = 3\n[cable]\nslack_m = 1\n";
     assert_eq!(lines(&folder, described, &[]), plain);
@@ -262,7 +263,8 @@ fn report_finds_the_simulated_clock_drifts() {
             let clock = &sources.iter().find(|source| source["id"] == id).unwrap()["device_clock"];
             let number = |key: &str| clock[key].as_f64().unwrap();
             assert_eq!((&clock["restarts"], &clock["jumps"]), (&0.into(), &0.into()), "{id}");
-            // The effect makes a device's seconds longer than true ones, so the device's clock is slow.
+            // The effect makes a device's seconds too long, so the device's clock is slow and the drift has the
+            // opposite sign.
             let (error, sd) = (number("drift_ppm") + ppm, number("drift_sd_ppm"));
             assert!(error.abs() < 5.0 * sd && sd < 30.0, "{id}: {clock}");
         }
@@ -304,7 +306,7 @@ fn water_temperature_corrects_a_wrong_speed_of_sound() {
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
 
-/// For each ping of a head: whether this effect alone removes or displaces its return.
+/// Tells for each ping of a head whether this effect alone removes or displaces the ping's return.
 fn touched(effect: &str) -> Vec<bool> {
     let ranges = |effects: &str| -> Vec<Option<f64>> {
         let scene = format!("{SCENE}\n[effects]\n{effects}\n");
@@ -327,8 +329,8 @@ fn random_draws_of_two_effects_are_independent() {
     let stray = touched("outliers = { share = 0.3, sensors = [\"sonar_0\"] }");
     assert!(lost.len() > 500 && (share(&lost) - 0.3).abs() < 0.1 && (share(&stray) - 0.3).abs() < 0.1);
     let both: Vec<bool> = lost.iter().zip(&stray).map(|(a, b)| *a && *b).collect();
-    // If both effects shared a random stream, the overlap would be the whole smaller set of pings. With separate
-    // streams, the overlap is 0.09 to within five standard deviations.
+    // If the two effects used the same random stream, both would change the same pings. With separate streams, both
+    // change a share of 0.09, to within five standard deviations.
     let sd = (0.09_f64 * 0.91 / both.len() as f64).sqrt();
     assert!((share(&both) - 0.09).abs() < 5.0 * sd + 0.01, "{}", share(&both));
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 
-/// A cube with 1 m edges as a PLY mesh, with the origin in its lower face.
+/// A cube with edges of 1 m, as a PLY mesh. The mesh's origin is in the lower face of the cube.
 fn cuboid() -> String {
     let mut text = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
@@ -47,7 +47,8 @@ fn echosounder_measures_a_mesh_body_on_the_floor() {
     let mut over = 0;
     for (chainage, height) in chainages.iter().zip(&heights) {
         let (chainage_m, height_m): (f64, f64) = (chainage.parse().unwrap(), height.parse().unwrap());
-        // The echosounder looks straight down and is close to the vehicle's position.
+        // The echosounder looks straight down from near the vehicle's position, so it hits the cube if the vehicle is
+        // above the cube.
         if (chainage_m - 5.0).abs() < 0.45 {
             over += 1;
             assert!((height_m - 1.0).abs() < 1e-9, "{chainage_m}: {height_m}");

@@ -41,7 +41,7 @@ fn every_shipped_scene_can_be_simulated() {
     }
 }
 
-/// The page about the scenes must state the true lengths of their dives.
+/// The page that documents the scenes must state the true lengths of their dives.
 #[test]
 fn shipped_scenes_match_the_figures_of_their_page() {
     let folder = headrace_tests::root().join("deploy/scenes");

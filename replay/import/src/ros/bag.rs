@@ -37,13 +37,13 @@ pub struct Bag {
     /// The chunk whose records are being read.
     chunk: Option<Chunk>,
     first_ns: Option<u64>,
-    /// Position of the index, and counts, as stated in the bag's header.
+    /// Position of the index, and numbers of connections and chunks, as stated in the bag's header.
     stated: Option<Stated>,
     chunks: u64,
     lost: BTreeMap<&'static str, u64>,
 }
 
-/// Position of the index, and counts, as stated in the bag's header.
+/// Position of the index, and numbers of connections and chunks, as stated in the bag's header.
 #[derive(Debug, Clone, Copy)]
 struct Stated {
     index_at: u64,
@@ -51,7 +51,7 @@ struct Stated {
     chunks: u32,
 }
 
-/// The content of an unpacked chunk, the position reached in it, and the parsing result to return at the chunk's end.
+/// The content of an unpacked chunk, the position reached in it, and the parsing result to return at its end.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
@@ -69,14 +69,14 @@ struct Record<'a> {
 enum Accepted<'a> {
     /// The record has been processed completely.
     Read,
-    /// The record is a chunk with this compression; its content must be unpacked.
+    /// The record is a chunk with this compression. Its content must still be unpacked.
     Chunk(&'a [u8]),
 }
 
 /// Reason why a record of the bag can't be read.
 enum Stop<'a> {
-    /// The record is incomplete. If its header fields are complete, they are given with the available part of its
-    /// data.
+    /// The record is incomplete. If the fields of its header are complete, the variant holds them, and that part of the
+    /// record's data which is available.
     More(Option<(Fields<'a>, &'a [u8])>),
     Bad,
 }
@@ -130,7 +130,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Splits bytes with a length prefix from the rest.
+/// Splits off the bytes that a length prefix announces. Returns these bytes, and the rest after them.
 fn sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (len, rest) = bytes.split_first_chunk()?;
     rest.split_at_checked(usize::try_from(u32::from_le_bytes(*len)).ok()?)
@@ -146,8 +146,8 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
-    // In a damaged file the lengths may be arbitrary. A field name must follow, and begins with a lower-case letter.
-    // This check detects most wrong lengths.
+    // In a damaged file the lengths may be arbitrary. After the lengths, a field name must follow, which begins with a
+    // lower-case letter. Most wrong lengths fail this check.
     if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
         return Err(Stop::Bad);
     }
@@ -197,10 +197,11 @@ impl Format for Bag {
             Err(Stop::Bad) => Step::Lost(1, NO_RECORD),
             Err(Stop::More(None)) if was_astray => {
                 self.astray = true;
-                // After damage a long header is probably not a header, but only the end of the file shows that.
+                // After damage, a header that seems incomplete is probably no header at all. This is certain only at
+                // the end of the file.
                 if end { Step::Lost(1, NO_RECORD) } else { Step::More }
             }
-            // A chunk that is cut off by the end of the file may still contain whole messages.
+            // Even if the end of the file cuts off a chunk, the rest of the chunk may contain whole messages.
             Err(Stop::More(Some((fields, data)))) if end && fields.u8(b"op") == Some(5) => {
                 match fields.get(b"compression") {
                     Some(packing) => self.open(fields, data, packing, front.len(), true),
@@ -306,7 +307,7 @@ impl Bag {
             3 => self.stated = Some(Self::bag_header(fields)?),
             5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
             7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
-            // Records of an index hold no messages, and records of unknown kinds may be ignored.
+            // Other records are ignored. They belong to an index, which holds no messages, or are of an unknown kind.
             _ => (),
         }
         Some(Accepted::Read)
@@ -376,7 +377,8 @@ impl Bag {
     }
 }
 
-/// Maximum unpacked size of a chunk, bytes. Recorders make chunks of less than a megabyte plus one message.
+/// Maximum unpacked size of a chunk, bytes. Recorders make far smaller chunks, of less than a megabyte plus one
+/// message.
 const MOST_UNPACKED: usize = 64 << 20;
 
 /// Result of unpacking a chunk of the bag.
@@ -392,7 +394,7 @@ enum Unpacked {
 
 /// Unpacks a chunk with the stated compression and size. `cut` means that the file ends within the chunk.
 ///
-/// Source: ROS wiki, "Bags/Format/2.0". Compressions are none, bz2, and lz4 as roslz4 writes it, in LZ4 frames.
+/// Source: ROS wiki, "Bags/Format/2.0". The compressions are none, bz2 and lz4. roslz4 writes lz4 as LZ4 frames.
 fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
     let Some(size) = usize::try_from(size).ok().filter(|size| *size <= MOST_UNPACKED) else {
         return Unpacked::Bad("chunks that would unpack to more than 64 MiB");

@@ -1,14 +1,14 @@
 //! Compares the timestamps in message headers with the times at which the messages were recorded.
 
-/// Lead of a header's timestamp over the record time, ns, above which the timestamp must come from another clock.
+/// If a header's timestamp is later than the record time by more than this, it must come from another clock, ns.
 const AHEAD_NS: i64 = 5_000_000;
 /// Maximum recording delay of messages from a computer with a synchronised clock, ns.
 const LATE_NS: i64 = 1_000_000_000;
 /// Maximum variation of the recording delay, ns. A larger variation means late messages or another clock.
 const VARIES_NS: i64 = 500_000_000;
-/// Offset between two clocks above which their epochs differ, ns. Smaller offsets are clock errors.
+/// If two clocks differ by more than this, they have different epochs, ns. Smaller offsets are clock errors.
 const OTHER_BASE_NS: i64 = 3_600_000_000_000;
-/// Deviation from the present clock offset above which a new offset begins, ns.
+/// If a header's timestamp deviates from the present clock offset by more than this, a new offset begins, ns.
 const ASTRAY_NS: i64 = 10_000_000_000;
 
 /// Choice of the time that applies to a message's values.
@@ -28,12 +28,12 @@ pub(super) struct Clocks {
     messages: u64,
     /// Number of messages whose header has a zero timestamp.
     unstamped: u64,
-    /// Least and greatest difference of record time minus header timestamp, ns.
+    /// Least and greatest value of the record time minus the header's timestamp, ns.
     lag_ns: Option<(i64, i64)>,
     before_ns: u64,
     backwards: u64,
-    /// Offset added to header timestamps, ns: 0 if the clocks agree within 1 s; `None` if no header timestamp has been
-    /// used.
+    /// Offset that is added to header timestamps, ns. It is 0 if the clocks agree within 1 s, and `None` before the
+    /// first header timestamp is used.
     moved_ns: Option<i64>,
     anew: u64,
 }
@@ -123,7 +123,7 @@ impl Clocks {
 
 fn difference(one_ns: u64, other_ns: u64) -> i64 {
     let difference = i128::from(one_ns) - i128::from(other_ns);
-    // Half the range of i64, so that the difference of two clock offsets still fits.
+    // The limit is half the range of i64, so that the difference of two clock offsets fits into an i64.
     let most = i128::from(i64::MAX / 2);
     i64::try_from(difference.clamp(-most, most)).unwrap_or_default()
 }

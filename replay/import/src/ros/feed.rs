@@ -12,7 +12,7 @@ use super::wire::Encoding;
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::entry::{Entry, ImportReport};
 
-/// Settings of a topic in the mapping, apart from its sensor.
+/// Settings that the mapping gives for a topic, apart from its sensor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Manner {
     pub(super) base: Base,
@@ -39,11 +39,11 @@ pub(super) struct Feed {
     other_frames: u64,
     /// Sum of the specific force along z over all messages, m/s^2.
     upward_mps2: f64,
-    /// Highest pressure in the messages so far, Pa.
+    /// Highest pressure in all messages so far, Pa.
     highest_pa: f64,
     /// Number of lost messages, points or ranges, by reason.
     lost: BTreeMap<&'static str, u64>,
-    /// Number of remarks that aren't losses, by text.
+    /// Number of messages or points with a remark that isn't a loss, by the remark's text.
     noted: BTreeMap<&'static str, u64>,
 }
 
@@ -115,7 +115,7 @@ impl Feed {
         self.say((at_ns, stamped), &value, out)
     }
 
-    /// Converts an inertial message. Parts may be missing, but not all of them.
+    /// Converts an inertial message. Attitude, turn rate or force may be missing, but not all three.
     fn inertia(
         &mut self,
         wxyz: Option<[f64; 4]>,
@@ -152,7 +152,8 @@ impl Feed {
 
     /// Converts the beams of a message.
     ///
-    /// The message is recorded after the last beam was measured. Its timestamp is the time of the first beam.
+    /// Beam times count from the first beam if the time comes from the message's header. Otherwise the last beam is
+    /// taken as measured at the time of recording.
     fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let valid = beams.valid(self.manner.plane)?;
         for (count, what) in [(valid.nowhere, "points without a position: no echo, at an unknown angle")] {
@@ -187,8 +188,8 @@ impl Feed {
 
     /// Encodes a value as entries.
     ///
-    /// If the header gives the value's time, the receive time is later by the sensor's own delays. Otherwise the
-    /// receive time is the time of recording.
+    /// If the value's time comes from a message's header, the receive time is later by the sensor's own delays.
+    /// Otherwise the receive time is the given time.
     fn say(
         &mut self,
         (at_ns, stamped): (u64, bool),
@@ -240,8 +241,7 @@ impl Feed {
     }
 }
 
-/// Returns the unit in which losses of a reason are counted: messages, unless the reason itself begins with another
-/// unit.
+/// Returns "messages " as the unit in which losses are counted. Empty if the reason `why` begins with its own unit.
 fn messages(why: &str) -> &'static str {
     if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
 }

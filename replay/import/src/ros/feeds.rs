@@ -33,7 +33,7 @@ impl Feeds {
         &self.matched
     }
 
-    /// Returns the greatest age that values may have when their message is recorded, ns.
+    /// Returns how old values can be when their message is recorded, ns.
     ///
     /// One message may contain the beams of a head's whole turn.
     pub(super) fn reach_ns(&self) -> u64 {
@@ -55,7 +55,7 @@ impl Feeds {
         let feed = self.by_topic.get_mut(&topic.name);
         match feed.filter(|feed| topic.known.as_ref().is_ok_and(|known| feed.is_of(*known))) {
             Some(feed) => feed.take(encoding, record_ns, bytes, out),
-            // A message without a feed becomes an empty entry, which counts as belonging to no sensor.
+            // A message for no sensor becomes an empty entry, so that the import counts it.
             None => out.push(Entry { stamp_ns: record_ns, stream: String::new(), bytes: Vec::new() }),
         }
     }

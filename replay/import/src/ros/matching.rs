@@ -1,4 +1,4 @@
-//! Assigns topics to sensors, either by a mapping, or automatically where only one assignment is possible.
+//! Assigns topics to sensors, either by a mapping, or automatically if only one assignment is possible.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -51,7 +51,7 @@ impl Feeds {
     ///
     /// A sensor and a topic are matched if each is the only one for its kind of measurement.
     ///
-    /// Errors: a kind has several topics or sensors, or no kind has a topic and a sensor.
+    /// Errors: a kind of measurement has several topics or sensors, or no kind has both a topic and a sensor.
     pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
         let mut feeds = Self::default();
         for sense in SENSES {
@@ -88,7 +88,7 @@ impl Feeds {
         Ok(feeds)
     }
 
-    /// Assigns topics by a mapping alone.
+    /// Assigns topics to sensors only as a mapping says.
     ///
     /// Errors: a key has an invalid value, a sensor or topic is unknown, or a topic doesn't fit its sensor's kind.
     pub fn mapped(

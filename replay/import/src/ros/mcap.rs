@@ -43,7 +43,7 @@ impl<R: Read + Seek> Mcap<R> {
     pub fn open(name: &str, mut file: R) -> Result<Self, ImportError> {
         let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
         let bytes = file.seek(std::io::SeekFrom::End(0)).map_err(failed)?;
-        // If reading the summary fails here, the log reader reports what is unreadable.
+        // An unreadable summary is no error here, because the log reader below reports what is unreadable.
         let stated = stated_messages(&mut file, bytes).ok().flatten();
         let reader = LogReader::new(file, name.to_owned())?;
         if reader.header().metadata.contains_key(FORMAT_KEY) {
@@ -149,7 +149,8 @@ impl<R: Read + Seek> Source for Mcap<R> {
     }
 }
 
-/// Opcodes of the records that end a file. Source: MCAP format specification, "Footer" and "Statistics".
+/// Opcodes of two records near the end of a file: statistics and footer. Source: MCAP format specification, "Footer"
+/// and "Statistics".
 const STATISTICS: u8 = 0x0B;
 const FOOTER: u8 = 0x02;
 const FOOTER_BYTES: u64 = 20;
@@ -157,7 +158,8 @@ const FOOTER_BYTES: u64 = 20;
 const HEAD_BYTES: u64 = 9;
 /// Length of the footer record and the closing magic, bytes.
 const END_BYTES: u64 = HEAD_BYTES + FOOTER_BYTES + 8;
-/// Maximum number of records skipped in a summary. A recording of a day has some thousands of chunks.
+/// Maximum number of records skipped in a summary. The limit is ample, because the recording of a day has only some
+/// thousands of chunks.
 const MOST_RECORDS: usize = 100_000;
 
 /// Returns the number of messages that the summary of an MCAP file states. `bytes` is the file's length.

@@ -58,8 +58,7 @@ impl Type {
         TYPES.iter().find(|(_, known, _)| *known == name).map(|(known, ..)| *known)
     }
 
-    /// Whether a ROS 1 definition with this MD5 is the expected one. `*` stands for an unknown MD5, which is
-    /// accepted.
+    /// Whether `md5` is the MD5 of this type's definition in ROS 1. `*` stands for an unknown MD5, which is accepted.
     pub(super) fn is_defined_as(self, md5: &str) -> bool {
         md5 == "*" || TYPES.iter().any(|(known, _, known_md5)| *known == self && *known_md5 == md5)
     }
@@ -76,8 +75,8 @@ impl Type {
         }
     }
 
-    /// Whether the message type states what was measured. A bare number may be anything.
-    pub(super) fn is_self_describing(self) -> bool {
+    /// Whether the message type states what was measured. A bare number doesn't, because it may be anything.
+    pub(super) fn is_telling(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
 }
@@ -156,7 +155,7 @@ fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let force: [f64; 3] = wire.doubles()?;
     let force_mps2 = is_known(wire.doubles()?).then_some(force);
     let whole = |values: &[f64]| values.iter().all(|value| value.is_finite());
-    // Senders without an orientation leave its default, which is all zeros.
+    // Senders that know no orientation leave the field at its default, which is all zeros.
     let wxyz = wxyz.filter(|wxyz| whole(wxyz) && wxyz.iter().any(|part| part.abs() > 0.0));
     Some(Values::Inertial {
         wxyz,
@@ -172,7 +171,7 @@ fn is_minus_one(value: f64) -> bool {
 fn range(wire: &mut Wire<'_>) -> Option<Values> {
     let _radiation = wire.u8()?;
     let [_field_of_view, least, most, range] = wire.singles()?;
-    // Newer definitions of this message append a variance.
+    // Newer definitions of this message end with a variance, which isn't used.
     if !wire.is_done() {
         wire.f32()?;
     }

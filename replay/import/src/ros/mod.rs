@@ -1,7 +1,7 @@
 //! Recordings of ROS. Messages of known types become the bytes that the vehicle file's sensors would have sent.
 //!
 //! [`bag`] reads bags of ROS 1, [`mcap`] reads recordings of ROS 2. Both pass messages to [`Feeds`], which assigns
-//! topics to sensors by a mapping, or where only one assignment is possible.
+//! topics to sensors. The assignment comes from a mapping, or is automatic if only one is possible.
 
 pub mod bag;
 mod clocks;

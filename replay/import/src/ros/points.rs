@@ -1,10 +1,10 @@
 //! Converts scans and point clouds of a profiling head to beams: angle, range and time.
 //!
-//! The angles of a scan are about its own z axis, from x towards y. This axis is the head's x. The scan's x is the
-//! head's zero angle (down, -z), and the scan's y is the head's y.
+//! The angles of a scan are about the scan's z axis, from x towards y. The scan's z axis is the head's x axis. The
+//! scan's x axis points where the head's angle is zero (down, -z), and the scan's y axis is the head's y axis.
 //!
-//! The points of a cloud are in the head's own frame, with the beam in the plane of y and z. With `xy` in the mapping
-//! they are in the frame of a scan.
+//! The points of a cloud are in the head's own frame, so that the beam turns in the plane of y and z. If the mapping
+//! says `xy`, the points are in the frame of a scan instead.
 
 use headrace_geometry::math;
 
@@ -14,7 +14,7 @@ use super::wire::Wire;
 const MOST_BEAMS: usize = 1 << 16;
 /// Maximum time between a beam and its message's timestamp, s.
 const LONGEST_S: f64 = 120.0;
-/// Maximum distance of a point from the beam's plane, as a share of the point's range. Farther points are dropped and
+/// Maximum distance of a point from the beam's plane, as a share of the point's range. Other points are dropped and
 /// counted.
 const OFF_PLANE: f64 = 0.1;
 
@@ -39,7 +39,7 @@ pub(super) struct Beam {
     pub(super) after_s: f64,
 }
 
-/// Plane of a message's axes in which the head's beam rotates.
+/// Plane in which the head's beam rotates, by the axes of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Plane {
     /// Plane of y and z, in the head's own axes.
@@ -64,7 +64,7 @@ pub(super) struct ValidBeams {
     pub(super) beams: Vec<Beam>,
     /// Number of points that are too far from the plane in which the beam rotates.
     pub(super) off_plane: u64,
-    /// Number of points that are NaN or at the origin, which means no echo at an unknown angle.
+    /// Number of points that are NaN or at the origin. Such a point means that there was no echo, at an unknown angle.
     pub(super) nowhere: u64,
 }
 
@@ -123,7 +123,8 @@ pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
     let _strengths = wire.single_sequence()?;
     let beam = |(number, range): (u32, &f32)| {
         let number = f64::from(number);
-        // A scan with a single beam may have any step, even an infinite one, which must not be multiplied by zero.
+        // A scan with a single beam may state any step between beams. The step may even be infinite, so it must not be
+        // multiplied by zero.
         let turned = |each: f64| if number > 0.0 { number * each } else { 0.0 };
         Beam {
             angle_rad: first + turned(step),
@@ -283,9 +284,9 @@ mod tests {
             let beam = valid.beams[0];
             assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
             assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
-            // The same point in the axes of a scanner: x is the head's zero angle, and y is the head's y.
-            let valid = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).valid(Plane::Xy).unwrap();
-            assert!((valid.beams[0].angle_rad - angle_rad).abs() < 1e-12);
+            // The same point in the axes of a scanner: x points where the head's angle is zero, and y is the head's y.
+            let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
+            assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
         }
     }
 

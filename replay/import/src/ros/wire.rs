@@ -1,7 +1,8 @@
 //! Parses the two serialisations of ROS from untrusted bytes.
 //!
 //! Sources: ROS wiki, "Message serialization", for ROS 1: little-endian and packed. OMG DDS-XTypes 1.3, 7.4.3, plain
-//! CDR, for ROS 2: numbers are aligned to their size, counted from the end of four bytes that state the byte order.
+//! CDR, for ROS 2: four bytes state the byte order, and then numbers are aligned to their size, counted from the end of
+//! these bytes.
 
 /// Serialisation of the messages in a ROS recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +25,7 @@ pub(super) struct Wire<'a> {
     big_endian: bool,
 }
 
-/// Header of a message, which has a timestamp.
+/// Header of a message, with the message's timestamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
     /// Timestamp, nanoseconds on the sender's clock, which may have any epoch.
@@ -71,8 +72,8 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// Reads the number of elements in a sequence. Returns `None` if that many elements, of at least `element_bytes`
-    /// each, can't fit into the message.
+    /// Reads the number of elements in a sequence. Each element has at least `element_bytes` bytes. Returns `None` if
+    /// the message is too short for so many elements.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);

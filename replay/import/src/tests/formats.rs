@@ -14,8 +14,8 @@ use crate::ping::PingFormat;
 use crate::tlog::TlogFormat;
 use crate::{Entry, Format, Step};
 
-/// Splits a file by a format. Returns the entries, the losses with their reasons, and the number of bytes left at the
-/// end.
+/// Splits a file by a format. Returns the entries, the lengths of the losses with their reasons, and the number of
+/// bytes left at the end of the file.
 fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {
     let (mut entries, mut lost) = (Vec::new(), Vec::new());
     while !file.is_empty() {
@@ -35,7 +35,7 @@ fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'s
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // The last field of the test frame isn't zero, so that the frame has all 28 bytes: MAVLink drops trailing zeros.
+    // MAVLink drops trailing zeros of a frame. The last field isn't zero, so that the frame has all its 28 bytes.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()

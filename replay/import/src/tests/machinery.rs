@@ -13,7 +13,7 @@ use crate::*;
 
 /// A test format with entries of eight bytes: u32 timestamp in ms, 'E', stream, two bytes.
 ///
-/// An entry with 'X' in place of 'E' is invalid.
+/// An entry that has 'X' in place of 'E' is invalid.
 struct Eights;
 
 impl Format for Eights {
@@ -44,8 +44,8 @@ fn taker(source: u16, stream: &str) -> Taker {
     Taker { source, stream: stream.to_owned(), driver: None }
 }
 
-/// Imports a file. Returns the result, and for each message its source, its time in ms after the beginning, and its
-/// last byte.
+/// Imports a file. Returns the import's result. Also returns each message's source, its time in ms after the log's
+/// start, and its last byte.
 fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
     let import = open(file, Box::new(Eights)).unwrap();
     let path = std::env::temp_dir().join(format!(

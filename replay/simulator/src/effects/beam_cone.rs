@@ -58,7 +58,7 @@ const FORMS: [(&str, Form); 3] = [("first", Form::First), ("mean", Form::Mean), 
 struct Parameters {
     rays: usize,
     width_deg: Option<f64>,
-    /// Frequency that determines the width of a head's beam, kHz; only for heads.
+    /// Frequency that determines the width of a head's beam, kHz. Echosounders have none.
     frequency_khz: Option<f64>,
     form: Form,
     bin_m: Option<f64>,
@@ -72,7 +72,7 @@ pub struct Cone {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConeRay {
-    /// Direction of the ray, in components: along the beam's axis, along the tunnel, and perpendicular to both.
+    /// Components of the ray's direction: along the beam's axis, along the tunnel, and perpendicular to both.
     parts: [f64; 3],
     /// Strength of the ray relative to the beam's axis.
     strength: f64,
@@ -83,15 +83,15 @@ struct BeamCone {
     cone: Cone,
     form: Form,
     bins: Bins,
-    /// Hits of the rays within the cone of the current ping.
+    /// Hits of all rays of the current ping's cone.
     hits: Vec<Option<Hit>>,
 }
 
 impl Cone {
-    /// Creates a cone of `width_rad` with this many rays.
+    /// Creates a cone with a full width of `width_rad` and `rays` rays.
     ///
     /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two rays are at the
-    /// cone's edges in the plane of turning, where an oblique wall is nearest and farthest.
+    /// cone's edges in the plane of turning, because an oblique wall is nearest and farthest there.
     pub fn new(width_rad: f64, rays: usize) -> Self {
         let last = rays.max(2) - 1;
         let ray = |number: usize| {
@@ -111,12 +111,12 @@ impl Cone {
 
     /// Components of the rays' directions along the beam's axis, along the tunnel, and perpendicular to both.
     ///
-    /// The axis comes first. The edges in the plane of turning come last.
+    /// The ray on the axis comes first. The two rays at the edges of the cone, in the plane of turning, come last.
     pub fn parts(&self) -> impl Iterator<Item = [f64; 3]> {
         self.rays.iter().map(|ray| ray.parts)
     }
 
-    /// Hits of the cone's rays within `far_m`. The hit of the axis comes first.
+    /// Hits of the cone's rays within `far_m`. The hit of the ray on the axis comes first.
     pub(crate) fn hits<'a>(
         &'a self,
         environment: &'a Environment,
@@ -209,7 +209,7 @@ impl BeamCone {
         }
     }
 
-    /// Range of the surface as Jorge et al. 2021 define it.
+    /// Range of the wall's surface as Jorge et al. 2021 define it, m.
     ///
     /// Each ray's echo, weighted by beam strength and incidence, is shared between the two nearest range bins. The
     /// surface is in the bin with the largest sum.
@@ -239,7 +239,7 @@ fn look_in_cones(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_
         for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {
             beam.hits.clear();
             beam.hits.extend(beam.cone.hits(&scenery.environment, ray, reach.0));
-            // The hit in the ground truth is the hit of the beam's axis.
+            // The ground truth records the hit of the beam's axis.
             ray.hit = beam.hits.first().copied().flatten();
             sounding.range_m = beam.range_m(ray);
         }
@@ -252,7 +252,7 @@ fn look_in_cones(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_
 /// 881L sensor to determine where the tunnel surface is". The head's picture is a grid of angle and range. An echo
 /// between grid points is shared linearly among the neighbouring points. In angle, the share is the beam strength,
 /// which falls linearly from the axis. The surface is the ridge of the picture. If the beam is oblique to the wall, its
-/// echo is long and the ridge is wide and low, as that paper found next to corners.
+/// echo is long and the ridge is wide and low, as the paper reports for places next to corners.
 #[derive(Debug, Clone, PartialEq)]
 struct Bins {
     width_m: f64,
@@ -283,8 +283,8 @@ impl Bins {
 
     /// Returns the range of the strongest echo, m, and empties the bins.
     ///
-    /// The range is the centroid of the strongest bin and its two neighbours. Among equally strong bins, the nearest
-    /// counts. Returns `None` if the bins are empty.
+    /// The range is the centroid of the strongest bin and its two neighbours. If several bins are equally strong, the
+    /// nearest of them is taken. Returns `None` if the bins are empty.
     fn take_surface_m(&mut self) -> Option<f64> {
         let (from, to) = std::mem::replace(&mut self.filled, (usize::MAX, 0));
         let filled = self.strengths.get_mut(from..to)?;

@@ -3,8 +3,8 @@
 use headrace_geometry::math::{self, TAU};
 use headrace_sensor::measurement::Sounding;
 
-/// Offset of a head from its commanded angle. Hosts command steps rather than angles, so the head never makes up for a
-/// missed step.
+/// Offset of a head from its commanded angle. Hosts command steps rather than angles, so a missed step leaves the head
+/// permanently behind.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Behind {
     commanded_rad: Option<f64>,

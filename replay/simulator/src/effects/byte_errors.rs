@@ -30,8 +30,8 @@ struct Parameters {
     inserted: f64,
 }
 
-/// Selects the affected bytes. All bytes have the same probability. One random number therefore gives the number of
-/// bytes to the next affected one.
+/// Selects the affected bytes. All bytes have the same probability. A single random number therefore tells how many
+/// bytes pass until the next affected byte.
 struct Hits {
     stream: Stream,
     kind: u64,
@@ -110,8 +110,8 @@ impl Hits {
         math::floor_to_i64(math::ln(u) / self.ln_missed).unsigned_abs()
     }
 
-    /// Returns a random number between 0 and 1 if this byte is affected; `None` otherwise. Must be called for the bytes
-    /// in order.
+    /// Returns a random number between 0 and 1 if this byte is affected; `None` otherwise. Must be called once for each
+    /// byte, in order.
     fn hit(&mut self, byte: u64) -> Option<f64> {
         if byte < self.next {
             return None;
@@ -134,8 +134,8 @@ impl ByteErrors {
         }
     }
 
-    /// Damages the messages on the line. A message keeps its index even if it loses all its bytes; the outbox drops
-    /// empty messages.
+    /// Damages the messages on the line. A message keeps its index even if it loses all its bytes, because the outbox
+    /// drops empty messages later.
     fn damage(&mut self, line: &mut Line) {
         let mut rest = std::mem::take(&mut self.rest);
         rest.clear();
@@ -169,7 +169,7 @@ impl ByteErrors {
     }
 }
 
-/// Maps a number in (0, 1) to an integer in [0, `count`).
+/// Maps `which`, a number in (0, 1), to an integer in [0, `count`).
 fn below(count: f64, which: f64) -> u8 {
     u8::try_from(math::floor_to_i64(count * which)).unwrap_or_default()
 }

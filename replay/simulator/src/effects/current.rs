@@ -13,9 +13,10 @@ use crate::stretch::Stretch;
 use crate::trajectory::{Flow, Ground, Knots, Trajectory};
 
 const NAME: &str = "current";
-/// Number of random speeds per correlation time of the gusts.
+/// Number of random speeds drawn in each correlation time of the gusts.
 const STEPS: f64 = 8.0;
-/// Largest distance by which a current may carry the vehicle out of the tunnel, m. Trajectories have the same limit.
+/// Largest distance beyond the tunnel's ends to which a current may carry the vehicle, m. Trajectories have this limit
+/// too.
 const OUTSIDE_M: f64 = 20.0;
 /// Interval at which the trajectory is checked against [`OUTSIDE_M`], s.
 const LOOK_S: f64 = 5.0;
@@ -162,7 +163,8 @@ mod tests {
         }
     }
 
-    /// Checks the standard deviation of the gusts' speed, the correlation after `gust_s`, and the displacement.
+    /// Checks the standard deviation of the gusts' speed, their correlation after `gust_s`, and the vehicle's
+    /// displacement by gusts.
     ///
     /// For times t well above the correlation time T, the variance of the displacement is 2 sd^2 T t.
     #[test]
@@ -189,8 +191,8 @@ mod tests {
         assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
         let correlation = lagged / speeds;
         assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
-        // Each random speed lasts for one step. The expected variance is therefore computed for the sum of a discrete
-        // process.
+        // Each random speed lasts for one step. The expected variance is therefore that of a sum of discrete steps, not
+        // of an integral.
         let kept = math::exp(-1.0 / STEPS);
         let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
         assert!((ways / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / f64::from(runs)), "{ways} {wanted}");

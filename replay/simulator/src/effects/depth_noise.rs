@@ -41,7 +41,7 @@ struct DepthNoise {
     parameters: Parameters,
     stream: Stream,
     offset_pa: f64,
-    /// Latest value of the drift, in standard deviations. The next field is the time of that value.
+    /// Latest value of the drift, in standard deviations. The next field is the time at which the drift had this value.
     drift: f64,
     before: Option<MonoNs>,
 }
@@ -91,7 +91,7 @@ fn disturb(mut sensors: Query<'_, '_, (&mut Samples<Pressure>, &mut DepthNoise)>
 }
 
 impl DepthNoise {
-    /// Error of one pressure sample, Pa. Must be called once per step, in order.
+    /// Error of one pressure sample, Pa. Must be called once for each `step`, in order.
     fn error_pa(&mut self, step: u64, at: MonoNs) -> f64 {
         let Parameters { noise_pa, drift_pa, tau_s, .. } = self.parameters;
         let [white, wander] = self.stream.at(step).normal();
@@ -138,12 +138,13 @@ mod tests {
             let pairs = drift.iter().zip(drift.iter().skip(lag));
             let found = pairs.map(|(a, b)| (b - a) * (b - a)).sum::<f64>() / (drift.len() - lag) as f64;
             let wanted = 2e4 * (1.0 - math::exp(-(lag as f64) * 0.1 / 20.0));
-            // Stretches of about two correlation times are independent. The series has 1,000 of them.
+            // Stretches of the series that are two correlation times long are nearly independent. The series has 1,000
+            // such stretches.
             assert!((found / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / 1000.0), "{lag}: {found} {wanted}");
         }
     }
 
-    /// The drift's increments are independent of the noise in these samples.
+    /// In these samples, the changes of the drift must be independent of the noise.
     #[test]
     fn depth_noise_and_drift_are_independent() {
         let stream = Stream::new(3, "depth_noise", "depth");
@@ -173,7 +174,7 @@ mod tests {
         let squares = offsets.iter().map(|pa| pa * pa / 1e6);
         let (second, fourth) = (squares.clone().sum::<f64>() / n, squares.map(|of| of * of).sum::<f64>() / n);
         assert!((second - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{second}");
-        // For standard normal values, the fourth moment is 3. The variance of its estimate from n values is 96 / n.
+        // Standard normal values have a fourth moment of 3. Its estimate from n values has a variance of 96 / n.
         assert!((fourth - 3.0).abs() < 5.0 * math::sqrt(96.0 / n) && fourth > 1.5, "{fourth}");
     }
 

@@ -16,8 +16,8 @@ use crate::stages::Stage;
 
 /// A depth sensor reports the depth below the surface rounded to the nearest step.
 ///
-/// `quantum_m` is the step in metres of the site's water, 0.031 by default: a 32,768th of 100 bar. The device's wire
-/// format adds its own quantisation.
+/// `quantum_m` is the step in metres of the site's water, 0.031 by default. The default is a 32,768th of a sensor's
+/// range of 100 bar. The device's wire format adds its own quantisation.
 pub(super) struct DepthStepsKind;
 
 #[derive(Debug, Clone, Copy)]

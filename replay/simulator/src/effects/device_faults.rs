@@ -41,7 +41,7 @@ enum Fault {
     Babble,
 }
 
-/// Time span of a fault. Its end is excluded.
+/// Time span of a fault. The time `to` is no longer part of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Span {
     from: MonoNs,
@@ -137,7 +137,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Makes a sensor repeat the value that it had before the fault.
+/// Makes a sensor repeat the last value that it had before the fault.
 #[derive(Component)]
 struct Stuck<M: Measurement> {
     span: Span,
@@ -150,9 +150,9 @@ impl<M: Measurement> Stuck<M> {
     }
 }
 
-/// A measurement whose value can be replaced by that of another measurement.
+/// A measurement whose value can be replaced by another measurement's value.
 trait Sticking: Measurement {
-    /// Returns this measurement with the value of `other`. Time and head angles are unchanged.
+    /// Returns this measurement with the value of `other`. This measurement's own time and head angles are kept.
     #[must_use]
     fn valued(self, other: &Self) -> Self;
 }
@@ -187,7 +187,8 @@ impl Sticking for Payout {
     }
 }
 
-/// Repeats the last value before the fault. A device that is stuck from the dive's start repeats its first value.
+/// Makes stuck devices repeat their last value before the fault. A device that is stuck from the dive's start repeats
+/// its first value.
 fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &mut Stuck<M>)>) {
     for (mut samples, mut stuck) in &mut devices {
         for measured in &mut samples.list {
@@ -212,7 +213,7 @@ fn jump_soundings(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Jumped, Op
     for (mut samples, Jumped { size, span }, echosounder) in &mut sonars {
         for sounding in samples.list.iter_mut().filter(|sounding| span.holds(sounding.at)) {
             if echosounder.is_some() {
-                // A range with an error is never negative.
+                // An added negative error must not make a range negative.
                 sounding.range_m = sounding.range_m.map(|range_m| (range_m + size).max(0.0));
             } else {
                 sounding.reported_rad += size.to_radians();

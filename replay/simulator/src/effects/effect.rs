@@ -6,7 +6,7 @@ use crate::builder::{Builder, Programs};
 use crate::error::SceneError;
 use crate::facts::Facts;
 
-/// A kind of effect. Scenes identify it by its name.
+/// A kind of effect, such as `beam_cone`. Scenes identify a kind by its name.
 pub trait EffectKind: Sync {
     /// Name of the effect: `[effects.NAME]`.
     fn name(&self) -> &'static str;
@@ -14,8 +14,8 @@ pub trait EffectKind: Sync {
     /// One-line summary of the effect.
     fn summary(&self) -> &'static str;
 
-    /// Reads the effect's tables. A scene has several `[[effects.NAME]]` tables if the keys differ by sensor or
-    /// stretch.
+    /// Reads the effect's tables. A scene has several `[[effects.NAME]]` tables if its keys differ between sensors or
+    /// between stretches of the tunnel.
     ///
     /// Errors: a key is missing, unknown or out of range; a named sensor doesn't exist.
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError>;

@@ -13,9 +13,9 @@ pub(super) fn dot(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
 
 /// Two unit vectors perpendicular to a beam's direction and to each other.
 ///
-/// The first vector is as nearly along the tunnel as possible. The second is across the tunnel, in the plane of turning
-/// of a head whose axis is along the tunnel. For a beam along the tunnel, the first vector is as nearly upwards as
-/// possible.
+/// The first vector is as nearly along the tunnel as possible. The second vector is across the tunnel. It lies in the
+/// plane in which a head turns whose axis is along the tunnel. For a beam along the tunnel, the first vector is as
+/// nearly upwards as possible.
 pub(super) fn square_to(direction: Vec3<Tunnel>) -> [Vec3<Tunnel>; 2] {
     let along = direction.x().abs() > ALONG;
     let towards = if along { Vec3::new(0.0, 0.0, 1.0) } else { Vec3::new(1.0, 0.0, 0.0) };

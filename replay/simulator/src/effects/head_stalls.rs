@@ -18,11 +18,11 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Interval between the possible starts of stalls.
+/// Interval between the times at which a stall can start.
 const STEP: DurNs = DurNs(100_000_000);
 
-/// From time to time a head stalls and pings repeatedly at one angle. It then continues from that angle, so it remains
-/// offset from its commands.
+/// From time to time a head stalls and pings repeatedly at one angle. Later it continues from the same angle, so it
+/// stays behind the commanded angles.
 ///
 /// Stalls begin `per_hour` times per hour, with equal probability at any tenth of a second. The duration is uniformly
 /// distributed over `seconds = [least, most]`, by default 2 to 20. A stall that begins during another one may extend
@@ -89,7 +89,7 @@ impl Stalls {
         Self { stream, chance, seconds: parameters.seconds, next_step: 0, until: START }
     }
 
-    /// Whether the head stalls at this time. Must be called in order of time.
+    /// Whether the head is stalled at this time. The times of successive calls must not decrease.
     fn at(&mut self, at: MonoNs) -> bool {
         let step = at.since(START).0.max(0).unsigned_abs() / STEP.0.unsigned_abs();
         while self.next_step <= step {
@@ -138,7 +138,7 @@ mod tests {
         }
         let free = math::exp(-6.0 / 60.0);
         let share = f64::from(still) / f64::from(count);
-        // The tolerance is that of a mean over 12,000 stalls of varying length.
+        // The tolerance is that of a mean over 12,000 stalls whose lengths vary.
         assert!((share - (1.0 - free)).abs() < 5.0 * 0.095 / math::sqrt(12_000.0) * 1.5, "{share}");
         let wanted = f64::from(hours) * 60.0 * free;
         assert!((f64::from(begun) - wanted).abs() < 5.0 * math::sqrt(wanted), "{begun} {wanted}");

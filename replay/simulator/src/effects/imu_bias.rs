@@ -20,7 +20,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step number that is reserved for drawing the constant parts. No sample has this number.
+/// Step number that is reserved for drawing the constant biases. No sample has this number.
 const CONSTANT: u64 = u64::MAX;
 /// Block of random numbers for the tilt, after the blocks for the biases.
 const TILT: u64 = 3;
@@ -58,13 +58,13 @@ struct ImuBias {
     parameters: Parameters,
     stream: Stream,
     constant: [f64; 6],
-    /// Latest varying biases of turn rates, then of forces, in standard deviations.
+    /// Latest varying biases, in standard deviations: three of turn rates, then three of forces.
     wandering: [f64; 6],
     /// Latest tilt of the attitude in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Previous sample interval, with two factors for the biases and two for the tilt: the correlation over the
-    /// interval, and the weight of a new random number.
+    /// Previous sample interval, with two factors for the biases and the same two for the tilt. The factors are the
+    /// correlation over the interval and the weight of a new random number.
     ///
     /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),
@@ -225,8 +225,8 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Over many seeds, the variance at the first sample and much later is as given, and the correlation between the
-    /// two samples is exp(-t / tau).
+    /// Over many seeds, the variance at the first sample and at a much later one equals the given one, and the
+    /// correlation between the two samples is exp(-t / tau).
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);
@@ -252,8 +252,8 @@ mod tests {
         assert!((both / n - wanted).abs() < 5.0 * math::sqrt((1.0 + wanted * wanted) / n), "{}", both / n);
     }
 
-    /// The process doesn't depend on the sample rate: with twice as many samples, the change over a time has the same
-    /// variance.
+    /// The bias doesn't depend on the sample rate. With twice as many samples per second, its change over a given time
+    /// has the same variance.
     #[test]
     fn bias_change_depends_on_time_not_on_sample_count() {
         let change = |millis: i64| {
@@ -307,7 +307,8 @@ mod tests {
             .collect();
         let lag = plain.iter().position(|inertia| inertia.at.since(plain[0].at).0 >= 2_000_000_000).unwrap();
         let wanted = f64::to_radians(0.5) * f64::to_radians(0.5);
-        // For a process with correlation time tau, the samples of t seconds are worth t / (2 tau) independent samples.
+        // For a process with correlation time tau, all samples within a time t carry as much information as t / (2 tau)
+        // independent samples.
         let worth = plain.len() as f64 / lag as f64 / 2.0;
         for axis in 0..2 {
             let product = |lag: usize| {

@@ -92,7 +92,7 @@ fn bump(mut units: Query<'_, '_, (&mut Samples<Inertia>, &ImuBumps)>) {
 }
 
 impl ImuBumps {
-    /// Velocity that bumps give the vehicle between two times, m/s; `None` without a bump.
+    /// Change of the vehicle's velocity by bumps between two times, m/s; `None` without a bump.
     fn gained_mps(&self, [from_s, until_s]: [f64; 2]) -> Option<Vec3<Sensor>> {
         let last = math::floor_to_i64(until_s / SPAN_S);
         let first = math::floor_to_i64((from_s - self.parameters.seconds) / SPAN_S).max(0);
@@ -134,8 +134,8 @@ mod tests {
 
     const KEYS: &str = "[effects.imu_bumps]\nper_hour = 400\nspeed_mps = [0.05, 0.2]\nseconds = 0.3\n";
 
-    /// The bumps, found as the difference of two dives, have the given rate, length and strength. After a bump the
-    /// vehicle has its previous speed.
+    /// Finds the bumps as the difference between a dive with them and a dive without. They have the given rate, length
+    /// and strength. After a bump the vehicle moves as fast as before it.
     #[test]
     fn bumps_have_the_given_rate_length_and_strength() {
         let (plain, with) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
@@ -168,7 +168,7 @@ mod tests {
         assert!(single * 4 > bumps.len() * 3);
     }
 
-    /// Velocities gained in the bumps of `spans` time spans.
+    /// Velocities that the bumps of the first `spans` time spans give the vehicle.
     fn bumps(spans: u64) -> Vec<Vec3<Sensor>> {
         let parameters = Parameters { chance: 0.5, speed_mps: [0.05, 0.2], seconds: 0.3 };
         let bumps = ImuBumps { parameters, stream: Stream::new(5, "imu_bumps", "vehicle") };
@@ -176,7 +176,7 @@ mod tests {
     }
 
     /// Directions are uniformly distributed on a sphere: each component has mean 0 and mean square 1/3. Sizes are
-    /// uniformly distributed from least to most, as mean and variance show.
+    /// uniformly distributed from the least to the most, which is tested by their mean and variance.
     #[test]
     fn bump_directions_and_sizes_are_uniformly_distributed() {
         let bumps = bumps(20_000);

@@ -17,7 +17,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Index of the first block of random numbers for each quantity. Each vector takes two blocks.
+/// Indices of the first block of random numbers for turn rate, force and attitude. Each vector takes two blocks.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;
@@ -140,8 +140,8 @@ mod tests {
                     let n = (means.len() - 1) as f64;
                     let variance = squares / n / 2.0;
                     let wanted = density * density / (period_s * length as f64);
-                    // Two neighbouring differences have one mean in common. The relative variance of the estimate from
-                    // n differences is therefore 3 / n.
+                    // Each difference is between the means of two neighbouring spans, so neighbouring differences share
+                    // one mean. The relative variance of the estimate from n differences is therefore 3 / n.
                     let off = variance / wanted - 1.0;
                     assert!(off.abs() < 5.0 * math::sqrt(3.0 / n), "{length} {axis}: {off}");
                 }

@@ -49,8 +49,8 @@ use pings::{Ping, Pings};
 /// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, in which the planner uses the same two paths.
 pub(super) struct InterferenceKind;
 
-/// Upper bound of the distance between heads, m. Vehicle files place them within 20 m of the body's origin in x, y and
-/// z.
+/// Upper bound of the distance between heads, m. Vehicle files place each head within 20 m of the body's origin in x, y
+/// and z, so two heads are at most 69.3 m apart.
 const APART_M: f64 = 70.0;
 
 #[derive(Debug, Clone, Copy)]
@@ -111,7 +111,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Adds the slice's pings to each head, and drops pings that can no longer be heard.
+/// Adds the pings of the present slice to their heads' lists, and drops old pings that no head can hear any more.
 fn remember(
     slice: Res<'_, Slice>,
     scenery: Res<'_, Scenery>,
@@ -159,7 +159,7 @@ fn listen(
     }
 }
 
-/// A head that listens after its own ping.
+/// A head that listens for echoes after its own ping.
 struct Ear<'a> {
     scenery: &'a Scenery,
     hears: &'a Hears,
@@ -167,7 +167,8 @@ struct Ear<'a> {
     ray: &'a Ray,
     stopped: bool,
     step: u64,
-    /// Least and largest range at which the head takes a sound as its echo, m.
+    /// Least and largest range at which the head takes a sound as its echo, m. Each sound that is taken lowers the
+    /// largest range.
     within_m: [f64; 2],
     /// Whether this head has taken another head's ping as its echo.
     heard: bool,
@@ -226,8 +227,8 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound with this apparent range arrives before all sounds heard so far. Sounds from within the least
-    /// range don't count.
+    /// Whether a sound with this apparent range arrives before all sounds heard so far. Sounds with a range below the
+    /// head's least range don't count.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }
@@ -243,9 +244,9 @@ impl Ear<'_> {
 }
 
 impl Hears {
-    /// Upper bound of the distance at which a wall still reflects this head's sound, m.
+    /// Upper bound of the distance to a wall that still reflects this head's sound audibly, m.
     fn rings_m(&self) -> f64 {
-        // The factor of 1.5 is larger than any ratio of two speeds of sound.
+        // The factor 1.5 is larger than the ratio of any two speeds of sound in water.
         self.spec.range_m[1] * 1.5
     }
 }

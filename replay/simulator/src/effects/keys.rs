@@ -16,7 +16,7 @@ pub(super) fn only_one(tables: Vec<Section<'_>>) -> Result<Vec<Section<'_>>, Con
 
 /// Reads two numbers `[least, most]`.
 ///
-/// Errors: the value isn't two numbers, a number is outside `allowed`, or the order is wrong.
+/// Errors: the value isn't two numbers, a number is outside `allowed`, or the first is larger than the second.
 pub(super) fn span(
     table: &Section<'_>,
     key: &'static str,

@@ -23,8 +23,8 @@ pub(super) const SENSES: [Sense; 6] =
 /// Messages from a device arrive late, in addition to the latency in the vehicle file.
 ///
 /// `latency_ms` delays all messages. In addition, a random time delays each message. This time is exponentially
-/// distributed with mean `jitter_ms`. A message that would overtake the previous one on its line arrives together with
-/// it. Messages to devices aren't delayed.
+/// distributed with mean `jitter_ms`. No message overtakes the previous one on its line; at the earliest, both arrive
+/// together. Messages to devices aren't delayed.
 pub(super) struct LineDelayKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -128,8 +128,8 @@ mod tests {
         }
     }
 
-    /// Messages are far apart, so that none delays the next one. Mean and variance of the delay are then those of an
-    /// exponential distribution.
+    /// The messages are so far apart that a delayed message never holds up the next one. Mean and variance of the delay
+    /// are then those of an exponential distribution.
     #[test]
     fn message_delay_jitter_is_exponentially_distributed() {
         let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };

@@ -54,7 +54,7 @@ struct Ramp {
 struct MissingReturns {
     places: Places<Parameters>,
     stream: Stream,
-    /// Whether the previous ping was lost as part of a run; `None` before the first ping.
+    /// Whether the previous ping was lost in a run of lost pings; `None` before the first ping.
     in_run: Option<bool>,
 }
 
@@ -118,15 +118,15 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// Whether the ping of a step gets no return. Must be called once per step, in order. `in_run` keeps the state of
-    /// the runs.
+    /// Whether the ping of a step gets no return. Must be called once per step, in order. `in_run` tells the next call
+    /// whether a run of lost pings is under way.
     fn loses(&self, in_run: &mut Option<bool>, drawn: [f64; 2], ray: &Ray, echo: Echo) -> bool {
         let [first, second] = drawn;
         let runs = self.runs.is_some_and(|runs| runs.next(*in_run, first));
         *in_run = Some(runs);
         let share =
             |ramp: Option<Ramp>, at: Option<f64>| ramp.zip(at).map_or(0.0, |(ramp, at)| ramp.share(at));
-        // The incidence on a part of the vehicle is unknown.
+        // The incidence counts only for walls. A part of the vehicle has no known incidence.
         let hit = ray.hit.filter(|_| self.grazing.is_some() && !echo.stopped);
         let incidence_deg = hit.map(|hit| math::acos(squareness(ray.direction, hit.normal)).to_degrees());
         let stays = (1.0 - share(self.grazing, incidence_deg)) * (1.0 - share(self.far, echo.range_m));
@@ -194,8 +194,8 @@ mod tests {
         let found = runs.iter().sum::<usize>() as f64 / count;
         assert!((found - mean).abs() < 5.0 * math::sqrt(mean * (mean - 1.0) / count), "{found}");
         assert_share(runs.iter().filter(|run| **run == 1).count(), runs.len(), 1.0 / mean);
-        // The share's variance is that of independent pings times (1 + r) / (1 - r), where r is the correlation of the
-        // Markov chain.
+        // The variance of the lost share is that of independent pings times (1 + r) / (1 - r), where r is the
+        // correlation of the Markov chain.
         let correlation = Runs::new(share, mean).correlation();
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         let found = runs.iter().sum::<usize>() as f64 / whole;
@@ -211,7 +211,7 @@ mod tests {
             let (hit, _) = row.wall().unwrap();
             let headrace_sensor::measurement::Sounding { angle_rad, range_m, .. } =
                 row.sounding.unwrap().measured;
-            // The tunnel is a rectangle, so the incidence is the angle to the nearest axis.
+            // The tunnel is a rectangle, so a beam's incidence is its angle to the vertical or to the horizontal.
             let across = math::sin(angle_rad).abs();
             let square = if hit.normal.z().abs() > 0.5 { math::cos(angle_rad).abs() } else { across };
             let incidence_deg = math::acos(square).to_degrees();

@@ -1,6 +1,6 @@
-//! The effects that a scene may name. Each has a file of its own.
+//! The effects that a scene may name. Each effect has a file of its own.
 //!
-//! An effect that isn't named adds no system, component or random number. Defaults of keys are in brackets.
+//! An effect that the scene doesn't name adds no system, component or random number. Defaults of keys are in brackets.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -59,7 +59,7 @@ pub use beam_cone::Cone;
 pub use effect::{Effect, EffectKind};
 pub use targets::PerSensor;
 
-/// All effects. Within a stage, systems run in this order, whatever the order in the scene.
+/// All effects. Within a stage, systems run in the order of this list, whatever the order in the scene.
 pub const KINDS: [&dyn EffectKind; 38] = [
     // Effects that make the vehicle differ from its file.
     &mount_error::MountErrorKind,
@@ -142,7 +142,7 @@ impl Named {
         self.0.iter().any(|(kind, _)| kind.name() == name)
     }
 
-    /// Adds the effects of the `[effects]` tables in a TOML text. None of these effects may be present already.
+    /// Adds the effects from the `[effects]` tables of the TOML text `tables`. None of them may be present already.
     ///
     /// Errors: see [`EffectKind::read`].
     pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {

@@ -1,4 +1,4 @@
-//! Differences of sensors' mounts from the vehicle file.
+//! Mounts of sensors that differ from the vehicle file.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Vec3};
@@ -73,7 +73,7 @@ impl Effect for PerSensor<Parameters> {
 }
 
 impl Parameters {
-    /// The mount with its error. `drawn` has the error of position and angle for each axis, in standard deviations.
+    /// The mount with its error. `drawn` has, for each axis, the errors of position and angle in standard deviations.
     fn moved(&self, mount: &Mount, drawn: [[f64; 2]; 3]) -> Mount {
         let off_m = [0, 1, 2].map(|axis: usize| {
             let [place, _] = drawn.get(axis).copied().unwrap_or_default();
@@ -108,8 +108,8 @@ mod tests {
         assert!(!dived.rows.is_empty());
         for row in &dived.rows {
             let sounding = row.sounding.unwrap();
-            // The head's angle is 0 straight down and grows clockwise, seen looking ahead; y is left, z up. The roll
-            // turns y towards z: left up.
+            // The head's angle is 0 straight down and grows clockwise, seen looking ahead. y is left, z up. The roll
+            // turns y towards z, so the left side goes up.
             let turned_rad = sounding.measured.angle_rad + f64::to_radians(3.0);
             let (sine, cosine) = math::sin_cos(turned_rad);
             let (y, z) = (0.25 + row.pose.position.y(), 0.5 + row.pose.position.z());

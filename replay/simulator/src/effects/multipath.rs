@@ -39,7 +39,7 @@ use crate::stages::Stage;
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
 pub(super) struct MultipathKind;
 
-/// Distance from the wall at which reflected rays begin, m.
+/// Reflected rays begin at this distance from the wall, m, so that they don't hit it again at once.
 const OFF_WALL_M: f64 = 1e-6;
 
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +92,7 @@ impl Effect for PerSensor<Places<Parameters>> {
     }
 }
 
-/// The range of a beam by way of two walls, m; `None` if there is no such path within `far_m`.
+/// Range m of an echo that reaches the sonar by way of two walls; `None` if there is no such path within `far_m`.
 fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f64> {
     let first = ray.hit?;
     let from = first.point + first.normal.scaled(OFF_WALL_M);
@@ -107,7 +107,8 @@ fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f
 }
 
 impl Parameters {
-    /// Whether a return arrives by way of two walls. `square` is the cosine of the beam's incidence.
+    /// Whether a return arrives by way of two walls. `square` is the cosine of the beam's incidence. `before` tells
+    /// whether the previous return did so.
     fn is_bounced(&self, before: bool, square: f64, chance: f64) -> bool {
         let share = self.share + (self.square_share - self.share) * square;
         let Some(mean) = self.mean_run.filter(|_| share > 0.0 && share < 1.0) else { return chance < share };
@@ -158,15 +159,15 @@ mod tests {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Distances along the straightened beam: to the side wall ahead, and to floor or ceiling.
+            // Distances along the straightened beam to the first walls: `to_side` to the side wall, the other one to
+            // floor or ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =
                 [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
             crossings.sort_by(f64::total_cmp);
             let along_m = crossings[1];
-            // Second point at which the beam meets the wall: its position on the straightened beam, mirrored back into
-            // the rectangular tunnel.
+            // `fold` mirrors the straightened beam's second point on a wall back into the rectangular tunnel.
             let fold = |at: f64, period: f64| {
                 let at = math::wrap(at, 2.0 * period);
                 if at > period { 2.0 * period - at } else { at }
@@ -187,8 +188,8 @@ mod tests {
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&pipe, [out_m, radius_m], angle_rad);
-            // The sine of incidence follows from the law of sines. Seen from the centre, the ends of a chord are pi - 2
-            // i apart, where i is the incidence.
+            // The sine of incidence follows from the law of sines. The ends of a chord are pi - 2 i apart as seen from
+            // the circle's centre, where i is the incidence.
             let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
             let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
             let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();

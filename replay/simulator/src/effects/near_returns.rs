@@ -91,7 +91,7 @@ impl Effect for PerSensor<Places<Parameters>> {
 
 impl Parameters {
     /// Range that the ping of a step returns from a cluster, m; `None` if the ping hits no cluster. Must be called once
-    /// per step, in order.
+    /// for each `step`, in order.
     fn met_m(&self, cluster: &mut Cluster, stream: Stream, step: u64) -> Option<f64> {
         let [chance, place] = stream.at(step).uniform();
         let meets = self.runs.next(cluster.met, chance);
@@ -131,7 +131,7 @@ mod tests {
 
     use crate::testing::Dive;
 
-    /// The near returns by ping; `None` for pings without one. The nearest walls are 2.5 m away.
+    /// Range of each ping that hits a cluster; `None` for all other pings. The nearest walls are 2.5 m away.
     fn near(keys: &str) -> Vec<Option<f64>> {
         let dive = Dive { seconds: 2000.0, ..Dive::with_head() };
         let (base, with) = (dive.dive(""), dive.dive(&format!("[effects.near_returns]\n{keys}")));
@@ -139,7 +139,7 @@ mod tests {
         pairs.map(|(was, is)| is.filter(|_| was != is)).collect()
     }
 
-    /// The pings of a run share one range, with the given spread. The next run has another range.
+    /// Consecutive pings that hit a cluster have one range, with the given spread. The next cluster has another range.
     #[test]
     fn near_return_clusters_have_the_given_share_run_length_and_spread() {
         let (share, mean) = (0.1, 6.0);
@@ -157,8 +157,8 @@ mod tests {
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         assert!((pings / whole - share).abs() < 5.0 * math::sqrt(variance), "{}", pings / whole);
 
-        // Within a run, the variance is the square of the spread. The means of the runs vary slightly more than
-        // uniformly distributed ranges.
+        // Within a run, the variance is the square of the spread. The means of runs vary slightly more than the
+        // clusters' ranges, which are uniformly distributed, because each mean has an error.
         let long: Vec<&Vec<f64>> = runs.iter().filter(|run| run.len() > 1).collect();
         let (mut within, mut freedom, mut means) = (0.0, 0.0, Vec::new());
         for run in &long {
@@ -185,8 +185,8 @@ mod tests {
         let wall_m = base[0].unwrap();
         assert!(with.iter().all(|range_m| range_m.unwrap() <= wall_m));
         let nearer = with.iter().filter(|range_m| range_m.unwrap() < wall_m).count();
-        // The pings of a run hit the same cluster. A run has 1 / (1 - share) pings on average, which increases the
-        // standard deviation of the count.
+        // The pings of a run hit the same cluster. A run has 1 / (1 - share) pings on average, and longer runs increase
+        // the standard deviation of the count.
         let share = 0.4 * (wall_m - 2.0) / 2.0;
         let sd = math::sqrt(share * (1.0 - share) / base.len() as f64 * 2.0 / (1.0 - 0.4));
         assert!((nearer as f64 / base.len() as f64 - share).abs() < 5.0 * sd, "{nearer} of {}", base.len());

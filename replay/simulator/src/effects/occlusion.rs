@@ -42,12 +42,14 @@ struct Occlusion {
     obstacles: Vec<Obstacle>,
 }
 
-/// For each beam of the slice, whether a part of the vehicle stops the beam before the wall. Later effects use this.
+/// For each beam of the present slice, whether a part of the vehicle stops the beam before the wall. Effects that run
+/// later use this.
 #[derive(Debug, Clone, Default, Component)]
 pub(super) struct Stopped(Vec<bool>);
 
 impl Stopped {
-    /// Whether a part of the vehicle stops the beam of a sample; false for a sonar without this effect.
+    /// Whether a part of the vehicle stops the beam of a sample. False for a sonar on which the effect occlusion
+    /// doesn't act.
     pub(super) fn has(stopped: Option<&Self>, sample: usize) -> bool {
         stopped.and_then(|stopped| stopped.0.get(sample)).copied().unwrap_or(false)
     }
@@ -122,7 +124,7 @@ impl Parameters {
 }
 
 impl Occlusion {
-    /// Range of the first obstacle that a beam meets, m.
+    /// Range of the first obstacle that a beam meets, m. `None` if the beam meets none.
     fn range_m(&self, mount: &Mount, direction: Vec3<Body>) -> Option<f64> {
         let entered =
             self.obstacles.iter().filter_map(|obstacle| obstacle.enters_m(mount.position, direction));
@@ -168,10 +170,10 @@ mod tests {
         let half_rad = math::asin(radius_m / 0.3);
         let mut hidden = 0;
         for ((angle_rad, range_m), wall_m) in dived.soundings(0).into_iter().zip(base.ranges_m(0)) {
-            // The neighbour is to the right of the head, at 270 degrees.
+            // The other head is to the right of this head, at 270 degrees.
             let off_rad = math::wrap_signed(angle_rad - 1.5 * math::PI, math::TAU);
             if off_rad.abs() < half_rad {
-                // Range at which the beam meets a circle of this radius, whose centre is 0.3 m away.
+                // Range at which the beam meets a circle of this radius, whose centre is 0.3 m from the sonar.
                 let across_m = 0.3 * math::sin(off_rad);
                 let depth_m = math::sqrt(radius_m * radius_m - across_m * across_m);
                 let near_m = 0.3 * math::cos(off_rad) - depth_m;

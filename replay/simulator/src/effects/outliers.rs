@@ -134,7 +134,8 @@ mod tests {
         assert!(least >= 0.3 && most <= 20.3 && most - least > 19.9);
         let mean_m = strays.iter().sum::<f64>() / count;
         let variance_m2 = strays.iter().map(|m| (m - mean_m) * (m - mean_m)).sum::<f64>() / count;
-        // For a uniform distribution over 20 m, the variance is 400 / 12 and the fourth moment 20^4 / 80.
+        // Outliers are uniformly distributed over 20 m, so their variance is 400 / 12 and their fourth moment 20^4 /
+        // 80.
         assert!((mean_m - 10.3).abs() < 5.0 * math::sqrt(400.0 / 12.0 / count));
         let kurtosis_m4 = 160_000.0 / 80.0 - (400.0 / 12.0) * (400.0 / 12.0);
         assert!((variance_m2 - 400.0 / 12.0).abs() < 5.0 * math::sqrt(kurtosis_m4 / count));

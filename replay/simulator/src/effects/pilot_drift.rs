@@ -92,7 +92,7 @@ mod tests {
         }
         for (axis, sum) in squares.into_iter().enumerate() {
             let sd = math::sqrt(sum / count);
-            // The tolerance is that of a standard deviation from about 320 independent values.
+            // The tolerance allows for the error of a standard deviation from about 320 independent values.
             assert!((sd - 0.4 * reach[axis]).abs() <= 0.1 * reach[axis], "{axis}: {sd}");
         }
     }

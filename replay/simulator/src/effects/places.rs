@@ -13,7 +13,7 @@ use crate::stretch::Stretch;
 pub(super) struct Places<P>(Vec<(Stretch, P)>);
 
 impl<P: Clone> PerSensor<Places<P>> {
-    /// Reads tables like [`PerSensor::read`], each limited to the stretch from `from_m` to `to_m`.
+    /// Reads tables as [`PerSensor::read`] does. Each table applies only from `from_m` to `to_m`.
     ///
     /// A sensor may have several stretches if they don't overlap.
     ///
@@ -58,7 +58,7 @@ impl<P: Clone> PerSensor<Places<P>> {
 impl<P> Places<P> {
     /// The parameters at the origin of a sonar's beam `ray`, if the effect acts there.
     ///
-    /// For an effect in the whole tunnel, the position isn't computed.
+    /// If the effect acts in the whole tunnel, the origin's chainage isn't computed.
     pub(super) fn here(&self, scenery: &Scenery, ray: &Ray) -> Option<&P> {
         self.at(|| {
             let [chainage_m, ..] = scenery.environment.axis().chart(ray.origin);
@@ -80,7 +80,7 @@ impl<P> Places<P> {
         Places(self.0.iter().map(|(stretch, parameters)| (*stretch, how(parameters))).collect())
     }
 
-    /// Parameters of the effect in all stretches, in the order of the scene.
+    /// Parameters of the effect in each stretch, in the order of the scene.
     pub(super) fn all(&self) -> impl Iterator<Item = &P> {
         self.0.iter().map(|(_, parameters)| parameters)
     }
@@ -133,7 +133,8 @@ mod tests {
         }
     }
 
-    /// At each step, an effect uses the same random numbers in a stretch as in the whole tunnel.
+    /// With one table per stretch, an effect draws the same random numbers at each step as with one table for the
+    /// tunnel.
     #[test]
     fn effect_in_adjacent_stretches_equals_the_effect_in_the_whole_tunnel() {
         let dive = Dive { seconds: 40.0, ..Dive::with_head() };

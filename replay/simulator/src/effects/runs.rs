@@ -47,7 +47,7 @@ impl Runs {
     /// Whether the next ping is in a run. `before` tells whether the previous ping was in a run; `chance` is a random
     /// number between 0 and 1.
     ///
-    /// The probability that the first ping is in a run equals the share.
+    /// The first ping is in a run with a probability equal to the share of pings in runs.
     pub(super) fn next(&self, before: Option<bool>, chance: f64) -> bool {
         let in_run = match before {
             None => self.share,
@@ -57,7 +57,7 @@ impl Runs {
         chance < in_run
     }
 
-    /// Correlation between the states of consecutive pings: 1 in a run, 0 in no run.
+    /// Correlation between the states of consecutive pings. The state is 1 in a run and 0 otherwise.
     #[cfg(test)]
     pub(super) fn correlation(&self) -> f64 {
         self.go_on - self.begin

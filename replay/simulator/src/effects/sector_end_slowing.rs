@@ -20,7 +20,7 @@ use crate::stages::Stage;
 ///
 /// The head slows down at the ends of its sector. The steps there are short, which gives the false minima that Jorge et
 /// al. 2021 describe. Heads that turn continuously are unchanged. `lag_ms` is the time constant, 100 by default. The
-/// command is assumed to change linearly between two pings; for such a command the lag is exact. The head begins at
+/// command is assumed to change linearly between two pings, and for such a command the lag is exact. The head begins at
 /// rest. Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due to the control system of the head").
 pub(super) struct SectorEndSlowingKind;
 
@@ -111,8 +111,7 @@ mod tests {
     const KEYS: &str = "[effects.sector_end_slowing]\nlag_ms = 150\n";
     const LAG_S: f64 = 0.15;
 
-    /// The command c(t) = w t grows from rest. With time constant T, the head's response is y = w (t - T + T exp(-t /
-    /// T)).
+    /// The command c(t) = w t grows from rest. With time constant T, the head's angle is y = w (t - T + T exp(-t / T)).
     #[test]
     fn lag_at_sector_ends_matches_its_closed_form() {
         let (plain, slowed) = (pings(""), pings(KEYS));
@@ -128,8 +127,8 @@ mod tests {
         }
     }
 
-    /// The command has the rate w, and reverses at time 0, long after its previous reversal. With time constant T, the
-    /// head then moves at w (2 exp(-t / T) - 1), and reverses at T ln 2.
+    /// The command has the rate w, and its sign changes at time 0, long after the previous change. With time constant
+    /// T, the head then moves at w (2 exp(-t / T) - 1), and reverses at T ln 2.
     #[test]
     fn head_steps_are_short_at_reversals_and_full_elsewhere() {
         let (plain, slowed) = (pings(""), pings(KEYS));

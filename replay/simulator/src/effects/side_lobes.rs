@@ -50,7 +50,8 @@ struct SideLobes {
     stream: Stream,
 }
 
-/// Side lobes in a stretch: their angle from the beam's axis, and the share of pings in which they are heard.
+/// Side lobes in a stretch of the tunnel: their angle from the beam's axis, and the share of pings in which they are
+/// heard.
 #[derive(Debug, Clone, Copy)]
 struct Lobes {
     angle_rad: f64,
@@ -95,8 +96,8 @@ impl Effect for PerSensor<Places<Parameters>> {
     }
 }
 
-/// Range of the nearest side lobe that meets the wall nearer than `near_m` and more perpendicularly than the beam's
-/// axis, m.
+/// Shortest range of a side lobe, m. Only lobes that meet the wall nearer than `near_m` and more perpendicularly than
+/// the axis count.
 fn lobe_m(environment: &Environment, ray: &Ray, angle_rad: f64, near_m: f64) -> Option<f64> {
     let least = ray.hit.map_or(0.0, |hit| squareness(ray.direction, hit.normal));
     let (sine, cosine) = math::sin_cos(angle_rad);
@@ -142,8 +143,8 @@ mod tests {
             dive.dive(effects).soundings(0).into_iter().zip(dive.dive("").ranges_m(0))
         {
             let (range_m, was_m) = (range_m.unwrap(), was.unwrap());
-            // The floor is hit by beams within 50 degrees of the perpendicular, and by all lobes of beams within 42
-            // degrees.
+            // Beams within 50 degrees of the perpendicular to the floor hit the floor. Within 42 degrees, all their
+            // lobes hit it too.
             let off_rad = math::wrap_signed(angle_rad, math::TAU).abs();
             if off_rad.to_degrees() < 42.0 {
                 // A lobe nearer to the perpendicular than the beam has the shorter range and the smaller incidence.

@@ -1,4 +1,4 @@
-//! Difference of the true speed of sound from the configured one.
+//! A true speed of sound that differs from the configured one.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};

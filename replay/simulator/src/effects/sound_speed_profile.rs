@@ -28,7 +28,7 @@ use crate::stages::Stage;
 /// in a constant gradient).
 pub(super) struct SoundSpeedProfileKind;
 
-/// Relative differences between speeds of sound below this count as zero.
+/// Relative difference below which two speeds of sound count as equal.
 const SAME: f64 = 1e-9;
 
 #[derive(Debug, Clone, Copy)]
@@ -79,10 +79,10 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// Ratio of reported to true range for an echo from one height to another.
+    /// Ratio of reported to true range for a sonar at height `from_z_m` and an echo from height `to_z_m`.
     fn scale(&self, from_z_m: f64, to_z_m: f64) -> f64 {
-        // Far above or below the floor, the linear speed could fall to zero. It is kept above a third of the speed at
-        // the floor.
+        // Far above or below the floor, a linear profile would reach zero. Speeds are therefore never below a third of
+        // the speed at the floor.
         let at_mps = |z_m: f64| (self.floor_mps + self.per_metre_mps * z_m).max(self.floor_mps / 3.0);
         let [from_mps, to_mps] = [from_z_m, to_z_m].map(at_mps);
         let faster = to_mps / from_mps - 1.0;
@@ -138,7 +138,7 @@ mod tests {
     }
 
     /// At a gradient of -50 m/s per metre, the speed would be zero about thirty metres up. The mean slowness is
-    /// computed with at least a third of the speed at the floor.
+    /// therefore computed with speeds of at least a third of the speed at the floor.
     #[test]
     fn speed_of_sound_never_falls_below_a_third_of_the_speed_at_the_tunnel_floor() {
         let profile = Parameters { floor_mps: 1440.0, per_metre_mps: -50.0, assumed_mps: 1440.0 };

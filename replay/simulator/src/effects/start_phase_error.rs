@@ -96,7 +96,7 @@ fn begun_off(program: HeadProgram, off_rad: f64) -> HeadProgram {
         return HeadProgram { start_rad: program.start_rad + off_rad, ..program };
     };
     let above_rad = program.start_rad - least_rad;
-    // Position in the sweep there and back: the head's angle grows up to `size_rad`, and then falls.
+    // Position in a sweep there and back. First the head's angle grows up to `size_rad`, then it falls.
     let along_rad = if program.growing { above_rad } else { 2.0 * size_rad - above_rad };
     let along_rad = math::wrap(along_rad + off_rad / TAU * 2.0 * size_rad, 2.0 * size_rad);
     let growing = along_rad < size_rad;
@@ -121,7 +121,7 @@ mod tests {
                 (Bench::turning("").run::<Sounding>(head), Bench::turning(&keys).run::<Sounding>(head));
             assert_eq!(plain.len(), off.len());
             for (plain, off) in plain.iter().zip(&off) {
-                // Heads have steps of 0.3 degrees, so an angle is rounded by up to half a step.
+                // The tested head turns in steps of 0.3 degrees, so a start angle is rounded by up to half a step.
                 let by_rad = off.angle_rad - plain.angle_rad - off_deg.to_radians();
                 assert!(math::wrap_signed(by_rad, TAU).abs() < f64::to_radians(0.150_1));
                 assert_eq!(off.angle_rad.to_bits(), off.reported_rad.to_bits());
@@ -137,7 +137,7 @@ mod tests {
             assert_eq!(sector, program.sector);
             (math::round_to_i64(start_rad * 1e9) as f64 / 1e9, growing)
         };
-        // The sweep there and back is 4 rad long.
+        // The sector is 2 rad wide, so a sweep there and back is 4 rad long.
         assert_eq!([begun(0.0), begun(90.0), begun(270.0)], [(1.0, true), (2.0, true), (2.0, false)]);
         assert_eq!([begun(-90.0), begun(180.0), begun(360.0)], [(2.0, false), (3.0, false), (1.0, true)]);
         let back = HeadProgram { start_rad: 3.0, growing: false, ..program };

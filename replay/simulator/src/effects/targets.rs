@@ -5,7 +5,7 @@ use headrace_sensor::device::Sense;
 
 use crate::facts::Facts;
 
-/// Parameters of an effect, by the number of the sensor.
+/// Parameters of an effect for each sensor, which is given by its number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerSensor<P>(pub Vec<(usize, P)>);
 

@@ -37,7 +37,7 @@ struct TetherLag {
 
 impl EffectKind for TetherLagKind {
     fn name(&self) -> &'static str {
-        // This name is the effect's key in scenes and the name of its random stream.
+        // Scenes use this name for the effect, although the module has another name.
         "late_winding"
     }
 
@@ -102,8 +102,8 @@ mod tests {
         TetherLag { parameters, counted: None, winding: false }
     }
 
-    /// With hold distance h, vehicle speed v and drum speed w, the drum stands still for h / v, and then winds for h
-    /// / (w - v). The mean lag is half of h.
+    /// With hold distance h, vehicle speed v and drum speed w, the drum stands still for h / v, and then winds for h /
+    /// (w - v). The mean lag of the count is h / 2.
     #[test]
     fn cable_count_lags_in_a_sawtooth_at_steady_vehicle_speed() {
         let (mut winding, period_s) = (winding(), 0.01);
@@ -116,7 +116,7 @@ mod tests {
         let lag = |k: usize| 0.2 * k as f64 * period_s - counts[k];
         assert!((0..counts.len()).all(|k| (-1e-9..=0.502 + 1e-9).contains(&lag(k))));
         let moving = counts.windows(2).filter(|w| w[1] > w[0]).count() as f64 / counts.len() as f64;
-        // The drum winds for a share v / w of the time: the vehicle's speed divided by the drum's.
+        // The drum winds for a share v / w of the time, which is the vehicle's speed divided by the drum's speed.
         assert!((moving - 0.2 / 0.6).abs() < 0.01, "{moving}");
         let mean_m = (0..counts.len()).map(lag).sum::<f64>() / counts.len() as f64;
         assert!((mean_m - 0.25).abs() < 0.01, "{mean_m}");

@@ -103,7 +103,8 @@ mod tests {
         assert!(plain.iter().zip(&off).all(|(is, counted)| (counted / is - 1.005).abs() < 1e-12));
     }
 
-    /// Compares with a cable of many short rods in series, each stretched by the drag on the rods nearer to the wheel.
+    /// Compares the counted length with that of a cable made of many short rods in series, each stretched by the drag
+    /// on the rods nearer to the wheel.
     #[test]
     fn cable_stretches_like_rods_in_series() {
         let (stiffness_n, drag_npm) = (40_000.0, 0.5);
@@ -117,8 +118,8 @@ mod tests {
                 let tension_n = drag_npm * (f64::from(rod) + 0.5) * rod_m;
                 reach_m += rod_m * (1.0 + tension_n / stiffness_n);
             }
-            // The drag is computed from the counted length instead of the stretched length. The two results differ by
-            // the square of the strain.
+            // Here the drag is computed from the counted length instead of the stretched length. This changes the
+            // result by about the square of the strain.
             let strain = drag_npm * counted_m / (2.0 * stiffness_n);
             let off = parameters.counted_m(reach_m) / counted_m - 1.0;
             assert!(off.abs() < 1.01 * strain * strain + 1e-9, "{counted_m}: {off}");
@@ -126,7 +127,7 @@ mod tests {
         }
     }
 
-    /// If the scene gives no drag, the drag is 0.05 N/m. The mean tension is half of the total drag.
+    /// Without the key `drag_npm`, the drag is 0.05 N/m. The mean tension is half of the total drag.
     #[test]
     fn stiffness_and_drag_keys_set_the_cable_strain() {
         let plain = counts("");

@@ -42,13 +42,13 @@ struct Swing {
     period_s: f64,
 }
 
-/// Step number that is reserved for drawing the swings' phases. It is far from the step numbers of knots.
+/// Step number that is reserved for drawing the swings' phases. No knot of the smooth variation has this number.
 const PHASES: u64 = u64::MAX;
 
 #[derive(Component)]
 struct TetherSlack {
     slack: Knots,
-    /// Swings of the cable with their phases, radians.
+    /// Swings of the cable, each with its phase in radians.
     swings: Vec<(Swing, f64)>,
 }
 
@@ -129,7 +129,7 @@ mod tests {
         };
         assert_eq!(plain[25].at.since(plain[0].at).0, 500_000_000);
         let variance = product(0);
-        // The tolerance is that of a standard deviation from some 600 independent values.
+        // The tolerance allows for the error of a standard deviation from some 600 independent values.
         assert!((math::sqrt(variance) / (0.15 * 0.3997) - 1.0).abs() < 0.1, "{variance}");
         // Source: the autocorrelation of the cubic B-spline, 2416 : 1191 : 120 : 1 at 0, 1, 2, 3 spacings.
         for (spacings, wanted) in [(1, 1191.0), (2, 120.0), (3, 1.0), (4, 0.0)] {
@@ -148,7 +148,7 @@ mod tests {
             .iter()
             .zip(&slack)
             .map(|(a, b): (&Payout, &Payout)| (a.at.since(START).as_secs_f64(), b.chainage_m - a.chainage_m));
-        // The range of times has whole periods of both swings.
+        // The first 200 s contain whole periods of both swings.
         let more: Vec<(f64, f64)> = more.filter(|(t, _)| *t < 200.0).collect();
         assert!(more.len() > 9000, "{}", more.len());
         let mut left = more.clone();

@@ -38,7 +38,8 @@ struct TetherSlip {
     at_m: Option<f64>,
     gone_m: f64,
     next_stretch: u64,
-    /// The slip still to come in the current stretch of travel: the travel at which it happens, and its size, m.
+    /// The slip still to come in the current stretch. The first number is the travel at which the cable slips, m; the
+    /// second is the size of the slip, m.
     waiting: Option<(f64, f64)>,
     slipped_m: f64,
 }
@@ -87,7 +88,7 @@ impl TetherSlip {
         Self { parameters, stream, at_m: None, gone_m: 0.0, next_stretch: 0, waiting: None, slipped_m: 0.0 }
     }
 
-    /// Error of the cable count once the vehicle has reached a chainage.
+    /// Moves the vehicle to a chainage, and returns the error of the cable count there, m.
     fn come_to(&mut self, chainage_m: f64) -> f64 {
         self.gone_m += self.at_m.map_or(0.0, |before_m| (chainage_m - before_m).abs());
         self.at_m = Some(chainage_m);

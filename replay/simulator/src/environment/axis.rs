@@ -38,7 +38,7 @@ pub(super) struct Piece {
     curvature_pm: f64,
 }
 
-/// A point of the axis. It defines the plane through the point, perpendicular to the axis.
+/// A point of the axis. It defines the plane through this point, perpendicular to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Station {
     /// The point of the axis, in plan view, m.
@@ -114,7 +114,7 @@ impl Axis {
         [chainage_m, y, point.z()]
     }
 
-    /// Number of the piece nearest to a point; the point's chainage and its distance to the left of the axis, m.
+    /// Number of the piece nearest to a point. Also the point's chainage, and its distance to the left of the axis, m.
     pub(super) fn locate(&self, plan: Yz) -> (usize, f64, f64) {
         let mut nearest = (0, 0.0, 0.0);
         let mut least = f64::INFINITY;
@@ -123,7 +123,7 @@ impl Axis {
                 continue;
             }
             let (chainage_m, y) = piece.chart(plan);
-            // Beyond the end of a piece, the distance to the end is added. Every point therefore belongs to a piece.
+            // Beyond the end of a piece, the distance to this end is added, so that every point has a nearest piece.
             let missed = (piece.from_m - chainage_m).max(chainage_m - piece.to_m).max(0.0);
             let distance = y.abs() + missed;
             if distance < least {
@@ -196,7 +196,7 @@ impl Piece {
         }
         let turned_rad = along_m * self.curvature_pm;
         let (sin, cos) = math::sin_cos(turned_rad);
-        // `1 - cos` is computed from the half angle, since the direct form loses digits in a wide bend.
+        // `1 - cos` is computed from half the angle, because the direct form loses digits in a wide bend.
         let half = math::sin(turned_rad / 2.0);
         let (ahead, left) = (sin / self.curvature_pm, 2.0 * half * half / self.curvature_pm);
         Station {

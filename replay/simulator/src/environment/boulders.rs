@@ -34,7 +34,7 @@ struct Boulder {
 struct Field {
     from_m: f64,
     to_m: f64,
-    /// Extent of the field along the wall, centred on the floor's centre, m.
+    /// Extent of the field along the wall, m. The field's middle is on the floor's centre.
     width_m: f64,
     count: i64,
     size_m: [f64; 2],
@@ -117,8 +117,8 @@ impl Boulder {
         let (wall, [ny, nz]) = ground.tube.wall_place(WallPoint { x_m: self.chainage_m, arc_m: self.arc_m });
         let above_m = half[2] * (1.0 - 2.0 * self.sunk);
         let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
-        // Axes of the boulder: its normal across the wall; its length along the tunnel and its width along the wall,
-        // both rotated about the normal.
+        // Axes of the boulder. Its thickness is along the wall's normal. Its length and width start along the tunnel
+        // and along the wall, and are rotated about the normal.
         let normal = section.outwards([0.0, ny, nz]);
         let (sin, cos) = math::sin_cos(self.yaw_rad);
         let length = section.outwards([cos, -sin * nz, sin * ny]);
@@ -154,8 +154,8 @@ impl Field {
     }
 }
 
-/// Raises `base` to `exponent` in [0, 1) with square roots. Square roots are exactly rounded and so give the same
-/// result on all machines.
+/// Raises `base` to `exponent` in [0, 1) with square roots. Square roots are rounded exactly, so the result is the same
+/// on all machines.
 fn power(base: f64, exponent: f64) -> f64 {
     let (mut result, mut root, mut rest) = (1.0, base, exponent);
     for _ in 0..53 {
@@ -169,7 +169,7 @@ fn power(base: f64, exponent: f64) -> f64 {
     result
 }
 
-/// Reads `size_m` of one boulder: one diameter or three.
+/// Reads `size_m` of a single boulder, which is one diameter or three.
 fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     let wanted = format!(
         "must be a diameter from {} to {}, or three: along the tunnel, along the wall, across the wall",
@@ -184,7 +184,7 @@ fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     }
 }
 
-/// Reads `size_m` of many boulders: the smallest and the largest diameter.
+/// Reads `size_m` of scattered boulders, which is the smallest and the largest diameter.
 fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
     match table.numbers("size_m", SIZE_M)?.as_deref() {
         None => Ok(None),

@@ -1,12 +1,12 @@
-//! Wall displaced from the profile, towards the reference point or away from it.
+//! Parts of the wall that are displaced from the profile, towards its reference point or away from it.
 
 use headrace_geometry::math::{self, PI};
 use headrace_geometry::tunnel::WallPoint;
 
 /// A displaced patch of wall, with the shape of a raised cosine along the tunnel and along the wall.
 ///
-/// The wall moves along the ray from the profile's reference point. If the displacement ends short of that point, all
-/// of the section remains visible from it.
+/// The wall moves along the ray from the profile's reference point. A displacement inwards ends short of the reference
+/// point, so all of the wall remains visible from there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bulge {
     /// Number of the feature that the patch belongs to.
@@ -34,7 +34,7 @@ impl Bulge {
         self.chainage_m + self.half_length_m
     }
 
-    /// Displacement of the wall by the patch at a point on a profile with this perimeter, inwards positive, m.
+    /// Displacement of the wall by the patch at the point `at` of a profile with this perimeter, inwards positive, m.
     pub(super) fn displacement_m(&self, at: WallPoint, perimeter_m: f64) -> f64 {
         let along = (at.x_m - self.chainage_m) / self.half_length_m;
         if along.abs() >= 1.0 {

@@ -19,8 +19,8 @@ pub(super) struct Features {
 
 /// Reads all features except displaced wall, and checks that no key is left over.
 ///
-/// [`super::heaps`] and [`super::meshes`] have read the displaced wall and the meshes before. `bodies` are the meshes
-/// in the water.
+/// [`super::heaps`] has already read the displaced wall, and [`super::meshes`] the meshes. `bodies` are the meshes in
+/// the water.
 ///
 /// Errors: a key is missing, unknown or out of range, or a feature is impossible.
 pub(super) fn parse(
@@ -74,7 +74,7 @@ impl Features {
     }
 }
 
-/// Returns the hollow if it opens from the tube's wall.
+/// Returns the hollow `hollow` if it opens from the tube's wall.
 ///
 /// Errors: the hollow opens from a mesh.
 fn opening(

@@ -20,7 +20,7 @@ const DEEPEST_ASPECT: f64 = 1.0;
 const LOOSENING: f64 = 1.5;
 /// Ratio of the length of the fallen heap to the length of its cavity.
 const SPREADING: f64 = 1.5;
-/// Number of points along a patch at which the distance to the wall is evaluated.
+/// Number of points across a displaced patch at which the wall's distance is evaluated.
 const PLACES: u32 = 64;
 
 /// Area over which the boulders of a heap are scattered.
@@ -105,7 +105,7 @@ fn parse_fall(
     }
     let length_m = SPREADING * 2.0 * cavity.half_length_m;
     let heap = Heap { feature, chainage_m: cavity.chainage_m, length_m, width_m: floor_m(site.profile) };
-    // Cavity and heap have the same shape, so their volumes are proportional to the products of their three extents.
+    // Cavity and heap have the same shape. Their volumes are therefore proportional to the products of their extents.
     let volume = cavity.depth_m * cavity.half_length_m * cavity.half_width_m * 4.0;
     let usual_m = LOOSENING * volume / (heap.length_m * heap.width_m);
     let height_m = table.number("heap_height_m", 0.01..=50.0)?.unwrap_or(usual_m);
@@ -126,7 +126,7 @@ impl Heap {
     }
 }
 
-/// Adds a bulge if the wall and the earlier bulges leave room for it.
+/// Adds a bulge to `bulges` if the wall and the earlier bulges leave room for it.
 fn add(
     bulges: &mut Vec<Bulge>,
     bulge: Bulge,
@@ -171,7 +171,8 @@ fn add(
     Ok(())
 }
 
-/// Minimum distance from the profile's reference point to the wall of a patch, m.
+/// Minimum distance from the profile's reference point to the wall that the bulge displaces, before the displacement,
+/// m.
 fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     let [ry, rz] = site.profile.reference();
     let distance_m = |k: u32| {

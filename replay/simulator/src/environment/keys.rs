@@ -65,7 +65,8 @@ pub(super) fn length_m(
     table.required(key, table.number(key, allowed)?)
 }
 
-/// Reads `chainage_m`, and the extent `key` along the tunnel, of a feature that must lie entirely within the tunnel.
+/// Reads `chainage_m` and the length of a feature, which is in the key `key`. The feature must lie entirely within the
+/// tunnel.
 ///
 /// Errors: a key is missing or out of range, or the feature extends out of the tunnel.
 pub(super) fn extent_m(

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::vector::{Face, Frame, Ray, V3};
 use crate::mesh::Mesh;
 
-/// Least distance from a mesh wall's end planes, m. A point nearer to a plane is moved to this distance, since the mesh
-/// is open in the plane itself.
+/// Least distance of a point from the end planes of a mesh wall, m. A point nearer to an end plane is moved to this
+/// distance, because the mesh is open in that plane.
 const INTO_M: f64 = 1e-7;
 
 /// A closed mesh that is a body in the water.
@@ -59,10 +59,11 @@ impl MeshWall {
         self.mesh.contains(self.between_ends(self.frame.local(point)))
     }
 
-    /// First hit of the ray on the mesh, searched from `t_m` to `until_m`. The ray passes an end plane at `until_m`.
+    /// First hit of the ray on the mesh, searched from `t_m` to `until_m`. At range `until_m` the ray passes an end
+    /// plane of the wall.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, until_m: f64) -> Option<(f64, Face)> {
         let local = self.frame.local_ray(ray);
-        // A ray from a point enclosed by the mesh leaves the mesh only through the ends.
+        // A ray that starts at a point enclosed by the mesh can leave it without a hit only through the ends.
         let from = self.between_ends(local.at(t_m));
         let hit = self.mesh.cast(from, local.direction, until_m - t_m)?;
         let face = Face { normal: self.frame.outwards(hit.normal), feature: Some(self.feature) };

@@ -82,8 +82,8 @@ fn parse_body(
         let why = format!("reaches out of the tunnel, which goes from 0 to {} m", site.length_m);
         return Err(misplaced(table, (from_m, to_m), &why));
     }
-    // In a bend, a corner's x doesn't give its chainage. The corner's distance from the origin is used instead, both
-    // ahead and behind.
+    // In a bend, the x of a corner doesn't give the corner's chainage. The mesh is therefore assumed to reach as far
+    // ahead and behind as its farthest corner is from the origin.
     let reach_m = corners.iter().map(|(x, y)| math::hypot(*x, *y)).fold(0.0, f64::max);
     let reach_m = if site.axis.is_straight() { [back_m, ahead_m] } else { [-reach_m, reach_m] };
     let span_m = span_m(site.axis, chainage_m, reach_m);
@@ -133,7 +133,7 @@ fn check(
     if site.axis.pieces().iter().any(|piece| bend(piece.from_m, piece.to_m, piece.curvature_pm())) {
         return refuse("meets a bend of the axis; a mesh can be the wall of a straight stretch only");
     }
-    // For a point farther from the axis than the radius of a bend, the nearest point of the axis could lie in the bend.
+    // If a point is farther from the axis than the radius of a bend, its nearest point of the axis may be in the bend.
     let (low, high) = wall.mesh.bounds();
     let (_, piece) = site.axis.piece_at(wall.from_m);
     let left_m = piece.left_of([wall.frame.origin[0], wall.frame.origin[1]]);

@@ -66,7 +66,7 @@ pub struct Environment {
     design: Profile,
     tube: Tube,
     rough: Roughness,
-    /// Whether the tunnel is straight, as designed, and empty. Rays are then cast against the profile alone.
+    /// Whether the tunnel is straight, as designed, and empty. If so, rays are cast against the profile alone.
     plain: bool,
     solids: Vec<Placed<Solid>>,
     hollows: Vec<Placed<Hollow>>,
@@ -97,7 +97,7 @@ pub enum What {
     Feature(u16),
 }
 
-/// Obstacle that stops a ray, before its normal is computed.
+/// Obstacle that stops a ray. Its normal isn't computed yet.
 #[derive(Debug, Clone, Copy)]
 enum Stop {
     /// The tunnel's wall, with its face if the face is already computed.
@@ -112,7 +112,7 @@ enum Stop {
     },
 }
 
-/// Stretch of water along a ray.
+/// Stretch of water along a ray, up to an obstacle or the end of the ray.
 #[derive(Debug, Clone, Copy)]
 struct Reach {
     t_m: f64,
@@ -133,7 +133,7 @@ impl Environment {
     /// Reads a scene's `[tunnel]` table, in which all keys are optional.
     ///
     /// `design` is the profile in the vehicle file, and `length_m` is the tunnel's length. `text` loads the text files
-    /// that the table names; `load` loads its other files.
+    /// that the table names; `load` loads all other files that it names.
     ///
     /// Errors: a key is missing, unknown or out of range, or the environment is impossible. Allocates: startup only.
     pub fn parse(
@@ -183,7 +183,7 @@ impl Environment {
         twice_m2.sum::<f64>().abs() / 2.0
     }
 
-    /// Names of the openings in the wall, with the chainages between which each opening lies, m.
+    /// Names of the openings in the wall, each with the chainages between which the opening lies, m.
     pub(crate) fn openings(&self) -> impl Iterator<Item = (&str, [f64; 2])> {
         self.hollows.iter().map(|hollow| {
             let (from_m, to_m) = hollow.span_m;
@@ -191,7 +191,8 @@ impl Environment {
         })
     }
 
-    /// Chainages between which each body lies, m. Bodies are boulders, pieces of heaps and other solids.
+    /// Chainages between which all bodies lie, m; `None` without bodies. Bodies are boulders, pieces of heaps and other
+    /// solids.
     pub(crate) fn rubble_m(&self) -> Option<[f64; 2]> {
         let spans = self.solids.iter().map(|solid| solid.span_m);
         spans.fold(None, |all: Option<[f64; 2]>, (from_m, to_m)| {
@@ -248,14 +249,14 @@ impl Environment {
 
     /// Replaces the range to the smooth wall by the range to the rough wall.
     ///
-    /// The point stays on the smooth wall, so it remains certain which side of the wall is water.
+    /// The point stays on the smooth wall, because the side on which the water is must remain certain.
     fn roughened(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
         let cosine = -direction.dot(&hit.normal);
         let deeper_m = self.rough.deeper_m(hit.point, (hit.range_m, cosine), chainage_m);
         Hit { range_m: hit.range_m + deeper_m, ..hit }
     }
 
-    /// Range to the smooth wall, m. Costs less than [`Environment::cast`].
+    /// Range to the smooth wall, m. This takes less time than [`Environment::cast`].
     ///
     /// Allocates: no.
     pub fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<f64> {
@@ -312,8 +313,7 @@ impl Environment {
         self.names.get(usize::from(index)).map_or("", String::as_str)
     }
 
-    /// Stretch of water along the ray, at most to `far_m`, and the obstacle at its end; `None` if the ray starts
-    /// outside the water.
+    /// Stretch of water along the ray, up to an obstacle or to `far_m`; `None` if the ray starts outside the water.
     fn reach(&self, ray: &Ray, far_m: f64) -> Option<Reach> {
         let far_m = far_m.min(FARTHEST_M);
         let mut reach = match self.tube.leave(ray, 0.0, far_m) {
@@ -334,7 +334,7 @@ impl Environment {
                 reach.stop = Some(Stop::Solid { normal, feature: solid.feature });
             }
         }
-        // A range of zero means that the ray starts inside the solid.
+        // A range of zero means that the ray starts inside a solid.
         let in_solid = reach.t_m <= 0.0 && matches!(reach.stop, Some(Stop::Solid { .. }));
         (!in_solid).then_some(reach)
     }
@@ -342,7 +342,8 @@ impl Environment {
     fn start_in_hollow(&self, ray: &Ray) -> Option<Reach> {
         let around = |hollow: &&Placed<Hollow>| hollow.shape.contains(ray.origin);
         let hollow = self.hollows.iter().find(around)?;
-        // The wall is provisional: the caller then searches for hollows and finds this hollow first.
+        // The reported wall is provisional. It makes the caller search for hollows at range 0, where it finds the
+        // hollow that contains the origin.
         Some(Reach { t_m: 0.0, stop: Some(Stop::Wall(None)), from_m: hollow.span_m.0, to_m: hollow.span_m.1 })
     }
 
@@ -359,7 +360,7 @@ impl Environment {
             if reach.stop.is_none() {
                 return;
             }
-            // A hollow may end on the wall itself. The tube then starts `SKIN_M` farther on.
+            // A hollow may end on the tube's wall itself. The search for the tube therefore starts `SKIN_M` farther on.
             if let Some(passage) = self.tube.leave(ray, reach.t_m + SKIN_M, far_m)
                 && passage.t_m > reach.t_m + PROGRESS_M
             {
@@ -375,11 +376,11 @@ impl Environment {
         }
     }
 
-    /// Finds, among the hollows at the end of the ray, the one in which the ray gets farthest. Returns the range of the
+    /// Of the hollows at the end of the ray, finds the hollow in which the ray gets farthest. Returns the range of the
     /// hollow's end, the normal there, and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
-        // The index lists hollows by the chainage of their openings. Deeper in the rock, a hollow may meet any other
+        // The index lists hollows by the chainage of their openings. Deeper in the rock, a ray may pass into any other
         // hollow.
         let (near, all) = if on_wall {
             (self.hollows_by_chainage.near(reach.from_m, reach.to_m), &[][..])
@@ -395,7 +396,7 @@ impl Environment {
             .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Number of the feature that contains a point in a solid.
+    /// Number of the feature whose solid contains `point`; `None` if no solid contains it.
     fn solid_around(&self, point: V3) -> Option<u16> {
         let [chainage_m, ..] = self.axis().chart(to_point(point));
         let near = self.solids_by_chainage.near(chainage_m, chainage_m).iter();

@@ -2,7 +2,7 @@
 
 use super::vector::{Face, Ray, V3};
 
-/// A wall of triangles. This build has no values of this type.
+/// A wall of triangles. No value of this type exists in a build without the feature `mesh`.
 #[derive(Debug, Clone)]
 pub(super) enum MeshWall {}
 

@@ -12,7 +12,7 @@ use super::widths::flat_floor_m;
 const BULKHEAD_SHARE: f64 = 0.6;
 /// Largest angle between a side tunnel and the perpendicular to the tunnel.
 const SLANT_DEG: f64 = 60.0;
-/// Distance from the upper edges of a rock trap at which the height of the floor is measured, m.
+/// The height of the floor is measured at this distance inside the upper edges of a rock trap, m.
 const INSIDE_M: f64 = 1e-6;
 /// Step along a hollow at which the hollow's length is sampled, m.
 const STEP_M: f64 = 0.5;
@@ -47,7 +47,7 @@ pub(super) fn rock_trap(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Height of the floor at the edges of a rock trap, m. The higher edge counts.
+/// Height of the floor at the edges of a rock trap, m. The result is the height at the higher of the two edges.
 fn edge_m(ground: Ground<'_>, chainage_m: f64, half_width_m: f64) -> Option<f64> {
     let [_, from_m] = ground.tube.scaled(chainage_m, ground.tube.profile().reference());
     let height_m = |y: f64| {
@@ -102,7 +102,7 @@ pub(super) fn side_tunnel(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Range of chainage over which a side tunnel opens into the tunnel, m. Valid also next to a bend.
+/// Range of chainage over which a side tunnel opens into the tunnel, m. The result is also valid next to a bend.
 fn mouth_span_m(
     ground: Ground<'_>,
     chainage_m: f64,
@@ -151,7 +151,7 @@ pub(super) fn gate(
         scale: enlarged,
     };
     let span_m = ground.span_m(chainage_m, width_m / 2.0);
-    // The bulkhead is at least as large as the slot. No ray reaches the part in the rock.
+    // The bulkhead may reach into the rock, because no ray gets there. It must be at least as large as the slot.
     let reach_m = enlarged * profile.farthest_m(profile.reference());
     let bulkhead = closed.then(|| Placed {
         shape: Solid::Block(

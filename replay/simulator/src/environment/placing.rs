@@ -7,8 +7,7 @@ use super::stations::Scales;
 use super::tube::Tube;
 use super::vector::Frame;
 
-/// Largest ratio of an object's span of chainage to its length. The ratio is largest on the inside of the tightest
-/// bend.
+/// Largest ratio of an object's span of chainage to its length. It occurs on the inside of the tightest bend.
 const BEND: f64 = 2.0;
 
 /// A shape, the number of its feature, and the range of chainage that the shape extends into, m.
@@ -30,7 +29,8 @@ pub(super) struct Site<'a> {
     pub(super) half_width_m: f64,
 }
 
-/// Range of chainage of an object at `chainage_m` that extends `reach_m` (least, largest) along the axis, m.
+/// Range of chainage of an object at `chainage_m`, m. `reach_m` is the object's extent along the axis relative to
+/// `chainage_m`, from the least to the largest.
 pub(super) fn span_m(axis: &Axis, chainage_m: f64, reach_m: [f64; 2]) -> (f64, f64) {
     let [back_m, ahead_m] = reach_m.map(|reach_m| if axis.is_straight() { reach_m } else { BEND * reach_m });
     (chainage_m + back_m, chainage_m + ahead_m)
@@ -44,7 +44,8 @@ pub(super) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// Frame of the axis at `chainage_m`: along the tunnel, left, up. The origin is point (y, z) of the section.
+    /// Frame of the axis at `chainage_m`: along the tunnel, left, up. The origin is the point (y, z) of the
+    /// cross-section.
     pub(super) fn frame(&self, chainage_m: f64, [y, z]: [f64; 2]) -> Frame {
         Frame::across(self.tube.axis().station(chainage_m), [y, z])
     }

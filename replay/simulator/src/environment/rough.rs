@@ -1,7 +1,7 @@
-//! Roughness of the wall: random heights about the smooth wall, correlated over a given length.
+//! Roughness of the wall: random heights relative to the smooth wall. Heights of nearby points are correlated.
 //!
-//! A point of the wall has the same height for every beam, sensor and pass. Averaging therefore does not reduce
-//! roughness as it reduces noise.
+//! A point of the wall has the same height for every beam, sensor and pass. Averaging several returns therefore reduces
+//! noise, but not roughness.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -14,7 +14,8 @@ use crate::stretch::Stretch;
 /// Lower limit of the cosine of incidence when a height is converted to a change of range. At more grazing incidence
 /// the bumps hide the hollows between them.
 const LEAST_COSINE: f64 = 0.25;
-/// Standard deviation of the sum of four 16-bit random numbers, in units of their range: the square root of 4 / 12.
+/// Standard deviation of the sum of four 16-bit random numbers, in units of the range of one such number: the square
+/// root of 4 / 12.
 const SUM_SD: f64 = 0.577_350_269_189_625_8;
 
 /// Rough stretches of the tunnel, each with the heights of its wall.
@@ -56,7 +57,7 @@ impl Roughness {
 
     /// Difference between the range to the rough wall and the range to the smooth wall, m.
     ///
-    /// The beam meets the smooth wall at `point`, at range `range_m` and with this cosine of incidence.
+    /// The beam meets the smooth wall at `point`. Its range there is `range_m`, and `cosine` is that of its incidence.
     pub(super) fn deeper_m(
         &self,
         point: Point3<Tunnel>,
@@ -70,7 +71,7 @@ impl Roughness {
         let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else {
             return 0.0;
         };
-        // A bump of the rough wall reaches at most halfway to the sonar.
+        // The limit keeps a bump of the rough wall from reaching more than halfway to the sonar.
         (heights.at_m(point) / cosine.max(LEAST_COSINE)).max(-range_m / 2.0)
     }
 }
@@ -94,8 +95,8 @@ impl Heights {
             sum += weight * self.number(nodes);
             squares += weight * weight;
         }
-        // A weighted mean of several numbers has a smaller standard deviation than each number. The division restores
-        // the given standard deviation.
+        // A weighted mean of several random numbers has a smaller standard deviation than each number. The division by
+        // the root of the squared weights restores the standard deviation `sd_m`.
         self.sd_m * sum / math::sqrt(squares)
     }
 

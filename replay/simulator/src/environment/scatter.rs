@@ -1,4 +1,4 @@
-//! Pseudo-random numbers for objects in the tunnel. Each feature has its own seed.
+//! Pseudo-random numbers for objects in the tunnel. Each feature with scattered objects has its own seed.
 
 /// The SplitMix64 generator.
 ///

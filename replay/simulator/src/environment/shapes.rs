@@ -1,7 +1,7 @@
 //! Bodies in the water and hollows in the rock.
 //!
-//! A body returns the first hit of a ray. A hollow returns the distance that a ray inside it travels. A new kind of
-//! shape is a new variant of [`Solid`] or [`Hollow`].
+//! For a body, the question is where a ray first hits it. For a hollow, the question is how far a ray inside it
+//! travels. A new kind of shape is a new variant of [`Solid`] or [`Hollow`].
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -13,8 +13,8 @@ use super::vector::{Ray, V3, along, dot, unit};
 
 /// Largest distance between a point and a hollow at which the point counts as in the hollow, m.
 ///
-/// A face of a hollow may lie on the wall itself, like the upper face of a ditch on a flat floor. Rounding must leave
-/// no wall between tube and hollow.
+/// A face of a hollow may lie on the wall itself, like the upper face of a ditch in a flat floor. Rounding errors must
+/// not put wall between tube and hollow.
 pub(super) const SKIN_M: f64 = 1e-6;
 
 /// A solid body that stops a ray.
@@ -122,8 +122,8 @@ impl Ring {
 
     fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
         let ray = self.frame.local_ray(ray);
-        // The point tested lies slightly ahead, since rounding decides whether a point on the wall of the hollow is
-        // inside.
+        // The tested point lies slightly farther along the ray, because rounding alone decides whether a point exactly
+        // on the hollow's boundary is inside.
         let t_m = t_m + SKIN_M;
         let at = ray.at(t_m);
         if !self.holds(at) {
@@ -175,7 +175,7 @@ fn block_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
 fn ellipsoid_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
     let local = frame.local_ray(ray);
     // In units of the half diameters, the ellipsoid is a unit sphere. Half the chord follows from the ray's least
-    // distance to the centre. The discriminant b * b - a * c would lose digits, which this distance doesn't.
+    // distance to the centre. This loses fewer digits than the discriminant b * b - a * c.
     let origin = [local.origin[0] / half[0], local.origin[1] / half[1], local.origin[2] / half[2]];
     let slope = [local.direction[0] / half[0], local.direction[1] / half[1], local.direction[2] / half[2]];
     let a = dot(slope, slope);

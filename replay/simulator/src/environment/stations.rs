@@ -2,7 +2,7 @@
 
 use headrace_config::{ConfigError, Section};
 
-/// Largest change of the distance between the wall and the floor's centre, per metre of chainage.
+/// Largest allowed change, per metre of chainage, of the distance between the wall and the floor's centre.
 const STEEPEST: f64 = 1.0;
 
 /// Scale of the profile by chainage: linear between stations, constant before the first and after the last station, and
@@ -48,7 +48,7 @@ impl Scales {
         Ok(Self { stations })
     }
 
-    /// Chainages at which the slope of the profile's scale changes, m.
+    /// Chainages of the stations, m. The slope of the profile's scale changes there.
     pub(super) fn breaks(&self) -> impl Iterator<Item = f64> + '_ {
         self.stations.iter().map(|station| station.0)
     }

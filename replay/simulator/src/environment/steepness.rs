@@ -1,5 +1,5 @@
-//! Upper bound on the slope of the gauge, which determines the length of steps along rays. The gauge of a point is
-//! its distance from the reference point, relative to the wall's distance in the same direction; see [`super::tube`].
+//! Upper bound on the slope of the gauge, which determines the length of steps along rays. The gauge of a point is its
+//! distance from the reference point, divided by the distance of the wall in the same direction; see [`super::tube`].
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
@@ -8,10 +8,10 @@ use super::bulge::Bulge;
 
 /// Number of directions in which a profile's wall is sampled.
 const DIRECTIONS: u32 = 2_000;
-/// Safety factor on the slope of the gauge, for directions between the samples.
+/// Safety factor on the slope of the gauge, which may be steeper between the sampled directions.
 const MARGIN: f64 = 1.05;
-/// Largest ratio of change of chainage to distance travelled. It occurs at the inner wall of the tightest allowed bend,
-/// which has a radius of twice the tunnel's half-width.
+/// Largest ratio of a point's change of chainage to the distance that the point moves. It occurs at the inner wall of
+/// the tightest allowed bend, which has a radius of twice the tunnel's half-width.
 const INSIDE_OF_BEND: f64 = 2.0;
 
 /// The wall of a profile as seen from its reference point.
@@ -29,7 +29,7 @@ struct View {
     arc_m: f64,
     /// Distance from the reference point to the wall in this direction, m.
     radius_m: f64,
-    /// Distance from the reference point to the wall's tangent, m.
+    /// Distance from the reference point to the tangent of the wall in this direction, m.
     tangent_m: f64,
 }
 
@@ -57,8 +57,8 @@ impl Steepness {
     /// Let R(phi) be the distance of the wall from the reference point, and D(chainage, arc) the displacement of the
     /// wall. The gauge of a point is rho / (R - D), where rho is the distance of the point from the reference point.
     /// The slope of the gauge in the section is sqrt(1 + (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel, the
-    /// slope of D adds to the slope of the gauge. So does the change of scale, which moves points in proportion to
-    /// their distance from the floor's centre.
+    /// slope of D adds to the slope of the gauge. The change of scale adds to it too, because it moves points in
+    /// proportion to their distance from the floor's centre.
     pub(super) fn gauge_slope_pm(
         &self,
         bulges: &[Bulge],
@@ -76,8 +76,8 @@ impl Steepness {
 
     /// Slopes of the gauge within the cross-section and along the tunnel.
     fn at(&self, view: &View, bulges: &[Bulge], scale: f64, scale_slope_pm: f64) -> (f64, f64) {
-        // A bulge counts for this view if it comes within two sampled directions of the view's direction. The margin is
-        // that distance on the wall.
+        // A bulge counts for this view if it comes within two sampled directions of the view's direction. `margin_m` is
+        // the distance on the wall between two sampled directions, taken twice.
         let margin_m = 2.0 * TAU / f64::from(DIRECTIONS) * view.radius_m * view.radius_m / view.tangent_m;
         let (mut inwards_m, mut outwards_m, mut along, mut across) = (0.0, 0.0, 0.0, 0.0);
         for bulge in bulges.iter().filter(|b| b.covers(view.arc_m, self.perimeter_m, margin_m)) {

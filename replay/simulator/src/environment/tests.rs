@@ -1,4 +1,4 @@
-//! Scenes as text, and pseudo-random numbers, for the tests below. Each file covers one subject.
+//! Scenes as text, and pseudo-random numbers, for the tests in this folder. Each test file covers one subject.
 
 use headrace_config::Document;
 use headrace_geometry::frames::{Point3, Vec3};

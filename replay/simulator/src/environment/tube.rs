@@ -5,11 +5,11 @@
 //!
 //! If the axis is straight, the scale constant and the wall not displaced, the range to the wall has a closed form.
 //! Otherwise a ray advances in steps of (1 - gauge) divided by an upper bound on the slope of the gauge. Such steps
-//! cannot pass the wall, however thin a protrusion is. However, steps are at least [`LEAST_STEP_M`] long, so a ray may
-//! cross less than that length of rock unnoticed.
+//! cannot pass the wall, however thin a protrusion is. The one exception is that steps are at least [`LEAST_STEP_M`]
+//! long, so a ray may cross a shorter length of rock unnoticed.
 //!
-//! A mesh that replaces the wall has a stretch of its own. The planes at its ends are also wall where water on one side
-//! meets rock on the other. A ray therefore cannot escape if profile and mesh do not fit.
+//! A mesh that replaces the wall has a stretch of its own. The planes at its ends are also wall, wherever water on one
+//! side meets rock on the other side. A ray therefore cannot escape between profile and mesh if they do not fit.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, WallPoint, Yz};
@@ -26,9 +26,10 @@ use super::widths::half_width_m;
 const LEAST_STEP_M: f64 = 1e-4;
 /// Accuracy of the point where a ray meets the wall, m.
 const ROOT_M: f64 = 1e-11;
-/// Displacement above which a hit on the wall is attributed to the feature that displaced the wall, m.
+/// Displacement of the wall above which a hit is attributed to the feature that displaced the wall there, m.
 const FEATURE_M: f64 = 1e-3;
-/// Half the distance between the points from which the normal of a displaced wall is computed, m.
+/// The normal of a displaced wall is computed from differences between points on both sides of the hit. This is half
+/// the distance between them, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
 /// The tunnel's wall along the whole tunnel, except openings.
@@ -36,7 +37,7 @@ const NORMAL_STEP_M: f64 = 1e-5;
 pub(super) struct Tube {
     axis: Axis,
     profile: Profile,
-    /// Centre of the floor, about which the profile is scaled.
+    /// Centre of the floor. The profile is scaled about this point.
     floor: Yz,
     scales: Scales,
     bulges: Vec<Bulge>,
@@ -46,19 +47,19 @@ pub(super) struct Tube {
     stretches: Vec<Stretch>,
 }
 
-/// A length of tunnel within one piece of the axis, with a linear scale and a fixed set of displacements.
+/// A length of tunnel within one piece of the axis, with a linear scale of the profile and the same bulges everywhere.
 #[derive(Debug, Clone)]
 struct Stretch {
     from_m: f64,
     piece: Piece,
     /// Planes across the tunnel at the stretch's ends; `None` for an end at infinity.
     ends: [Option<Station>; 2],
-    /// Scale of the profile at the start of the stretch, or of the whole stretch if the slope is zero.
+    /// Scale of the profile at the start of the stretch, or of the whole stretch if `scale_slope_pm` is zero.
     scale: f64,
     scale_slope_pm: f64,
     /// Numbers of the bulges that extend into the stretch.
     bulges: Vec<usize>,
-    /// Number of the mesh that is the wall of this stretch.
+    /// Number of the mesh that is the wall of this stretch; `None` if the profile is.
     mesh: Option<usize>,
     /// Reciprocal of an upper bound on the slope of the gauge, m. It determines the length of steps along rays.
     step_m: f64,
@@ -67,7 +68,7 @@ struct Stretch {
 /// Passage of a ray through the water in the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
-    /// Distance along the ray at which the ray leaves the tube or reaches the given limit, m.
+    /// Distance along the ray at which the ray leaves the tube or reaches the limit of the search, m.
     pub(super) t_m: f64,
     /// Whether the ray's passage ends at the wall.
     pub(super) wall: bool,
@@ -92,7 +93,8 @@ impl Tube {
         let mut breaks: Vec<f64> = axis.pieces().iter().map(|piece| piece.from_m).collect();
         breaks.extend(scales.breaks());
         breaks.extend(bulges.iter().flat_map(|bulge| [bulge.begin_m(), bulge.end_m()]));
-        // A mesh has a single stretch, even if straight pieces of the axis meet within it.
+        // Breaks within a mesh are removed, so that each mesh has a single stretch, even if two straight pieces of the
+        // axis meet there.
         let spans: Vec<(f64, f64)> = meshes.iter().map(MeshWall::span_m).collect();
         breaks.retain(|at_m| !spans.iter().any(|(from_m, to_m)| from_m < at_m && at_m < to_m));
         breaks.extend(spans.iter().flat_map(|(from_m, to_m)| [*from_m, *to_m]));
@@ -173,9 +175,9 @@ impl Tube {
         [fy + (unscaled[0] - fy) * scale, fz + (unscaled[1] - fz) * scale]
     }
 
-    /// Place (y, z) of a wall point of the unscaled profile, and the profile's inward normal there.
+    /// Place (y, z) of a wall point on the unscaled profile, and the profile's inward normal there.
     ///
-    /// The place includes displacements.
+    /// The place includes the displacement of the wall by bulges.
     pub(super) fn wall_place(&self, at: WallPoint) -> (Yz, Yz) {
         let reference = self.profile.reference();
         let [wy, wz] = self.profile.point_at(at.arc_m);
@@ -192,7 +194,7 @@ impl Tube {
     /// Range along the unit vector `direction` (y, z) from a point of the section at `chainage_m` to the profile's
     /// wall, m.
     ///
-    /// Ignores displacements. `None` if the point is outside the profile.
+    /// Ignores displacements of the wall. `None` if the point `from` is outside the profile.
     pub(super) fn section_range_m(&self, chainage_m: f64, from: Yz, direction: Yz) -> Option<f64> {
         let scale = self.scale(chainage_m);
         let hit = self.profile.cast(self.unscaled(from, scale), direction.map(|c| c / scale))?;
@@ -214,7 +216,7 @@ impl Tube {
         if !self.holds(first, start) {
             return None;
         }
-        // Chainage is monotonic along a straight line, so the direction at the start holds for the whole ray.
+        // Chainage is monotonic along a straight line. A ray towards growing chainage therefore never turns back.
         let [tx, ty] = first.piece.station(start_m).tangent;
         let forwards = ray.direction[0] * tx + ray.direction[1] * ty >= 0.0;
         let mut t_m = t_m;
@@ -255,7 +257,7 @@ impl Tube {
         }
     }
 
-    /// Number of the stretch that holds a point, and the point's chainage.
+    /// Number of the stretch that the point lies in, and the point's chainage.
     fn locate(&self, point: V3) -> (usize, f64) {
         let (_, chainage_m, _) = self.axis.locate([point[0], point[1]]);
         let after = self.stretches.partition_point(|stretch| stretch.from_m <= chainage_m);
@@ -278,7 +280,7 @@ impl Tube {
     }
 
     /// Returns the range at which the ray leaves the tube, searched from `t_m` to `until_m` within the stretch. If a
-    /// mesh is the wall there, also returns the face that the ray hits.
+    /// mesh is the wall of the stretch, also returns the face that the ray hits.
     fn leave_stretch(
         &self,
         stretch: &Stretch,
@@ -297,8 +299,8 @@ impl Tube {
         left.map(|t_m| (t_m, None))
     }
 
-    /// Face of the plane between two stretches where the ray arrives at `t_m`; `None` if there is water beyond the
-    /// plane.
+    /// Face of the plane between two stretches, if the plane is wall where the ray meets it at `t_m`; `None` if water
+    /// is beyond.
     ///
     /// Only the end planes of a mesh can be wall.
     fn end_wall(&self, from: &Stretch, to: usize, ray: &Ray, t_m: f64) -> Option<Face> {
@@ -315,7 +317,8 @@ impl Tube {
         Some(Face { normal: [against * tx, against * ty, 0.0], feature: Some(mesh.feature()) })
     }
 
-    /// Range at which the ray leaves the tube, in closed form, for a straight axis and a constant profile.
+    /// Range at which the ray leaves the tube, in closed form, if axis and profile of the stretch are straight and
+    /// constant.
     fn leave_plain(&self, stretch: &Stretch, ray: &Ray, t_m: f64) -> Option<f64> {
         let at = ray.at(t_m);
         let [tx, ty] = stretch.piece.station(0.0).tangent;
@@ -327,8 +330,8 @@ impl Tube {
         );
         match hit {
             Some(hit) => Some(t_m + hit.range_m),
-            // Two cases have no wall ahead: a point on the wall itself, which ends the ray here, and a ray along the
-            // axis.
+            // No wall is ahead in two cases. If the point is on the wall itself, the ray ends here. If the ray runs
+            // along the axis, it hits no wall.
             None => (self.gauge(stretch, at) > 1.0 - 1e-9).then_some(t_m),
         }
     }
@@ -350,7 +353,7 @@ impl Tube {
         None
     }
 
-    /// Distance of a point from the reference point, divided by the distance of the wall in the same direction.
+    /// Gauge of a point: its distance from the reference point divided by the wall's distance in the same direction.
     fn gauge(&self, stretch: &Stretch, point: V3) -> f64 {
         let plan = [point[0], point[1]];
         if stretch.is_constant() {
@@ -373,8 +376,8 @@ impl Tube {
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
-    /// The profile's wall in the direction from the reference point to an unscaled point, and the distance between
-    /// these two points, m.
+    /// The profile's wall in the direction from the reference point to the point `unscaled`, and the distance between
+    /// the reference point and that point, m.
     fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
         let [ry, rz] = self.profile.reference();
         let out = [unscaled[0] - ry, unscaled[1] - rz];
@@ -384,8 +387,8 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Without this return, adding and subtracting the floor's position could change the last bit of the result. The
-        // plain case must equal the profile exactly.
+        // An unscaled tunnel must equal the profile exactly. Adding and subtracting the floor's position could change
+        // the last bit of the result, so the point is returned as it is.
         if scale == 1.0 {
             return section;
         }
@@ -405,7 +408,7 @@ impl Tube {
         unit(fall)
     }
 
-    /// Number of the feature that displaces the wall most at a point.
+    /// Number of the feature that displaces the wall most at a point; `None` if no feature displaces it noticeably.
     fn displaced_by(&self, stretch: &Stretch, at: WallPoint) -> Option<u16> {
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
@@ -451,8 +454,7 @@ impl Stretch {
     }
 }
 
-/// Root of a function between a point with a negative value and a point with a non-negative value, by the Illinois
-/// method.
+/// Finds a root of `f` by the Illinois method. The function is negative at `below` and not negative at `above`.
 fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
     let mut kept = 0;
     for _ in 0..100 {
@@ -461,8 +463,8 @@ fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) ->
         }
         let t = below.0 - below.1 * (above.0 - below.0) / (above.1 - below.1);
         let value = f(t);
-        // If an end of the bracket is kept twice in a row, the function's value at this end is halved. Otherwise the
-        // bracket could shrink from one side only.
+        // If an end of the search interval is kept twice in a row, the function's value at this end is halved.
+        // Otherwise the interval could shrink from one side only.
         if value < 0.0 {
             below = (t, value);
             if kept == 1 {

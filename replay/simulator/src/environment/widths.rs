@@ -4,9 +4,9 @@ use headrace_geometry::tunnel::Profile;
 
 /// Number of points at which a profile's extent is evaluated.
 const PLACES: u32 = 2_000;
-/// Factor on a half-width that allows for points between the samples.
+/// Factor by which a half-width is enlarged, because the wall may be farther out between the evaluated points.
 const WIDTH_MARGIN: f64 = 1.001;
-/// Largest rise of a floor that counts as flat, m.
+/// Largest difference in height within a floor that counts as flat, m.
 const FLAT_M: f64 = 1e-3;
 /// Largest distance of the wall from the axis, to either side, m.
 pub(super) fn half_width_m(profile: &Profile) -> f64 {

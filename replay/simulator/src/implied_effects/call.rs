@@ -1,4 +1,4 @@
-//! Calls: reasons to simulate an effect.
+//! Calls. A call is a reason to simulate an effect, such as silt in the scene's water.
 
 /// An effect that a scene implies, with its tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,11 +18,11 @@ pub struct Called {
 pub enum Fate {
     /// The effect is simulated with its implied tables.
     Taken,
-    /// The effect is simulated with the tables in the scene.
+    /// The effect is simulated with tables that the scene itself has.
     Named,
-    /// The effect isn't simulated: the scene asks only for the effects that it names.
+    /// The effect isn't simulated: the scene asks only for the effects that it names itself.
     NotTaken,
-    /// The effect isn't simulated: the key `leave` lists it.
+    /// The effect isn't simulated: the scene's key `leave` lists it.
     Left,
 }
 
@@ -41,7 +41,8 @@ impl Fate {
 /// A value of an effect's key, as TOML text.
 pub(super) type Value = String;
 
-/// A call: one reason to simulate an effect, with the sensors, the range of chainage and the keys that follow from it.
+/// A call: one reason to simulate an effect, with the sensors, the range of chainage and the keys that follow from this
+/// reason.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Call {
     pub(super) effect: &'static str,

@@ -21,7 +21,7 @@ use headrace_vehicle::VehicleConfig;
 use super::call::{Call, number};
 use crate::facts::{Facts, SensorFacts};
 
-/// Largest difference in beam width between heads of one frequency, radians. It corresponds to 5 kHz.
+/// Largest difference in beam width between heads that count as having one frequency, radians. It corresponds to 5 kHz.
 const SAME_BEAM_RAD: f64 = 2e-4;
 
 /// Effects implied by the models of the vehicle's sensors.
@@ -94,7 +94,7 @@ fn inertial(noise: &InertialNoise) -> Own {
     ]
 }
 
-/// Effects implied by heads on a moving vehicle, and by heads near other heads or the hull.
+/// Effects implied by heads that are on a moving vehicle, or near other heads or the hull.
 fn of_vehicle(vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
     let heads: Vec<&SensorFacts> = facts.sensors.iter().filter(|sensor| sensor.head.is_some()).collect();
     let ids = |sensors: &[&SensorFacts]| sensors.iter().map(|sensor| sensor.id.clone()).collect::<Vec<_>>();

@@ -14,9 +14,9 @@ use crate::trajectory::Ground;
 /// A known cable, selected by name.
 ///
 /// Strength and diameter are from the maker's page (docs.bluerobotics.com/fathom-r2: 7.6 mm, 350 lb). The stiffness EA
-/// is the strength divided by the strain at which aramid breaks, 3.6 % (DuPont, "Kevlar aramid fiber technical guide",
-/// Kevlar 29). The drag is that of a smooth cylinder drawn along its axis at 0.2 m/s, with a friction coefficient of
-/// 0.01.
+/// is the strength divided by 3.6 %, the strain at which aramid breaks (DuPont, "Kevlar aramid fiber technical guide",
+/// Kevlar 29). The drag is that of a smooth cylinder with a friction coefficient of 0.01, drawn along its axis at 0.2
+/// m/s.
 struct Cable {
     name: &'static str,
     diameter_m: f64,
@@ -27,10 +27,10 @@ const CABLES: [Cable; 1] = [Cable { name: "fathom", diameter_m: 0.0076, strength
 const ARAMID_STRAIN: f64 = 0.036;
 const FRICTION: f64 = 0.01;
 const DRAWN_MPS: f64 = 0.2;
-/// Distance on either side of an opening within which its corners cause double reflections, m.
+/// Distance on either side of an opening, m. Within it the opening's corners cause double reflections.
 const BESIDE_M: f64 = 1.0;
-/// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance, degrees. The values
-/// are from the scene steel.toml.
+/// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance there, degrees. Both
+/// values are from the scene steel.toml.
 const STEEL_END_M: f64 = 6.0;
 const STEEL_END_DEG: f64 = 10.0;
 
@@ -54,7 +54,7 @@ struct Murk {
     grain_um: f64,
 }
 
-/// A leak: a flow out of the tunnel, or into the tunnel if negative.
+/// A leak: a flow out of the tunnel if `flow_m3ps` is positive, or into the tunnel if it is negative.
 #[derive(Debug, Clone, Copy)]
 struct Leak {
     chainage_m: f64,
@@ -96,7 +96,7 @@ pub(crate) struct Tables<'a> {
 impl<'a> Tables<'a> {
     /// Finds the tables `[water]`, `[cable]` and `[thrusters]`, and the stretches in `[tunnel]`.
     ///
-    /// Errors: one of them is not a table.
+    /// Errors: one of these keys is not a table.
     pub(crate) fn of(root: &Section<'a>, tunnel: Option<&Section<'a>>) -> Result<Self, ConfigError> {
         let stretches = tunnel.map(|tunnel| tunnel.sections("stretches")).transpose()?;
         Ok(Self {
@@ -207,7 +207,7 @@ impl Described {
             let place_m = [murk.stretch.from_m, murk.stretch.to_m];
             let by = format!("murk of {} g/l from {} to {} m", murk.silt_gpl, place_m[0], place_m[1]);
             let call = |effect, keys: &[_]| Call::new(effect, by.clone(), keys).within(place_m);
-            // Values from docs/why/field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
+            // Values from docs/why/field.md, "murk", for runs of lost returns, near returns (5 %) and second echoes.
             let lost = [("share", number(0.2)), ("mean_run", number(6.0))];
             let near = [("share", number(0.05)), ("mean_run", number(3.0))];
             let silt = [("silt_gpl", number(murk.silt_gpl)), ("grain_um", number(murk.grain_um))];
@@ -222,7 +222,7 @@ impl Described {
     }
 
     fn of_leaks(&self, facts: &Facts, environment: &Environment) -> Vec<Call> {
-        // A current does not carry a vehicle with a trajectory given over ground.
+        // If the trajectory is given over ground, a current does not carry the vehicle.
         if self.leaks.is_empty() || facts.ground == Ground::Tunnel {
             return Vec::new();
         }

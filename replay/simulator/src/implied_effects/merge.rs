@@ -4,8 +4,8 @@
 use super::call::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
-/// The only key of an effect whose value is a list. The lists of several calls are concatenated. For all other keys,
-/// the value of the later call applies.
+/// The only key of an effect whose value is a list. The lists of several calls for the effect are concatenated. For
+/// every other key, the value of the later call applies.
 const PLACES: &str = "places";
 
 /// Name of the effect that has one table per group of sensors.
@@ -13,8 +13,8 @@ const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
 
-/// Sensors that share tables, the ranges of chainage and keys of these tables, and, for the effect [`GROUPED`], the
-/// sensors that the call names.
+/// Sensors that share tables; the ranges of chainage and the keys of these tables; and the sensors that the call names,
+/// which are kept only for the effect [`GROUPED`].
 type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
 /// A table to write: the range of chainage where it applies, and its keys.

@@ -47,7 +47,7 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    /// Reads `take` and `leave`. `instead` overrides the value of `take`.
+    /// Reads `take` and `leave`. `instead`, if given, overrides the value of `take`.
     ///
     /// Errors: `take` has an unknown value, `leave` is given without `take = "called"`, or `leave` lists a name that is
     /// not an effect.
@@ -68,8 +68,8 @@ impl Choice {
         Ok(Self { take: instead.unwrap_or(take), leave })
     }
 
-    /// Sets for each implied effect whether and how it is simulated. `is_named` tells whether the scene names an
-    /// effect.
+    /// Sets for each implied effect whether and how it is simulated. `is_named` tells whether the scene names the
+    /// effect with this name.
     pub(crate) fn decide(&self, called: &mut [Called], is_named: impl Fn(&str) -> bool) {
         for call in called {
             call.fate = match self.take {

@@ -33,7 +33,8 @@ fn implied_effects_are_simulated_only_if_the_scene_says_so() {
     assert!(fates(MURK).iter().all(|(_, fate)| *fate == Fate::NotTaken));
 }
 
-/// The displayed tables are equivalent to the implied effects: copied into the scene, they give the same bytes.
+/// The displayed tables are equivalent to the implied effects. If the tables are copied into the scene, the devices
+/// send the same bytes.
 #[test]
 fn implied_effects_give_the_same_messages_as_named_effects() {
     let called = format!("{MURK}[effects]\ntake = \"called\"\n");
@@ -87,7 +88,7 @@ fn each_description_implies_its_effects() {
         let found: Vec<&str> = effects(text).into_iter().filter(|effect| !bare.contains(effect)).collect();
         assert_eq!(found, more, "{text}");
     }
-    // The current of a leak is half a cubic metre per second through a rectangle of 6 m by 5 m.
+    // The leak takes half a cubic metre per second through a rectangle of 6 m by 5 m, so the current is 0.5 / 30 m/s.
     let scene = dive().scene("[water]\n[[water.leaks]]\nchainage_m = 20\nflow_m3ps = 0.5").unwrap();
     let current = scene.called().iter().find(|call| call.effect == "current").unwrap();
     let speed_mps: f64 =

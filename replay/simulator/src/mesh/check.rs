@@ -19,13 +19,13 @@ pub enum Role {
 
 /// Largest allowed coordinate, metres. A larger coordinate indicates a wrong unit or origin.
 const FAR_M: f64 = 100_000.0;
-/// Largest distance between welded vertices, as a share of the mesh's diagonal.
+/// Largest distance at which two vertices are welded into one, as a share of the mesh's diagonal.
 const WELD: f64 = 1e-9;
-/// Largest distance of a wall's opening from an end of the mesh, as a share of the wall's length. If [`END_M`] is
-/// larger than this distance, [`END_M`] applies.
+/// Largest distance of a wall's opening from an end of the mesh, as a share of the wall's length. If [`END_M`] is the
+/// larger distance, it applies instead.
 const END: f64 = 0.02;
-/// Largest distance of a wall's opening from an end of the mesh, metres, where it exceeds the share [`END`]. Both
-/// limits are at most a quarter of the length, which keeps the ends apart.
+/// Largest distance of a wall's opening from an end of the mesh, metres, if it is larger than the distance by [`END`].
+/// Either limit is reduced to a quarter of the wall's length, so that the ends stay apart.
 const END_M: f64 = 0.5;
 
 /// A checked surface of triangles.
@@ -49,7 +49,7 @@ pub(super) struct Cap {
     pub(super) high: [f64; 3],
 }
 
-/// A hole in the surface: connected edges that belong to only one face each.
+/// A hole in the surface: connected edges, each of which belongs to only one face.
 struct Hole {
     edges: Vec<[u32; 2]>,
     low_x: f64,
@@ -140,11 +140,11 @@ pub(super) fn diagonal(low: [f64; 3], high: [f64; 3]) -> f64 {
     math::sqrt(x * x + y * y + z * z)
 }
 
-/// For each vertex, the number of the first vertex within welding distance.
+/// Returns, for each vertex, the number of the first vertex to which it is close enough to be welded.
 fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     let near = (WELD * diagonal).max(f64::MIN_POSITIVE);
-    // A cell is several times as wide as the welding distance. For most vertices only one cell is therefore searched,
-    // and no cell holds many vertices.
+    // A cell of the search grid is several times as wide as the welding distance, so that only one cell is searched for
+    // most vertices. A cell is still too small to hold many vertices.
     let cell = 8.0 * near;
     let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let mut welded = Vec::with_capacity(vertices.len());
@@ -253,7 +253,8 @@ fn ends(vertices: &[[f64; 3]], holes: &[Hole], low_x: f64, high_x: f64) -> Resul
 
 /// Closes a hole by triangles from the centroid of the rim vertices to each edge.
 ///
-/// Each edge of the hole then has two faces, whatever the hole's shape. The inside is therefore defined.
+/// Each edge of the hole then has two faces, whatever the hole's shape. It is therefore defined which points are inside
+/// the surface.
 fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let mut middle = [0.0; 3];
     for &corner in hole.edges.as_flattened() {
@@ -264,7 +265,7 @@ fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let middle = middle.map(|sum| sum / (2 * hole.edges.len()) as f64);
     let triangle = |&[a, b]: &[u32; 2]| [vertices[a as usize], vertices[b as usize], middle];
     let triangles: Vec<_> = hole.edges.iter().map(triangle).collect();
-    // The centroid lies within the bounding box of the edges.
+    // The centroid lies within the bounding box of the edges, so the box may start from it.
     let (mut low, mut high) = (middle, middle);
     for corner in triangles.as_flattened() {
         for k in 0..3 {

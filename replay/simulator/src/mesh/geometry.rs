@@ -7,13 +7,14 @@
 
 use headrace_geometry::math;
 
-/// Relative size of a triangle's area, seen along the ray, below which rounding errors dominate. Such a triangle is a
-/// needle or is seen edge-on. The value is a few thousand times the relative rounding error of one operation.
+/// Relative size of a triangle's area, seen along the ray, below which rounding errors dominate. A triangle with such a
+/// small area is a needle or is seen edge-on. The value is a few thousand times the relative rounding error of one
+/// operation.
 const THIN: f64 = 1e-12;
 /// Factor that widens the interval of a box by more than its rounding error.
 const WIDER: f64 = 1.0 + 1e-15;
 
-/// Result of the crossing test of a ray and a triangle, with ambiguous cases kept apart.
+/// Tells whether a ray crosses a triangle. Ambiguous cases have a value of their own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Crossing {
     Beside,
@@ -29,8 +30,8 @@ pub(super) struct Ray {
     inverse: [f64; 3],
     /// Numbers of the coordinate axes. The axis nearest to the ray's direction is last.
     axes: [usize; 3],
-    /// Shear that makes the ray parallel to the last axis: the amounts that are subtracted from the first two
-    /// coordinates per unit of the last coordinate, and the scale of the last coordinate.
+    /// Shear that makes the ray parallel to the last axis. The first two numbers are subtracted from the first two
+    /// coordinates, per unit of the last coordinate. The third number is the scale of the last coordinate.
     shear: [f64; 3],
     far: f64,
 }
@@ -42,7 +43,7 @@ struct Parts {
 }
 
 impl Ray {
-    /// Prepares a ray from an origin and a direction of any length. The ray ends at `far` times that length.
+    /// Prepares a ray from an origin and a direction of any length. The ray ends at `far` times the direction's length.
     ///
     /// A ray hits nothing if its direction is zero or not finite.
     pub(super) fn new(origin: [f64; 3], direction: [f64; 3], far: f64) -> Self {
@@ -61,7 +62,7 @@ impl Ray {
 
     /// Lower bound of the range at which the ray enters a box; infinite if the ray misses the box.
     ///
-    /// A NaN, from zero times infinity, leaves the bound unchanged.
+    /// A NaN, which comes from zero times infinity, leaves the bound unchanged.
     pub(super) fn enters(&self, low: [f64; 3], high: [f64; 3]) -> f64 {
         let mut near = 0.0;
         let mut far = self.far;
@@ -76,8 +77,8 @@ impl Ray {
                 far = last;
             }
         }
-        // The bound is less than the range of any hit in the box, even at range 0. A hit at an equal range in another
-        // box is therefore found too.
+        // The bound is less than the range of any hit in the box, even of a hit at range 0. If hits in two boxes have
+        // equal ranges, both are therefore found.
         if near <= far * WIDER { near / WIDER / WIDER - f64::MIN_POSITIVE } else { f64::INFINITY }
     }
 
@@ -123,7 +124,7 @@ impl Ray {
 }
 
 impl Parts {
-    /// Depth along the last axis at which the ray meets the triangle's plane.
+    /// Coordinate along the last axis at which the ray meets the triangle's plane.
     fn depth(&self) -> Option<f64> {
         let [u, v, w] = self.areas;
         let [a, b, c] = self.corners;
@@ -137,7 +138,8 @@ impl Parts {
         if whole.abs() > THIN * wide * deep {
             return Some((u * a[2] + v * b[2] + w * c[2]) / whole);
         }
-        // The areas are mere rounding errors. The triangle is nearly a line, so the longest side gives the depth.
+        // The areas consist of rounding errors only, because the triangle is seen as a line. The depth is therefore
+        // computed from its longest side.
         let side = |p: [f64; 3], q: [f64; 3]| {
             let (x, y) = (q[0] - p[0], q[1] - p[1]);
             let square = x * x + y * y;
@@ -155,8 +157,8 @@ impl Parts {
     }
 }
 
-/// The unit normal of a triangle, on the side from which a ray of this direction comes. For a triangle without area,
-/// the normal points against the ray.
+/// The unit normal of a triangle, on the side from which a ray with this `direction` comes. For a triangle without
+/// area, the normal points against the ray.
 pub(super) fn normal_against(triangle: [[f64; 3]; 3], direction: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = triangle;
     let normal = cross(minus(b, a), minus(c, a));

@@ -30,13 +30,13 @@ pub use ply::{Triangles, read};
 
 /// Margin of the tree's boxes around their contents, as a share of the mesh's size.
 ///
-/// The margin exceeds the rounding error for a triangle seen from a distance of up to a thousand times the mesh's size.
+/// The margin exceeds the rounding error of a triangle that is hit from up to a thousand times the mesh's size.
 const SLACK: f64 = 1e-12;
 
 /// Directions of the rays that test whether a point is inside.
 ///
-/// The directions avoid the axes and planes that are likely in meshes. They point mostly across the tunnel, where a ray
-/// is short.
+/// The directions avoid the axes and planes that are likely in meshes. They point mostly across the tunnel, because
+/// rays in these directions are short.
 const WAYS_OUT: [[f64; 3]; 6] = [
     [0.137, 0.811, 0.573],
     [-0.219, -0.547, 0.829],
@@ -94,11 +94,11 @@ impl Mesh {
     /// The nearest hit of a ray on the mesh, from either side, no farther than `far_m`.
     ///
     /// A ray that starts on the surface hits it at range 0. `direction_unit` must have length 1. The result is `None`
-    /// if there is no hit, or if a number other than `far_m` is not finite.
+    /// if there is no hit, or if a component of `origin` or `direction_unit` is not finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // Range and face of the best hit. The smallest face number wins at equal ranges, while the tree itself would
-        // return the hit that it visits first.
+        // Range and face of the best hit. At equal ranges, the smallest face number wins. The tree alone returns the
+        // hit that it visits first.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,
@@ -119,12 +119,12 @@ impl Mesh {
     /// Whether a point is in the solid, or within the wall and between its ends.
     ///
     /// This function counts how often a ray from the point crosses the surface. An odd number means inside. The
-    /// openings of a wall are closed by triangles, which extend from an opening's centroid to its edges. If a ray
-    /// touches an edge, the next ray is tried. If all rays touch edges, the point is on the surface and counts as
-    /// inside. A point in two overlapping parts counts as outside.
+    /// openings of a wall are closed by triangles, which extend from an opening's centroid to its edges. If the ray
+    /// touches an edge, a ray in another direction is tried. If all rays touch edges, the point is on the surface and
+    /// counts as inside. A point in two overlapping parts of the mesh counts as outside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
-        // The negated comparison counts a point with NaN as outside.
+        // All comparisons with NaN are false. Their negation therefore counts a point with NaN as outside.
         if !(0..3).all(|k| point[k] >= low[k] && point[k] <= high[k]) {
             return false;
         }

@@ -8,7 +8,7 @@ use ply_rs_bw::ply::{
 use super::error::MeshError;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Names of the property that lists a face's corners. Both are in use.
+/// Names of the property that lists a face's corners. Files use either name.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// Maximum length of an error text. An error quotes a line of the file, which may have any length.
 const MAX_ERROR_CHARS: usize = 300;
@@ -34,7 +34,8 @@ pub fn read(bytes: &[u8]) -> Result<Triangles, MeshError> {
     check(&header)?;
     widen_text(&mut header);
     let mut triangles = Triangles::default();
-    // An element without properties takes no bytes, so its count in the header must not decide how much memory is used.
+    // An element without properties takes no bytes in the file. Its count in the header may be any number, so it must
+    // not decide how much memory is used.
     for element in header.elements.values().filter(|element| !element.properties.is_empty()) {
         match element.name.as_str() {
             "vertex" => {

@@ -69,7 +69,7 @@ pub(super) fn cuboid(half: [f64; 3]) -> Triangles {
     Triangles { vertices: (0..8).map(corner).collect(), faces }
 }
 
-/// An icosahedron with each face split in four `levels` times. A function gives the radius of each vertex.
+/// An icosahedron with each face split in four `levels` times. `radius_m` is called for the radius of each vertex.
 pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let g = f64::midpoint(1.0, math::sqrt(5.0));
     let mut vertices: Vec<[f64; 3]> = Vec::new();
@@ -115,7 +115,7 @@ pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Tri
     Triangles { vertices, faces }
 }
 
-/// A tube about the x-axis with open ends. A function gives the radius of each vertex.
+/// A tube about the x-axis with open ends. `radius_m` is called for the radius of each vertex.
 pub(super) fn tube(rings: u32, around: u32, length_m: f64, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let mut triangles = Triangles::default();
     for i in 0..=rings {
@@ -146,7 +146,8 @@ fn rough_tube() -> Triangles {
 
 /// Range of the nearest hit by the Moller-Trumbore method over all triangles; infinite if there is no hit.
 ///
-/// `None` for a ray that passes within a billionth of an edge, where the two methods may differ.
+/// `None` for a ray that passes within a billionth of an edge, because the mesh's own method may give another result
+/// there.
 fn brute(t: &Triangles, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
     let mut nearest = f64::INFINITY;
     for face in &t.faces {
@@ -233,7 +234,7 @@ fn no_ray_slips_between_triangles() {
             let (direction, distance) = toward(origin, target);
             let hit = mesh.cast(origin, direction, f64::INFINITY);
             let range = hit.unwrap_or_else(|| panic!("out by {target:?} from {origin:?}")).range_m;
-            // From a point off the centre of the rough body, another face may hide the target.
+            // Odd rays start off the centre of the rough body, so a nearer face may hide the target.
             assert!(
                 range < distance + 1e-9 && (i % 2 == 1 || range > distance - 1e-9),
                 "{range}, not {distance}"
@@ -247,7 +248,7 @@ fn no_ray_from_the_axis_of_a_tube_slips_through_its_wall() {
     let triangles = rough_tube();
     let mesh = Mesh::new(triangles.clone(), Role::Wall).unwrap();
     for &target in &triangles.vertices {
-        // Directions are perpendicular to the axis, so one or two components are zero or nearly zero.
+        // The rays are perpendicular to the axis, so one or two components of their directions are zero or nearly zero.
         let origin = [target[0], 0.0, 0.0];
         let (direction, distance) = toward(origin, target);
         let hit = mesh.cast(origin, direction, 100.0).unwrap();
@@ -283,7 +284,7 @@ fn lowest_face_number_wins_at_equal_ranges() {
     let hit = |t: &Triangles, direction| {
         Mesh::new(t.clone(), Role::Body).unwrap().cast([0.0; 3], direction, 9.0).unwrap()
     };
-    // The faces' diagonals, which are edges of triangles, cross in the middle.
+    // A ray along an axis hits the middle of a face, where the face's diagonal is the common edge of two triangles.
     let along_x = hit(&triangles, [1.0, 0.0, 0.0]);
     assert_eq!(along_x, MeshHit { range_m: 1.0, normal: [-1.0, 0.0, 0.0], face: 2 });
     assert_eq!(hit(&triangles, [0.0, 0.0, -1.0]).face, 8);

@@ -47,7 +47,7 @@ fn duplicated_vertices_are_welded() {
     let whole = icosphere(3, || 2.0);
     let mut t = Triangles::default();
     for (i, corner) in (0_u32..).zip(whole.faces.as_flattened()) {
-        // The copies of a vertex differ by less than a billionth of the mesh's diagonal.
+        // The copies of a vertex are less than a billionth of the mesh's diagonal apart, so they are welded.
         let off = f64::from(i % 3) * 1e-9;
         t.vertices.push(whole.vertices[*corner as usize].map(|c| c + off));
     }
@@ -76,7 +76,7 @@ fn body_with_holes_is_refused() {
     while t.faces[middle].iter().any(|corner| t.faces[0].contains(corner)) {
         middle += 1;
     }
-    // Removes all faces around one vertex that is not a corner of the icosahedron.
+    // Removes all faces around vertex 100, which is not a corner of the icosahedron.
     t.faces.retain(|face| !face.contains(&100));
     let expected =
         "the mesh has 2 hole(s) where it must be closed; the largest has 6 edges, one of them at (";
@@ -95,7 +95,8 @@ fn mesh_wall_may_be_open_only_at_its_ends() {
     let whole = tube(100, 8, 100.0, || 2.0);
     assert!(Mesh::new(whole.clone(), Role::Wall).is_ok());
 
-    // Each ring has 16 faces. A missing face within 2 % of the end counts as unevenness of the end.
+    // Each ring has 16 faces. A face that is missing within 2 % of the wall's length from an end is part of the open
+    // end.
     let mut t = whole.clone();
     t.faces.remove(16);
     assert!(Mesh::new(t, Role::Wall).is_ok());
@@ -106,7 +107,7 @@ fn mesh_wall_may_be_open_only_at_its_ends() {
         "the mesh has 1 hole(s) where it must be closed; the largest has 3 edges, one of them at (50.000, 0.000, 2.000)"
     );
 
-    // A half pipe has a single rim along all its edges.
+    // A half pipe is refused, because all its open edges form a single rim.
     let mut t = whole.clone();
     t.faces.retain(|face| face.iter().all(|corner| corner % 8 <= 4));
     assert!(

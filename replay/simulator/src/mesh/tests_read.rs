@@ -11,7 +11,7 @@ fn sample() -> Triangles {
     icosphere(1, || 2.0)
 }
 
-/// A PLY file with more elements and properties than needed.
+/// The triangles as a PLY file, which has more elements and properties than the reader needs.
 fn ply(t: &Triangles, encoding: &str) -> Vec<u8> {
     let header = format!(
         "ply\nformat {encoding} 1.0\ncomment by hand\nobj_info no\nelement camera 2\nproperty short id\nproperty list uchar \
@@ -173,7 +173,7 @@ fn wrong_element_counts_in_ply_files_allocate_no_memory() {
     long_list.extend([0xFF; 4]);
     let words = refused(&long_list);
     assert!(words.contains("end of file") && words.contains("'face'"), "{words}");
-    // A file in text encoding that is cut off.
+    // A file in text encoding that ends before it has as many elements as its header says.
     let text = file(u64::MAX, "uint").replace("binary_little_endian", "ascii");
     assert!(refused(text.as_bytes()).contains("end of file"));
 }

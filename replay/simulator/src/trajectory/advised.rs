@@ -1,4 +1,5 @@
-//! Trajectory of a pilot who follows a monitor's advice. It is decided during the dive, a few seconds ahead.
+//! Trajectory of a pilot who follows a monitor's advice. The trajectory is decided during the dive, a few seconds
+//! ahead.
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -13,19 +14,19 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// The position at a time depends on at most this many knots after that time.
+/// A position depends on at most this many knots that are later than its own time.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back to a missed stretch, m/s.
 const BACK_MPS: f64 = 0.2;
-/// The pilot goes back for a missed stretch once it is this far behind the vehicle, m.
+/// Distance of a missed stretch behind the vehicle, m. From this distance on, the pilot goes back for the stretch.
 const BEHIND_M: f64 = 3.0;
-/// Run-up before the second pass over a missed stretch, m.
+/// Distance before a missed stretch from which the pilot passes it a second time, m.
 const RUN_UP_M: f64 = 2.5;
-/// Period over which the ratio of driven to advised speed varies, s.
+/// Period of the variation of the driven speed relative to the advised speed, s.
 const HOLD_S: f64 = 20.0;
 /// Maximum total time that the pilot keeps the vehicle stationary because of advice, s.
 const MOST_STOOD_S: f64 = 120.0;
-/// Time that the pilot waits for more advice at the end, in addition to `lag_s`, s.
+/// Time that the pilot waits for more advice at the end of the dive, in addition to his reaction time `lag_s`, s.
 const WAITS_S: f64 = 10.0;
 
 /// The monitor's advice to the pilot at one time.
@@ -61,13 +62,13 @@ pub(super) struct Heeding {
     pub(super) speed_mps: f64,
     /// Delay between advice and the pilot's action, at least 3 s.
     pub(super) lag_s: f64,
-    /// Largest relative shortfall of the driven speed below the advised speed.
+    /// Largest share by which the driven speed falls short of the advised speed.
     pub(super) within: f64,
     /// Whether the pilot passes missed stretches a second time.
     pub(super) goes_back: bool,
     /// Whether the pilot stops when advised to, and waits for the first advice before setting out. The monitor advises
-    /// stops to estimate gyro biases, or if it has no position.
-    pub(super) stops_if_advised: bool,
+    /// a stop if it needs to estimate gyro biases or has no position.
+    pub(super) stands: bool,
     /// Time that the pilot waits at the dive's start before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
@@ -101,7 +102,7 @@ pub(super) struct Advised {
     farthest_m: f64,
     /// Missed stretches that the pilot has gone back for, each extended by 1 m at both ends.
     tried_m: Vec<[f64; 2]>,
-    /// Number of the next knot of the trajectory to decide.
+    /// Number of the next knot of the trajectory that the pilot decides.
     next: i64,
     ended_s: Option<f64>,
     /// Total time that the pilot has kept the vehicle stationary because of advice, s.
@@ -201,16 +202,16 @@ impl Advised {
         }
     }
 
-    /// The latest advice that was given at least `lag_s` before `at_s`, if any.
-    fn advice_at(&self, at_s: f64) -> Option<PilotAdvice> {
+    /// The advice that the pilot follows at `at_s`: the latest that was given at least `lag_s` earlier, if any.
+    fn told_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
         let advice_list = |advice: &&PilotAdvice| advice.at <= by && by > MonoNs(START.0);
         self.advice_list.iter().rev().find(advice_list).cloned()
     }
 
     /// The missed stretch farthest behind the vehicle that the pilot has not gone back for. It must lie at least
-    /// [`BEHIND_M`] behind, unless the pilot waits at the end.
-    fn to_go_back_for(&self, advice: &PilotAdvice) -> Option<[f64; 2]> {
+    /// [`BEHIND_M`] behind the vehicle, unless the pilot waits at the end of the dive.
+    fn to_go_back_for(&self, told: &PilotAdvice) -> Option<[f64; 2]> {
         let behind_m = if matches!(self.doing, Doing::Waiting { .. }) { 0.0 } else { BEHIND_M };
         let missed = advice.missed_m.iter().filter(|[from_m, to_m]| {
             let tried = |[first_m, last_m]: &[f64; 2]| from_m < last_m && to_m > first_m;

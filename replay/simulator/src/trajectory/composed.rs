@@ -24,8 +24,8 @@ enum Base {
 }
 
 impl Trajectory {
-    /// Creates a trajectory of legs at constant speed from `start_m`, at one position in the cross-section. The vehicle
-    /// stays level.
+    /// Creates a trajectory of legs at constant speed from `start_m`, all at the same position in the cross-section.
+    /// The vehicle stays level.
     pub fn of_legs(start_m: f64, across_m: [f64; 2], legs: Vec<Leg>) -> Self {
         let legs = Legs::new(start_m, across_m, legs);
         Self { duration_s: legs.duration_s(), base: Base::Legs(legs), sways: Vec::new() }
@@ -60,12 +60,12 @@ impl Trajectory {
         }
     }
 
-    /// Duration, s. For an advised pilot, the maximum duration until he has finished.
+    /// Duration, s. For an advised pilot, this is the maximum duration until he has finished.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// Position `after_s` seconds after the start. The motion continues before the start and after the end.
+    /// Position `after_s` seconds after the start. Before the start and after the end, the motion continues.
     pub fn place(&self, after_s: f64) -> Place {
         let mut place = match &self.base {
             Base::Legs(legs) => legs.place(after_s),
@@ -79,13 +79,13 @@ impl Trajectory {
         place
     }
 
-    /// Adds a motion to the trajectory. The duration stays the same.
+    /// Adds the motion `knots` to the trajectory. The duration stays the same.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }
 
-    /// Lets the flow carry a vehicle that moves through the water. The vehicle reaches the same end after another
-    /// duration.
+    /// Lets the flow carry a vehicle that moves through the water. The vehicle ends at the same place, but after
+    /// another duration.
     ///
     /// Errors, as text: a leg makes no progress against the current, or the trajectory is given over ground.
     pub fn carry(&mut self, flow: &Flow) -> Result<(), String> {

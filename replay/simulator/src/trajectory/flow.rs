@@ -2,7 +2,7 @@
 
 use crate::stretch::Stretch;
 
-/// Speed of the water for stretches of the tunnel. The water is stationary outside these stretches.
+/// Speed of the water in each of several stretches of the tunnel, m/s. The water is stationary outside these stretches.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Flow(Vec<(Stretch, f64)>);
 

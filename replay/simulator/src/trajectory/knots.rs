@@ -7,9 +7,9 @@ use crate::random::Stream;
 /// Offsets of the vehicle: along the axis, left and up, m; roll, pitch and yaw, radians.
 pub type Offsets = [f64; 6];
 
-/// Control points of a spline, `spacing_s` apart. The first point lies one spacing before the start.
+/// Control points of a spline, spaced `spacing_s` apart in time. The first point lies one spacing before the start.
 ///
-/// The curve stays within the hull of four neighbouring points, so it never exceeds their range.
+/// The curve stays within the hull of four neighbouring points, so none of its values lies outside the range of theirs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knots {
     spacing_s: f64,
@@ -17,13 +17,14 @@ pub struct Knots {
 }
 
 impl Knots {
-    /// A spline of `duration_s`. Control point number k, from -1, is `point(k)` at time k * `spacing_s`.
+    /// Creates a spline with a duration of `duration_s`. Its control point number k, counted from -1, is `point(k)` and
+    /// lies at time k * `spacing_s`.
     pub fn new(duration_s: f64, spacing_s: f64, mut point: impl FnMut(i64) -> Offsets) -> Self {
         let last = math::floor_to_i64(duration_s / spacing_s) + 2;
         Self { spacing_s, points: (-1..=last).map(&mut point).collect() }
     }
 
-    /// Sets a component of control point number k, from -1.
+    /// Sets a component of control point number k, counted from -1.
     pub(super) fn set(&mut self, k: i64, component: usize, value: f64) {
         let point = usize::try_from(k + 1).ok().and_then(|index| self.points.get_mut(index));
         if let Some(slot) = point.and_then(|point| point.get_mut(component)) {
@@ -90,7 +91,7 @@ impl Knots {
 /// Control points are half a period apart and uniformly distributed. The standard deviation is 0.4 of the amplitude.
 pub fn wandering(stream: Stream, duration_s: f64, period_s: f64, reach: Offsets) -> Knots {
     Knots::new(duration_s, period_s / 2.0, |k| {
-        // The first control point has number -1.
+        // Step numbers are not negative, but the first control point has number -1.
         let step = (k + 1).unsigned_abs();
         let numbers = [0, 1, 2].map(|block| stream.block(step, block).uniform());
         let mut point = reach;

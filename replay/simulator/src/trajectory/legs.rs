@@ -58,7 +58,8 @@ impl Legs {
         Place { chainage_m, across_m: self.across_m, turned_rad: [0.0; 3] }
     }
 
-    /// Applies a flow while the speeds through the water stay the same. A leg is cut where the flow changes.
+    /// Applies a flow of the water. The vehicle's speeds through the water stay the same. Changes of the flow cut a
+    /// leg.
     ///
     /// Errors, as text: a leg makes no progress against the flow.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
@@ -67,7 +68,7 @@ impl Legs {
             let (mut at_m, mut left_m, towards) = (*begins_m, leg.distance_m, leg.speed_mps.signum());
             while left_m > 0.0 {
                 let change_m = flow.next_change_m(at_m, at_m + towards * left_m);
-                // A leg keeps its exact length if no change of the flow cuts it.
+                // If no change of the flow cuts a leg, the leg keeps its exact length, without rounding errors.
                 let distance_m = left_m.min((change_m - at_m).abs());
                 let is_last = distance_m >= left_m - SHORTEST_M;
                 let distance_m = if is_last { left_m } else { distance_m };

@@ -15,7 +15,7 @@ use super::recorded;
 use super::waypoints::{self, Waypoint};
 use crate::random::Stream;
 
-/// Largest distance outside the tunnel at which a dive may start or end, m.
+/// A dive may start or end outside the tunnel, up to this distance, m.
 const OUTSIDE_M: f64 = 20.0;
 const CHAINAGE_M: RangeInclusive<f64> = -OUTSIDE_M..=1.0e6;
 const ACROSS_M: RangeInclusive<f64> = -200.0..=200.0;
@@ -43,8 +43,7 @@ const KINDS: [(&str, TrajectoryKind); 5] = [
     ("recorded", TrajectoryKind::Recorded),
 ];
 
-/// Reads a trajectory in a tunnel of this design. Also returns whether its speeds are relative to the water or to the
-/// tunnel.
+/// Reads the trajectory of a scene. Also returns whether its speeds are relative to the water or to the tunnel.
 ///
 /// Errors: a key is missing, unknown or out of range, or the trajectory goes beyond the ends of the tunnel.
 pub(crate) fn parse(
@@ -115,7 +114,7 @@ fn legs(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, ConfigE
         let Some(parsed) = parsed else { continue };
         legs.push(parsed);
         chainage_m += parsed.distance_m * parsed.speed_mps.signum();
-        // The end of the leg is known only if all previous legs are valid.
+        // Where a leg ends is known only if this leg and all previous legs are valid.
         if legs.len() == number + 1 {
             tunnel.check(leg, "distance_m", chainage_m)?;
         }
@@ -185,7 +184,7 @@ fn pilot(section: &Section<'_>, tunnel: Tunnel<'_>, seed: u64) -> Result<Traject
 
 /// Reads the amplitude of a pilot's drift: left and up, m; roll, pitch and yaw, radians.
 ///
-/// `usual` has the default amplitudes to the left and up, m, and of yaw, degrees.
+/// The second argument has the default amplitudes: to the left and up, m, and of yaw, degrees.
 fn wander(section: &Section<'_>, [left, up, yaw]: [f64; 3]) -> Result<Offsets, ConfigError> {
     let or = |key, allowed, usual: f64| section.number(key, allowed).map(|value| value.unwrap_or(usual));
     let degrees = |key, usual| or(key, REACH_DEG, usual).map(f64::to_radians);

@@ -11,7 +11,7 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// Ratio of a dive's duration to its duration without stops, above which the dive counts as endless.
+/// A dive counts as endless if it takes more than this many times as long as without stops.
 const MOST_TIMES_AS_LONG: f64 = 50.0;
 
 /// Parameters of a pilot who gets no advice.
@@ -54,7 +54,7 @@ enum Doing {
 }
 
 impl Pilot {
-    /// The vehicle's chainage at each time step, and one step before the first.
+    /// The vehicle's chainage at one step before the dive's start, and at each time step from the start.
     ///
     /// Errors, as text: the trajectory never ends.
     fn chainages_m(&self, stick: Stream, flow: &Flow) -> Result<Vec<f64>, String> {
@@ -132,7 +132,7 @@ impl Piloted {
         place
     }
 
-    /// Recomputes the pilot's trajectory for a current.
+    /// Recomputes the pilot's trajectory for water that flows as `flow` says.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         self.go(flow).map_err(|why| format!("carries the vehicle off: {why}"))
     }

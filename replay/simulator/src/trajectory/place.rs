@@ -13,7 +13,7 @@ pub struct Place {
     pub turned_rad: [f64; 3],
 }
 
-/// Reference that the speeds of a trajectory are relative to.
+/// Reference for the speeds of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
     /// The speeds are relative to the water. A current carries the vehicle.

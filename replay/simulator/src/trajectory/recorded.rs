@@ -5,7 +5,7 @@ use headrace_geometry::math;
 use super::knots::{Knots, Offsets};
 use super::waypoints::through;
 
-/// Interval of the knots, s. The recording is smoothed over four intervals.
+/// Interval of the knots, s. The spline smooths the recording over four such intervals.
 const SPACING_S: f64 = 0.1;
 /// Maximum duration of a recorded trajectory, s: two days.
 const MAX_S: f64 = 172_800.0;
@@ -66,8 +66,7 @@ pub(super) fn knots(timed: &[Timed]) -> (Knots, f64) {
     (through(timed, SPACING_S, duration_s), duration_s)
 }
 
-/// Unwraps each angle to within half a turn of the previous angle. The angles 179 and -179 degrees are thus close to
-/// each other.
+/// Unwraps each new angle to within half a turn of the previous one. After 179 degrees, -179 degrees becomes 181.
 fn turn_short([.., roll, pitch, yaw]: &Offsets, [.., new_roll, new_pitch, new_yaw]: &mut Offsets) {
     for (before, angle) in [(roll, new_roll), (pitch, new_pitch), (yaw, new_yaw)] {
         *angle = before + math::wrap_signed(*angle - before, math::TAU);

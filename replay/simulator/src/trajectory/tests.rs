@@ -47,7 +47,7 @@ fn legs_follow_each_other_without_a_jump() {
 }
 
 /// Corners are rounded over two seconds. The trajectory therefore starts a little after its first waypoint and ends a
-/// little before its last one. The difference is a sixth of the distance travelled in half a second.
+/// little before its last one. Each difference is a sixth of the distance travelled in half a second.
 #[test]
 fn waypoints_are_passed_at_their_speeds() {
     let trajectory = trajectory(
@@ -102,7 +102,7 @@ fn pilot_reaches_the_end_within_bounds_in_both_directions() {
     }
 }
 
-/// The distance back is as given, to the nearest step.
+/// The pilot goes back by the distance `back_m`, rounded to the nearest step of the simulation.
 #[test]
 fn pilot_goes_back_the_given_distance() {
     let keys = "kind = \"pilot\"\nto_m = 190\nspeed_mps = 1\nstops_per_hour = 0\nbacks_per_hour = 30\n\
@@ -115,7 +115,8 @@ fn pilot_goes_back_the_given_distance() {
         backs += gone.windows(2).filter(|w| w[0] >= 0.0 && w[1] < 0.0).count() as f64;
         lost_m += trajectory.duration_s() - 190.0;
     }
-    // Each reversal costs three seconds to go back and three seconds to make up for the distance. Starting costs 1.5 s.
+    // Each reversal costs three seconds for going back and three for driving the same distance again. The start of a
+    // dive costs 1.5 s.
     let each_s = (lost_m - 50.0 * 1.5) / backs;
     assert!((each_s - 6.0).abs() < 0.3, "{each_s} of {backs}");
 }
@@ -201,7 +202,7 @@ fn spline_stays_within_the_hull_of_its_points() {
     }
 }
 
-/// Position, speed and acceleration have no jump at a knot. Beyond the ends, the curve continues straight.
+/// Position, speed and acceleration have no jump at a knot. Beyond its ends, the curve is a straight line.
 #[test]
 fn spline_acceleration_has_no_jumps() {
     let (knots, _) = random_knots(3);
@@ -215,7 +216,8 @@ fn spline_acceleration_has_no_jumps() {
         let (before_s, behind_s) = (knot_s - 2.0 * step_s, knot_s + 2.0 * step_s);
         assert!((at(behind_s) - at(before_s)).abs() < 0.01);
         assert!((speed(behind_s) - speed(before_s)).abs() < 0.02);
-        // The third derivative is at most 8 times the largest coordinate, divided by 0.7^3.
+        // The third derivative is at most 8 times the largest coordinate divided by 0.7^3, so the acceleration changes
+        // little here.
         assert!((acceleration(behind_s) - acceleration(before_s)).abs() < 0.05, "{knot_s}");
     }
     for (end_s, sign) in [(0.0, -1.0), (43.0 * 0.7, 1.0)] {
@@ -239,8 +241,8 @@ fn random_drift_has_the_given_amplitude_and_sd() {
         products += offsets[0] * offsets[1] / f64::from(count);
     }
     for (variance, reach) in squares.into_iter().zip(reach) {
-        // The tolerance is that of a variance from about 2,000 independent values. The variance is 151/315 of the
-        // variance of uniform random numbers.
+        // The wanted variance is 151/315 of the variance of the control points, which are uniform random numbers. The
+        // tolerance allows for the error of a variance that is estimated from about 2,000 independent values.
         let wanted = reach * reach / 3.0 * 151.0 / 315.0;
         assert!((variance - wanted).abs() <= 0.1 * wanted, "{variance} {wanted}");
     }
@@ -253,8 +255,8 @@ fn everywhere(speed_mps: f64) -> Flow {
     flow
 }
 
-/// If the flow changes within a leg, the time for each piece is its length divided by its own speed. The positions
-/// within a piece follow from these times.
+/// If the flow changes within a leg, the time for each piece is its length divided by its own speed. From these times
+/// follow the positions within a piece.
 #[test]
 fn current_changes_the_speed_only_within_its_stretch() {
     let mut flow = Flow::default();
@@ -287,7 +289,7 @@ fn current_changes_the_speed_only_within_its_stretch() {
             legs.place(after_s).chainage_m
         );
     }
-    // A leg is refused only if the flow is too strong on the leg itself.
+    // A leg is refused only if the flow is too strong somewhere on that leg.
     let mut strong = Flow::default();
     assert!(strong.add(Stretch { from_m: 100.0, to_m: 200.0 }, -1.0));
     legs.carry(&strong).unwrap();

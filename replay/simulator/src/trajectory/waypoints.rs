@@ -4,7 +4,7 @@ use headrace_geometry::math;
 
 use super::knots::{Knots, Offsets};
 
-/// Interval of the knots, s. Corners are rounded over four intervals.
+/// Interval of the knots, s. The spline rounds corners over four such intervals.
 pub(super) const SPACING_S: f64 = 0.5;
 
 /// A waypoint of a trajectory.
@@ -35,7 +35,7 @@ pub(super) fn knots(waypoints: &[Waypoint]) -> (Knots, f64) {
     (through(&timed, SPACING_S, at_s), at_s)
 }
 
-/// Knots on the straight lines between timed poses. The times of the poses increase or repeat.
+/// Knots on the straight lines between timed poses. The times of the poses never decrease, but may repeat.
 pub(super) fn through(timed: &[(f64, Offsets)], spacing_s: f64, duration_s: f64) -> Knots {
     Knots::new(duration_s, spacing_s, |k| {
         let at_s = k as f64 * spacing_s;

@@ -41,7 +41,8 @@ fn first_return_of_oblique_beam_is_from_its_nearer_edge() {
             cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m).reduce(f64::min).unwrap();
         // Range of the nearest point of the floor within the cone.
         let nearest_m = 3.0 / math::cos((angle_rad - half_rad).max(0.0));
-        // If the perpendicular to the floor is within the cone, no ray hits the nearest point of the floor exactly.
+        // If the perpendicular to the floor is within the cone, no ray hits the floor's nearest point exactly, so more
+        // error is allowed.
         let allowed_m = if angle_rad < half_rad { 2e-5 } else { 1e-12 };
         assert!((first_m - nearest_m).abs() < allowed_m, "{angle_deg}: {first_m} {nearest_m}");
     }
@@ -56,8 +57,8 @@ fn mean_range_is_averaged_over_the_disc_of_the_cone() {
         let ranges_m = cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m);
         mean(ranges_m).unwrap()
     };
-    // Mean of h / cos x over rays at angle x from the axis, where h is the height. The squares of the angles are evenly
-    // spread.
+    // Mean range h / cos x of rays to a flat wall, where h is the height of the beam's origin and x a ray's angle from
+    // the axis. The squares of the angles are evenly spread, as for rays that fill a disc.
     let count = 10_000;
     let ring = |k: i32| 3.0 / math::cos(half_rad * math::sqrt((f64::from(k) + 0.5) / f64::from(count)));
     let whole_m = (0..count).map(ring).sum::<f64>() / f64::from(count);
@@ -86,8 +87,8 @@ fn beam_cone_leaves_the_true_axis_point_and_perpendicular_ranges_unchanged() {
         let range_m = |row: &crate::truth::TruthRow| row.sounding.unwrap().measured.range_m.unwrap();
         assert!(base.wall() == first.wall() && base.wall() == bilinear.wall());
         assert!(range_m(first) <= range_m(base) + 1e-12);
-        // The beam is at most 45 degrees from the perpendicular to a wall. If it turns by half a degree, the range
-        // changes by less than 3 %.
+        // The beam is at most 45 degrees from the perpendicular to a wall. A turn by half a degree then changes its
+        // range by less than 3 %.
         assert!((range_m(bilinear) - range_m(base)).abs() < 0.03 * range_m(base));
         if range_m(base) < 2.501 {
             assert!((range_m(bilinear) - range_m(base)).abs() < 0.002, "{}", range_m(bilinear));

@@ -58,7 +58,7 @@ fn jump_fault_shifts_values_by_its_size() {
     }
     let mut seen = 0;
     for (plain, broken) in both::<Sounding>("ping", "kind = \"jump\"\nsize = 0.7") {
-        // The echosounder looks along the tunnel, and sees a wall only when the vehicle is turned.
+        // The echosounder looks along the tunnel. It sees a wall only while the vehicle is turned to the side.
         if let (Some(plain_m), Some(broken_m)) = (plain.range_m, broken.range_m) {
             off(plain.at, [plain_m, broken_m], 0.7);
             seen += usize::from(breaks(plain.at));

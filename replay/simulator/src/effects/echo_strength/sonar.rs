@@ -4,9 +4,9 @@ use headrace_geometry::math;
 
 /// Range at which the mean echo of rough rock, perpendicular to the beam, is just detected, m.
 ///
-/// The range applies to the frequency, absorption and pulse below. It is the head's largest range setting for
-/// profiling. Frequency, absorption and pulse are those that DUNE uses at that setting. No source states the head's
-/// source level, noise or threshold.
+/// The range is the head's largest range setting for profiling. It applies to the frequency, absorption and pulse in
+/// the constants below. Frequency, absorption and pulse are those that DUNE uses at that setting. No source states the
+/// head's source level, noise or threshold.
 ///
 /// Source: the 881L's data sheet and switch command (range settings to 100 m; 675 kHz and 0.2 dB/m above 5 m; 540 us at
 /// 100 m).
@@ -20,7 +20,7 @@ const HEARD_PULSE_S: f64 = 540e-6;
 /// threshold if the absorption setting matches the water's absorption.
 const ABOVE_THRESHOLD_DB: f64 = 20.0;
 const USUAL_GAIN_DB: f64 = 20.0;
-/// Ratio of the density of silt (quartz) to that of water.
+/// Density of silt (quartz) divided by the density of water.
 const GRAIN_DENSITY: f64 = 2.65;
 /// Kinematic viscosity of water at 10 degrees, m^2/s.
 const VISCOSITY_M2PS: f64 = 1.307e-6;
@@ -100,7 +100,8 @@ fn heard_db() -> f64 {
         - 2.0 * HEARD_DBPM * HEARD_M
 }
 
-/// Frequency of a head whose beam has this full width, kHz. The width is 2.4 degrees at 600 kHz and 1.4 at 1 MHz.
+/// Frequency of a head whose beam has the full width `beam_rad`, kHz. The width is 2.4 degrees at 600 kHz and 1.4 at 1
+/// MHz.
 ///
 /// Source: the 881L's data sheet, beam widths.
 pub(crate) fn frequency_of_khz(beam_rad: f64) -> f64 {
@@ -109,7 +110,8 @@ pub(crate) fn frequency_of_khz(beam_rad: f64) -> f64 {
 
 /// Usual setting of the absorption that the head compensates, dB/m: one value for 1 MHz, one for 675 kHz.
 ///
-/// Source: the switch command as DUNE's driver sets it. The limit is halfway between the two frequencies.
+/// Source: the switch command as DUNE's driver sets it. The function switches between the two values halfway between
+/// the frequencies.
 pub(super) fn usual_absorption_dbpm(frequency_khz: f64) -> f64 {
     if frequency_khz > 837.0 { 0.6 } else { 0.2 }
 }
@@ -158,7 +160,7 @@ impl Silt {
         let denser = GRAIN_DENSITY - 1.0;
         let friction = k * denser * denser * s / (s * s + (GRAIN_DENSITY + tau) * (GRAIN_DENSITY + tau));
         let scattering = k * k * k * k * self.grain_m * self.grain_m * self.grain_m / 3.0;
-        // Both terms are absorption of power. Nepers refer to amplitude, hence the factor 1/2.
+        // Both terms are absorption of power. Nepers refer to amplitude, so the sum is halved.
         volume * (friction + scattering) / 2.0 * DB_PER_NEPER
     }
 }

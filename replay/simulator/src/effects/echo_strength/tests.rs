@@ -11,8 +11,8 @@ fn square(x: f64) -> f64 {
     x * x
 }
 
-/// Measured absorption of pure water divided by the frequency squared, 1e-15 s^2/m in nepers. Source: Pinkerton 1949,
-/// Proc. Phys. Soc. B 62, 129.
+/// Compares with the measured absorption of pure water divided by the frequency squared, in units of 1e-15 Np s^2/m.
+/// Source: Pinkerton 1949, Proc. Phys. Soc. B 62, 129.
 #[test]
 fn water_absorption_matches_measurements() {
     for (t_degc, measured) in [(0.0, 56.9), (10.0, 36.1), (20.0, 25.3), (30.0, 19.1)] {
@@ -23,7 +23,7 @@ fn water_absorption_matches_measurements() {
     assert!((water_absorption_dbpm(1000.0, 10.0) / water_absorption_dbpm(500.0, 10.0) - 4.0).abs() < 1e-12);
 }
 
-/// Compares the absorption with the motion of a grain in oscillating water, integrated step by step.
+/// Compares the absorption with the energy lost by a grain in oscillating water. Its motion is integrated in steps.
 ///
 /// The drag is that on an oscillating sphere (Landau and Lifshitz, "Fluid mechanics", §24, problem 5). The sound loses
 /// the work done by the drag.
@@ -33,8 +33,8 @@ fn silt_absorption_matches_the_drag_on_its_grains() {
     for (frequency_khz, grain_m) in [(675.0, 2e-6), (1000.0, 5e-6), (1000.0, 20e-6)] {
         let omega = math::TAU * frequency_khz * 1000.0;
         let depth_m = math::sqrt(2.0 * viscosity / omega);
-        // Forces per unit of displaced mass: the drag, resistance * (u - v) + added * d(u - v)/dt, and the buoyancy in
-        // accelerated water, du/dt.
+        // Forces on the grain per unit of displaced mass: the drag, resistance * (u - v) + added * d(u - v)/dt, and the
+        // buoyancy in accelerated water, du/dt.
         let resistance = 9.0 * viscosity / (2.0 * grain_m * grain_m) * (1.0 + grain_m / depth_m);
         let added = 0.5 * (1.0 + 9.0 * depth_m / (2.0 * grain_m));
         let (steps, turns) = (4000, 60);
@@ -68,8 +68,8 @@ fn silt_absorption_matches_the_drag_on_its_grains() {
     }
 }
 
-/// Compares the share of detected echoes, by range, incidence and silt, with the sonar equation computed in powers
-/// instead of decibels.
+/// Compares the share of detected echoes with the sonar equation, which is computed here in powers instead of decibels.
+/// The comparison covers bands of range and incidence, in water with silt.
 #[test]
 fn detected_share_matches_the_sonar_equation() {
     let mut dive = Dive { seconds: 1500.0, speed_mps: 0.01, ..Dive::with_head() };
@@ -111,7 +111,7 @@ fn detected_share_matches_the_sonar_equation() {
     }
 }
 
-/// The vehicle's own parts are detected even if no wall is detected.
+/// Parts of the vehicle are detected even if the wall's echoes are too weak.
 #[test]
 fn echoes_of_vehicle_parts_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";

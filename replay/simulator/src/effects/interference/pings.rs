@@ -20,7 +20,7 @@ pub(super) struct Ping {
     pub(super) origin: Point3<Tunnel>,
     pub(super) direction: Vec3<Tunnel>,
     pub(super) wall: Option<Point3<Tunnel>>,
-    /// Whether the ping is extrapolated and its `wall` is not yet computed.
+    /// Whether the ping is extrapolated, and its `wall` isn't computed yet.
     foreseen: bool,
 }
 
@@ -35,7 +35,7 @@ impl Ping {
         Self { at, origin: ray.origin, direction: ray.direction, wall, foreseen: false }
     }
 
-    /// Computes the point on the wall if the ping is extrapolated.
+    /// Computes where the ping meets the wall, if the ping is extrapolated.
     pub(super) fn seen(self, environment: &Environment, far_m: f64) -> Self {
         if !self.foreseen {
             return self;
@@ -44,7 +44,8 @@ impl Ping {
         Self { wall, foreseen: false, ..self }
     }
 
-    /// Extrapolates to the `count`-th ping after this one. Interval and rotation are those from `before` to this ping.
+    /// Extrapolates to the `count`-th ping after this one. Interval and rotation between pings stay as they were from
+    /// `before` to this ping.
     fn foreseen(&self, before: &Self, count: u32) -> Self {
         let period = self.at.since(before.at);
         let step_rad = between_rad(before.direction, self.direction);
@@ -63,7 +64,8 @@ impl Ping {
 }
 
 impl Pings {
-    /// Drops pings that are more than `rings_s` earlier than `from`. The last two pings are kept for extrapolation.
+    /// Drops pings that began more than `rings_s` before the time `from`. The last two pings are kept for
+    /// extrapolation.
     pub(super) fn forget(&mut self, from: MonoNs, rings_s: f64) {
         let old = |ping: &Ping| from.since(ping.at).as_secs_f64() > rings_s;
         let gone = self.0.partition_point(old).min(self.0.len().saturating_sub(2));
@@ -91,7 +93,7 @@ impl Pings {
         let last = if let [.., before, last] = made { Some((before, last)) } else { None };
         let later = (1..=MOST_FORESEEN).map_while(move |count| {
             let (before, last) = last.filter(|(before, last)| before.at < last.at)?;
-            // Usually the next ping comes too late to matter, so its time is checked first.
+            // Usually the next ping comes after `latest_s`, so its time is checked before the ping is extrapolated.
             let period_s = last.at.since(before.at).as_secs_f64();
             let on_s = after_s(last) + period_s * f64::from(count);
             (on_s <= latest_s).then(|| last.foreseen(before, count))
@@ -125,7 +127,7 @@ mod tests {
             assert_eq!(foreseen.at, made.at);
             assert!((foreseen.direction + -made.direction).norm() < 1e-12);
         }
-        // The result is the same without the pings after `at`.
+        // Pings after `at` are extrapolated, so the result is the same if the simulated pings after `at` are missing.
         let short = Pings(pings.0[..51].to_vec());
         assert!(short.around(at, -0.05, 0.05).eq(pings.around(at, -0.05, 0.05)));
     }

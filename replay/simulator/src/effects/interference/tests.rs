@@ -15,7 +15,7 @@ fn pair() -> Dive {
     dive
 }
 
-/// A pair of heads that ping out of step.
+/// Two heads whose pings are not simultaneous.
 fn out_of_step() -> Dive {
     let mut dive = pair();
     dive.sensors[1].2 = dive.sensors[1].2.replace("medium", "fastest");
@@ -69,7 +69,7 @@ fn apparent_ranges_of_reflected_and_direct_pings_follow_from_time_and_path() {
         ear.hear(1, &sounds);
         ear.heard.then_some(ear.within_m[1])
     };
-    // Both heads look at the middle of the floor, and the two paths have equal length. Simultaneous pings don't
+    // Both heads look at the middle of the floor, and their sounds' paths have equal length. Simultaneous pings don't
     // interfere. An earlier ping of the other head is heard.
     let inwards = math::atan2(0.4, 2.5);
     let way_m = 2.0 * math::hypot(0.4, 2.5);
@@ -78,9 +78,10 @@ fn apparent_ranges_of_reflected_and_direct_pings_follow_from_time_and_path() {
         let expected_m = (way_m - earlier_ms / 1000.0 * SOUND_MPS) / 2.0;
         assert!((heard(-inwards, inwards, -earlier_ms).unwrap() - expected_m).abs() < 1e-6);
     }
-    // An even earlier ping arrives before this head's own ping, or within the least range.
+    // An even earlier ping of the other head arrives before this head's own ping or within its least range, so it isn't
+    // heard.
     assert_eq!(heard(-inwards, inwards, -3.4), None);
-    // The other head now looks at a wall point that isn't within this head's beam.
+    // The other head now looks at a point of the wall outside this head's beam, so its ping isn't heard.
     assert_eq!(heard(-inwards, inwards + 0.1, -1.0), None);
     // The heads face each other, 0.8 m apart. If both ping at once, each hears the other at an apparent range of 0.4 m.
     let (right, left) = (1.5 * math::PI, math::FRAC_PI_2);

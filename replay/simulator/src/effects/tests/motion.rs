@@ -2,7 +2,8 @@ use headrace_sensor::measurement::{Inertia, Payout, Pressure, Sounding};
 
 use crate::testing_motion::{Bench, same_in_any_slices};
 
-/// Every effect on motion, angles, clocks and lines, with the sensor whose measurements it changes.
+/// Sensors, each with an effect on motion, angles, clocks or lines that changes the sensor's measurements. All such
+/// effects are listed.
 const ALONE: [(&str, &str); 18] = [
     ("head_a", "[effects.start_phase_error]\n"),
     ("head_a", "[effects.sector_end_slowing]\n"),

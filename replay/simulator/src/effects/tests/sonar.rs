@@ -3,7 +3,7 @@
 use crate::testing::{Dive, Dived};
 use crate::truth::TruthRow;
 
-/// Each effect on sonars, as a table of a scene with some keys.
+/// Each effect on sonars, as the table that a scene contains, with some keys.
 const EFFECTS: [&str; 11] = [
     "[effects.beam_cone]\n",
     "[effects.occlusion]\n",
@@ -22,8 +22,8 @@ fn pair() -> Dive {
     Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]])
 }
 
-/// For each measurement of the dive, the values before and after its change by an effect; `None` if unchanged.
-/// `effect` is the effect's index in the scene.
+/// For each measurement of the dive, its values before and after an effect changes it; `None` if unchanged. `effect` is
+/// the effect's index in the scene.
 fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
     let of = |row: &TruthRow| {
         let cause = row.causes.iter().find(|cause| cause.effect == effect)?;
@@ -44,7 +44,7 @@ fn adding_an_effect_keeps_the_random_numbers_of_other_effects() {
     for effects in [EFFECTS[0], EFFECTS[2], EFFECTS[3], EFFECTS[4]] {
         assert!(alone == outliers(effects, 1), "{effects}");
     }
-    // The effects run in the fixed order, even if the scene names them in another order.
+    // The scene names the two effects in the wrong order. They run in the program's fixed order all the same.
     let (a, b) = (EFFECTS[8], EFFECTS[7]);
     assert_eq!(dive.dive(&format!("{a}{b}")).messages, dive.dive(&format!("{b}{a}")).messages);
 }
@@ -56,7 +56,7 @@ fn adding_a_head_keeps_the_random_numbers_of_the_first_head() {
         let ranges_m = dive.dive(&effects).ranges_m(0);
         ranges_m.into_iter().map(|range_m| range_m.map(f64::to_bits)).collect::<Vec<_>>()
     };
-    // The scene has no planned speed, so adding a second head doesn't change the ping settings of the first head.
+    // The scene has no planned speed, so the ping settings of the first head don't change if a second head is added.
     let one = Dive::with_heads(&[[0.0, 0.4, 0.0]]);
     assert_eq!(bits(&one), bits(&pair()));
 }

@@ -1,4 +1,4 @@
-//! Features compared with an independent model and closed forms, and the index compared with a full search.
+//! Features compared with an independent model and closed forms, and the index of objects compared with a full search.
 
 use super::oracle::{Oracle, Shape, ellipsoid, upright};
 use super::*;
@@ -15,7 +15,7 @@ fn boulder_is_an_ellipsoid_sunk_into_the_floor() {
     let environment = parse(&text, &CERAN.profile());
     let hit = cast(&environment, [10.0, 0.0, 5.0], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (5.0 - 0.6)).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // Rays at the height of the centre, 0.2 m above the floor, along the tunnel and from the side.
+    // Rays at the height of the boulder's centre, 0.2 m above the floor: one along the tunnel, one from the side.
     let hit = cast(&environment, [5.0, 0.0, 0.2], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 4.0).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     let hit = cast(&environment, [10.0, 4.0, 0.2], [0.0, -1.0, 0.0]).unwrap();
@@ -56,7 +56,8 @@ fn side_tunnel_has_the_given_length() {
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     let hit = cast(&environment, [10.0, -1.0, 2.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 35.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // Ranges from inside the side tunnel to the opposite wall and to its own side wall.
+    // Ranges from a point inside the side tunnel, first to the opposite wall of the main tunnel and then to a side wall
+    // of the side tunnel.
     let back = cast(&environment, [10.5, 30.0, 2.0], [0.0, -1.0, 0.0]).unwrap();
     assert!((back.range_m - 34.0).abs() < 1e-12 && back.what == What::Wall, "{back:?}");
     let side = cast(&environment, [10.5, 30.0, 2.0], [1.0, 0.0, 0.0]).unwrap();

@@ -6,15 +6,16 @@ use super::*;
 
 const RADIUS_M: f64 = 3.0;
 const SIDES: u32 = 240;
-/// Largest distance between the sides of the polygon and its circumscribed circle, per metre of radius.
+/// Largest distance between a side of the polygon that stands for a circle and the polygon's circumscribed circle, per
+/// metre of radius.
 const SAGITTA: f64 = 8.6e-5;
 
 fn circle() -> Profile {
     shapes::circle(RADIUS_M).unwrap()
 }
 
-/// A prism around the circle's axis, as PLY text. It extends from x = 0 to `length_m` in `rings`, and lacks the faces
-/// whose numbers are in `without`.
+/// A tube-shaped prism about the x-axis, as PLY text. It extends from x = 0 to `length_m` in `rings`, and lacks the
+/// faces whose numbers are in `without`.
 fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     let (mut vertices, mut faces, mut count) = (String::new(), String::new(), 0);
     for ring in 0..=rings {
@@ -70,7 +71,7 @@ fn cast(environment: &Environment, origin: V3, direction: V3) -> Option<Hit> {
     environment.cast(to_point(origin), to_vec(direction), FARTHEST_M)
 }
 
-/// Range from inside to the circle of this radius about the tunnel's axis.
+/// Range from a point inside the tunnel to the circle with radius `radius_m` about the tunnel's axis.
 fn to_circle(radius_m: f64, origin: V3, direction: V3) -> f64 {
     let [_, dy, dz] = direction;
     let (y, z) = (origin[1], origin[2] - RADIUS_M);
@@ -124,7 +125,7 @@ fn mesh_of_the_profile_gives_the_ranges_of_the_profile() {
     assert!(into > 1_000 && out > 1_000 && through > 300, "{into} {out} {through}");
     let far = environment.cast(to_point([45.0, 0.0, 3.0]), to_vec([0.0, 1.0, 0.0]), 2.9);
     assert!(far.is_none());
-    // A ray along the axis meets no wall. A point outside the tunnel is not in water.
+    // A ray along the axis meets no wall. The second ray starts outside the tunnel, where there is no water.
     assert!(cast(&environment, [20.0, 0.1, 3.0], [1.0, 0.0, 0.0]).is_none());
     assert!(cast(&environment, [45.0, 3.1, 3.0], [0.0, 1.0, 0.0]).is_none());
 }
@@ -133,7 +134,7 @@ fn mesh_of_the_profile_gives_the_ranges_of_the_profile() {
 fn no_ray_escapes_between_mismatched_mesh_and_profile() {
     for (radius_m, seed) in [(4.0, 61), (2.0, 62)] {
         let environment = wall(&tube(radius_m, 10.0, 2, &[]));
-        // Points between the inner and the outer circle of the polygon may be inside or outside.
+        // Points between the polygon's inscribed and circumscribed circles may be inside or outside the mesh.
         let is_within = |p: V3, share: f64| {
             let radius_m = if (40.0..=50.0).contains(&p[0]) { radius_m * share } else { RADIUS_M };
             math::hypot(p[1], p[2] - RADIUS_M) < radius_m
@@ -168,7 +169,7 @@ fn no_ray_escapes_between_mismatched_mesh_and_profile() {
 
 #[test]
 fn mesh_with_ragged_ends_is_a_wall_only_where_closed() {
-    // Some faces of the first and the last ring are missing. The mesh is closed from x = 0.25 m to 9.75 m.
+    // Some faces of the first and the last ring are missing, so the mesh is closed only from x = 0.25 m to 9.75 m.
     let ragged = tube(4.0, 10.0, 40, &[0, 1, 2, 50, 51, 39 * SIDES + 7]);
     let environment = wall(&ragged.replace("\n0.0 ", "\n-0.0 "));
     let placed =
@@ -239,7 +240,7 @@ fn box_of_triangles_equals_a_solid_block() {
         let Some(hit) = hit else { continue };
         let wall_m = cast(&bare, ray.origin, ray.direction).map_or(f64::INFINITY, |hit| hit.range_m);
         let wanted_m = block.meet(&ray).map_or(wall_m, |(t_m, _)| t_m.min(wall_m));
-        // A ray that runs along a side of the box may hit the box or miss it.
+        // Only a ray that runs along a side of the box may hit or miss it.
         assert!((hit.range_m - wanted_m).abs() < 1e-9, "{ray:?} {hit:?} {wanted_m}");
         met += usize::from(hit.what == What::Feature(0));
     }

@@ -16,8 +16,8 @@ pub(super) enum Shape {
     Trimmed(f64, f64),
 }
 
-/// A function that tests whether a point is in an object. The point is given in the tunnel's frame, and as chainage, y
-/// and z.
+/// A function that tests whether a point is in an object. The first argument is the point in the tunnel's frame. The
+/// second is the same point as chainage, y and z.
 pub(super) type Test = Box<dyn Fn(V3, V3) -> bool>;
 
 pub(super) struct Oracle {
@@ -108,8 +108,8 @@ impl Oracle {
                 break;
             }
             let part = rest.min(*length);
-            // The chord of an arc follows from the sine of half the turn. The chord points along the heading after half
-            // the turn.
+            // The chord of an arc follows from the sine of half the turn. The chord points along the heading at the
+            // middle of the arc.
             let half = curvature * part / 2.0;
             let chord = if half == 0.0 { part } else { 2.0 * math::sin(half) / curvature };
             at[0] += chord * math::cos(heading + half);
@@ -184,7 +184,8 @@ impl Oracle {
             && !self.solids.iter().any(|test| test(p, chart))
     }
 
-    /// Range of the first point along the ray that is not in water, searched in steps from range `from`.
+    /// Range of the first point along the ray that is not in water. The search goes in steps of `step` from range
+    /// `from` to `far`.
     pub(super) fn range(&self, ray: &Ray, from: f64, far: f64, step: f64) -> Option<f64> {
         let mut chart = self.search(ray.at(from));
         let mut t = from;
@@ -192,7 +193,7 @@ impl Oracle {
             let next = t + step;
             let p = ray.at(next);
             chart = self.chart(p, chart[0]);
-            // Far from the axis, the nearest point of the axis may jump between steps, so this point is searched
+            // Far from the axis, the nearest point of the axis may jump between steps, so the nearest point is searched
             // without an estimate.
             if chart[1].abs() > 8.0 && !self.axis.is_empty() {
                 chart = self.search(p);
@@ -213,8 +214,8 @@ impl Oracle {
 
     /// Compares thousands of rays with this model. Returns the number of rays that hit each feature.
     ///
-    /// Two differences are allowed. Steps of 2 mm may miss an object that a ray grazes, but smaller steps must then
-    /// find it. The environment may miss a graze that is shorter than its own smallest step.
+    /// Two differences are allowed. The model's steps of 2 mm may miss an object that a ray grazes, but smaller steps
+    /// must then find the object. The environment may miss a graze that is shorter than its own smallest step.
     pub(super) fn compare(
         &self,
         environment: &Environment,

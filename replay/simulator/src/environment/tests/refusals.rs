@@ -1,4 +1,4 @@
-//! Scenes that are refused, and the location stated in the error.
+//! Scenes that are refused. The error must name the place in the scene.
 
 use super::*;
 

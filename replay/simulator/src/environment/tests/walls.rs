@@ -1,4 +1,4 @@
-//! The wall: as designed, scaled, displaced, in bends, and with all of these combined.
+//! The wall: as designed, scaled, displaced, in bends, and all of these together.
 
 use super::oracle::{Oracle, Shape};
 use super::*;
@@ -65,7 +65,8 @@ fn bulge(b: &[f64; 5]) -> String {
 fn bulges_displace_the_wall() {
     for (seed, shape) in [(6, CERAN), (7, Shape::Rectangle(9.0, 4.0)), (8, Shape::Circle(3.0))] {
         let mut oracle = Oracle::new(shape);
-        // Bulges inwards, outwards, across the seam of the arc length on the floor, overlapping, and thin.
+        // Bulges that point inwards, that point outwards, that lie across the floor's centre, where the arc length
+        // jumps from p to 0, that overlap, or that are thin.
         oracle.bulges = vec![
             [10.0, 4.0, 9.0, 3.0, 1.0],
             [13.0, 6.0, 11.0, 6.0, -2.0],
