@@ -132,12 +132,12 @@ fn sweep() {
     let both = all(&speeds, |speed_mps| [outing.dive(0.1, *speed_mps), outing.dive(*speed_mps, *speed_mps)]);
     for (speed_mps, [fixed, own]) in speeds.iter().zip(&both) {
         let anew =
-            |of: &Outcome| of.median(|beat| beat.advice.anew.map_or(0.0, |anew| anew.planned_speed_mps));
+            |of: &Outcome| of.median(|entry| entry.advice.anew.map_or(0.0, |anew| anew.planned_speed_mps));
         println!(
             "| {speed_mps:.3} | {:.4} | {:.4} | {:.4} | {:.2} | {:.4} | {:.4} | {:.2} | {:.1} |",
             advised(fixed),
-            fixed.median(|beat| beat.advice.from_mps),
-            fixed.median(|beat| beat.advice.nearest_mps.unwrap_or(0.0)),
+            fixed.median(|entry| entry.advice.from_mps),
+            fixed.median(|entry| entry.advice.nearest_mps.unwrap_or(0.0)),
             fixed.passing,
             advised(own),
             anew(own),

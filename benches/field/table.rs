@@ -53,8 +53,8 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";
     }
     let stood = [Condition::DataSheet, Condition::Declared, Condition::Rough, Condition::AsBuilt];
-    let stands = place == "portal" && stood.contains(&condition);
-    if speed == "stood" && !stands && arguments.cell.is_empty() {
+    let is_included = place == "portal" && stood.contains(&condition);
+    if speed == "stood" && !is_included && arguments.cell.is_empty() {
         return false;
     }
     let of_mounts = [Condition::Mounts, Condition::WrongMount];
@@ -62,7 +62,7 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
         return false;
     }
     // Few cells have the middle place, because it only shows that results don't depend on the place.
-    let told_apart = place != "3000"
+    let is_covered_elsewhere = place != "3000"
         || ["vita1", "vita2-4"].contains(&vehicle.name) && ["planned", "advised"].contains(&speed);
     if !is_covered_elsewhere && arguments.cell.is_empty() {
         return false;

@@ -115,8 +115,8 @@ impl Outcome {
     /// of updates as the fraction of sections that may fail.
     ///
     /// Some excess is allowed, because a swaying vehicle gets lower advice for short times.
-    pub fn told_mps(&self) -> f64 {
-        let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
+    pub fn advised_mps(&self) -> f64 {
+        let mut all: Vec<f64> = self.entries.iter().map(|entry| entry.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }

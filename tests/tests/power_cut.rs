@@ -126,7 +126,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
     let which = format!("kill {number} after {after:?} ({arguments:?})");
 
     let answer = folder.headrace(&["verify", "--json", &log]);
-    let Ok(told) = serde_json::from_str::<Value>(&answer.stdout) else {
+    let Ok(report) = serde_json::from_str::<Value>(&answer.stdout) else {
         // The log or its header didn't exist yet at the kill, so the dive hadn't begun.
         assert!(lines.is_empty(), "{which}: {}, but the pilot had read {lines:?}", answer.stderr);
         let early = ["could not open", "is not an MCAP file", "no vehicle file can be read"];

@@ -269,7 +269,7 @@ pub struct Given {
 /// clearly better if it is smaller by more than `resolution`. A cost is clearly better if its upper bound is below the
 /// other's lower bound. Noise in the costs of equal settings therefore removes no point from the front.
 pub fn front(points: &mut [Point], resolution: f64) {
-    let beats = |one: &Point, other: &Point| {
+    let is_better = |one: &Point, other: &Point| {
         let (error, others) = (one.error(), other.error());
         let is_cheaper = one.cost.high < other.cost.low;
         one.scene == other.scene
@@ -278,7 +278,7 @@ pub fn front(points: &mut [Point], resolution: f64) {
             && (error < others - resolution || is_cheaper)
     };
     let on_front: Vec<bool> =
-        points.iter().map(|point| !points.iter().any(|other| beats(other, point))).collect();
+        points.iter().map(|point| !points.iter().any(|other| is_better(other, point))).collect();
     for (point, on_front) in points.iter_mut().zip(on_front) {
         point.on_front = on_front;
     }

@@ -87,7 +87,7 @@ pub enum Condition {
     DataSheet,
     /// As `DataSheet`, but the vehicle file states the true sensor noises. The file makes no allowance for rough walls,
     /// tilt or cable slack.
-    Told,
+    Declared,
     /// A MEMS inertial unit and cable slack, stated in the vehicle file. Also a counter with 0.5 % error, and steel
     /// nearby.
     Poor,
@@ -299,7 +299,7 @@ impl Cell {
 
     /// Navigation settings of the vehicle file that headrace reads. In most conditions they state only the slack of a
     /// taut cable. In some they also state noises or mount errors.
-    fn told_navigation(&self) -> String {
+    fn declared_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
             Condition::Declared => TRUE_NOISES.to_owned(),

@@ -73,8 +73,9 @@ pub struct Stretch<'a> {
 
 impl Stretch<'_> {
     /// The set of causes that is displayed for more of the stretch's sections than any other set.
-    pub fn told(&self) -> &[Cause] {
-        let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
+    pub fn reported(&self) -> &[Cause] {
+        let count =
+            |reported: &[Cause]| self.sections.iter().filter(|section| section.reported == reported).count();
         self.sections
             .iter()
             .map(|section| section.reported.as_slice())

@@ -56,7 +56,7 @@ pub struct Matrix {
     /// Number of dives without a failed section.
     pub idle: u32,
     /// Number of sections and number of stretches for each pair of true and displayed cause, in dives with one cause.
-    told: BTreeMap<(String, String), [u32; 2]>,
+    reported: BTreeMap<(String, String), [u32; 2]>,
     /// Number of stretches with a wrong answer for each pair of true and displayed causes, in dives with two causes.
     wrong: BTreeMap<(String, String), u32>,
 }

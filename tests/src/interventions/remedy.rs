@@ -62,8 +62,11 @@ fn remedy(dive: &InterventionDive, reported: &ReturnReport, sections: &[Judged])
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
     // If the action "slower" has no speed, other settings of the heads are enough at the planned speed.
-    let at_most_mps =
-        if told.at_most_mps > 0.0 || !has(Action::Slower) { told.at_most_mps } else { dive.drawn.speed_mps };
+    let at_most_mps = if reported.at_most_mps > 0.0 || !has(Action::Slower) {
+        reported.at_most_mps
+    } else {
+        dive.drawn.speed_mps
+    };
     let then = report(&dive.drawn.changed(&mended, over_m, at_most_mps, again_deg), &|_| true);
     let then_m: Vec<[f64; 2]> =
         sections.iter().map(|section| [section.ends_m[0], hole_at_m(&then, section.ends_m[0])]).collect();

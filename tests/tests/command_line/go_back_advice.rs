@@ -5,7 +5,7 @@ use headrace_tests::{Folder, root};
 use serde_json::Value;
 
 /// Output lines (JSON) of a dive in which a shipped vehicle follows the trajectory in `scene`.
-fn told(scene: &str) -> Vec<Value> {
+fn json_lines(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
     folder.write("vehicle.toml", std::fs::read(file).unwrap());

@@ -79,7 +79,7 @@ fn every_view_message_matches_its_schema_and_the_dive() {
 
     let [duration_s] = numbers(&report["dive"], ["duration_s"]);
     let updates = topics["vehicle"].len() as f64;
-    assert!((updates - 5.0 * duration_s).abs() < 3.0, "{updates} beats in {duration_s} s");
+    assert!((updates - 5.0 * duration_s).abs() < 3.0, "{updates} updates in {duration_s} s");
     for transforms in &topics["transforms"] {
         for transform in transforms["transforms"].as_array().unwrap() {
             let turn = numbers(&transform["rotation"], ["x", "y", "z", "w"]);

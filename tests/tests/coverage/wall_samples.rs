@@ -251,8 +251,8 @@ fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
         assert!(wall > 50_000 && 200 * doubtful <= wall, "{name}: {doubtful} of {wall}");
         let all = observed(&dive.report);
         assert!(all.iter().all(|alert| alert.sensor.is_none()), "{all:?}");
-        let told = dive.report.dive.samples_rejected.doubtful_returns;
-        assert_eq!(usize::try_from(told).unwrap(), doubtful);
+        let reported = dive.report.dive.samples_rejected.doubtful_returns;
+        assert_eq!(usize::try_from(reported).unwrap(), doubtful);
         // No section fails only because its doubtful returns don't count.
         let all =
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);

@@ -10,7 +10,7 @@ pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
     /// Words that the report of a replay must contain. A `|` separates alternatives.
-    pub(crate) told: &'static str,
+    pub(crate) expected_text: &'static str,
 }
 
 const MIB: u64 = 1 << 20;

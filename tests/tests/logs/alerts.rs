@@ -402,7 +402,7 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     assert!((sent - 3..=sent).contains(&count), "{count} of {sent}");
     assert_eq!(action, "restart it");
     // An alert that a sensor is silent would contradict the alert about withheld readings.
-    let of_sensors = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+    let of_sensors = changes.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
     assert_eq!(of_sensors, 0);
     let state = late.view().live_state_json();
     let dvl = state.sensors.iter().find(|sensor| sensor.id == "dvl").unwrap();

@@ -284,8 +284,8 @@ fn damage_seen_before_seeking_back_is_reported_at_the_end() {
     ] {
         // Only the number of losses is compared. Their times may be known more exactly after the whole log has been
         // read.
-        let (code, told) = losses(lines);
-        assert_eq!((code, told.as_array().unwrap().len()), (Some(3), 3), "{lines}: {told}");
+        let (code, listed) = losses(lines);
+        assert_eq!((code, listed.as_array().unwrap().len()), (Some(3), 3), "{lines}: {listed}");
     }
 }
 

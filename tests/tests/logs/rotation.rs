@@ -146,13 +146,13 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
             assert!(early.iter().any(|words| answer.stderr.contains(words)), "{name}: {}", answer.stderr);
             continue;
         };
-        assert_eq!(told["differences"], Value::Array(Vec::new()), "{name}: {told}");
-        let lost = told["losses"].as_array().unwrap();
+        assert_eq!(report["differences"], Value::Array(Vec::new()), "{name}: {report}");
+        let lost = report["losses"].as_array().unwrap();
         // After a kill, data may be lost from two parts of the log: the one that was being written, and one that had
         // just begun.
-        assert!(lost.len() <= 2, "{name}: {told}");
-        assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {told}");
-        same += told["same_records"].as_u64().unwrap();
+        assert!(lost.len() <= 2, "{name}: {report}");
+        assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {report}");
+        same += report["same_records"].as_u64().unwrap();
         assert!(Path::new(&folder.path(&name)).exists());
     }
     println!("{KILLS} kills, {parts} parts, {same} results the same");

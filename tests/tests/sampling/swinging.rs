@@ -22,7 +22,8 @@ fn advised_speed_of_a_swinging_vehicle_is_positive_and_passes() {
             "{target_m} m"
         );
         // The speed after all margins must be near the advised speed, because the target is met at both speeds.
-        let with_all_mps = slow.median(|beat| beat.advice.margins.map_or(0.0, |margins| margins.losses_mps));
+        let with_all_mps =
+            slow.median(|entry| entry.advice.margins.map_or(0.0, |margins| margins.losses_mps));
         assert!((0.9..2.0).contains(&(with_all_mps / advised_mps)), "{with_all_mps}, not {advised_mps} m/s");
         assert!(advised_mps > 0.01, "target {target_m} m: {advised_mps} m/s");
         let followed = outing.dive(planned_mps, advised_mps);

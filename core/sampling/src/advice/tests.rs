@@ -307,8 +307,8 @@ fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
     let [y_m, z_m] = case.profile.reference();
     let mut advisor = case.advisor();
     let (mut most, mut cast) = (0.0_f64, 0);
-    for beat in 0..600 {
-        let s = f64::from(beat) * 0.2;
+    for update in 0..600 {
+        let s = f64::from(update) * 0.2;
         let position = Point3::new(100.0, y_m + 0.9 * math::sin(s / 90.0), z_m + 0.5 * math::sin(s / 70.0));
         let [roll, pitch, yaw] =
             [(0.15, 31.0), (0.1, 23.0), (0.2, 47.0)].map(|(most, at)| most * math::sin(s / at));
@@ -317,7 +317,7 @@ fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
         let before: Vec<_> = advisor.heads.iter().map(|head| head.cast_at).collect();
         let kept_mps = advisor.advise(&then, swing, None).v_max_mps;
         cast += advisor.heads.iter().zip(before).filter(|(head, before)| head.cast_at != *before).count();
-        if beat % 7 == 0 {
+        if update % 7 == 0 {
             let fresh_mps = case.advisor().advise(&then, swing, None).v_max_mps;
             most = most.max((kept_mps / fresh_mps - 1.0).abs());
         }

@@ -76,7 +76,7 @@ impl Type {
     }
 
     /// Whether the message type states what was measured. A bare number doesn't, because it may be anything.
-    pub(super) fn is_telling(self) -> bool {
+    pub(super) fn is_self_describing(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
 }

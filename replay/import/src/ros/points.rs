@@ -285,8 +285,8 @@ mod tests {
             assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
             assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
             // The same point in the axes of a scanner: x points where the head's angle is zero, and y is the head's y.
-            let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
-            assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
+            let valid = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).valid(Plane::Xy).unwrap();
+            assert!((valid.beams[0].angle_rad - angle_rad).abs() < 1e-12);
         }
     }
 

@@ -68,7 +68,7 @@ pub(super) struct Heeding {
     pub(super) goes_back: bool,
     /// Whether the pilot stops when advised to, and waits for the first advice before setting out. The monitor advises
     /// a stop if it needs to estimate gyro biases or has no position.
-    pub(super) stands: bool,
+    pub(super) stops_if_advised: bool,
     /// Time that the pilot waits at the dive's start before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
@@ -203,7 +203,7 @@ impl Advised {
     }
 
     /// The advice that the pilot follows at `at_s`: the latest that was given at least `lag_s` earlier, if any.
-    fn told_at(&self, at_s: f64) -> Option<PilotAdvice> {
+    fn advice_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
         let advice_list = |advice: &&PilotAdvice| advice.at <= by && by > MonoNs(START.0);
         self.advice_list.iter().rev().find(advice_list).cloned()
@@ -211,7 +211,7 @@ impl Advised {
 
     /// The missed stretch farthest behind the vehicle that the pilot has not gone back for. It must lie at least
     /// [`BEHIND_M`] behind the vehicle, unless the pilot waits at the end of the dive.
-    fn to_go_back_for(&self, told: &PilotAdvice) -> Option<[f64; 2]> {
+    fn to_go_back_for(&self, advice: &PilotAdvice) -> Option<[f64; 2]> {
         let behind_m = if matches!(self.doing, Doing::Waiting { .. }) { 0.0 } else { BEHIND_M };
         let missed = advice.missed_m.iter().filter(|[from_m, to_m]| {
             let tried = |[first_m, last_m]: &[f64; 2]| from_m < last_m && to_m > first_m;
