@@ -41,7 +41,7 @@ impl Clock {
 
 /// Returns the clock with the most raw messages; `None` if the log has only one clock.
 ///
-/// The messages are read only if the chunk headers span more than a year.
+/// Messages are read only if the times in the chunk headers span more than a year.
 ///
 /// Errors: the log can't be read.
 pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<Option<Clock>, LogError> {
@@ -95,7 +95,7 @@ mod tests {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);
-        // The timestamp of a clock beyond the limit doesn't extend the range of another clock.
+        // A timestamp beyond the limit on clocks doesn't extend the range of any other clock.
         assert!(!count(&mut clocks, MonoNs(YEAR_NS * 580)) && count(&mut clocks, MonoNs(8)));
         assert!(clocks.iter().all(|clock| clock.to.0 - clock.from.0 <= YEAR_NS));
     }

@@ -84,7 +84,7 @@ impl LeftOut {
         self.excess() <= 1.0
     }
 
-    /// Returns the largest change within the confidence intervals, as a multiple of the limit for that quantity.
+    /// Returns the largest change within the two confidence intervals, as a multiple of the limit for that quantity.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
@@ -103,8 +103,8 @@ pub fn measure(
         return Err(EffectInfluenceError::Seeds(scenes.len()));
     }
     let effects = scenes.first().map(Scene::simulated).unwrap_or_default();
-    // Leaving out all negligible effects together takes one measurement. Each effect that must be restored takes one
-    // more measurement.
+    // One measurement leaves out all negligible effects together. Each effect that must be restored takes one more
+    // measurement.
     let most = scenes.len() * (2 * effects.len() + 2);
     let mut paired = Paired { with: Vec::new(), scenes, dived: 0, most, note };
     paired.with = paired.dive(&[])?;
@@ -126,7 +126,7 @@ pub fn measure(
     })
 }
 
-/// Returns the scene on which the cost is measured.
+/// Returns the first scene, on which the cost is measured.
 fn first(scenes: &mut [Scene]) -> Result<&mut Scene, EffectInfluenceError> {
     scenes.first_mut().ok_or(EffectInfluenceError::Seeds(0))
 }
@@ -228,8 +228,8 @@ impl Figures {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }
 
-    /// Returns the mean difference of the hole diameter D over the sections that both dives have, m; zero without such
-    /// sections.
+    /// Returns by how much the hole diameter D exceeds that of `other`, as a mean over the sections that both dives
+    /// have, m. Zero without such sections.
     fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();

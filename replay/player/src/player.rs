@@ -32,7 +32,7 @@ pub struct Player {
     clock: Option<Clock>,
     /// Messages with timestamps of another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
-    /// The farthest position from which a jump started, as a message count, and the losses up to that position.
+    /// The farthest position that playback had reached before a jump, as a message count, and the losses up to it.
     farthest: (u64, Vec<String>),
 }
 
@@ -251,7 +251,8 @@ impl PacketSource for Player {
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
         let Some(coming) = self.next else { return Ok(()) };
-        // This program's own logs are in the loop's order of consumption. Logs of other writers are in time order.
+        // Only this program's own logs state the order in which the loop consumed packets. Other logs are read in time
+        // order.
         let order = if self.reader.has_ticks() { self.order } else { NO_ORDER };
         port.send_in_order(coming.at, order, &self.bytes)?;
         self.order += 1;

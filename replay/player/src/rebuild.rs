@@ -21,8 +21,8 @@ use crate::playback::PlaybackError;
 use crate::player::Player;
 use crate::saved_state::{Consumed, SavedState};
 
-/// Number of new packets left to the rebuilding loop at which the dive's loop waits for it. The wait takes a fraction
-/// of a second.
+/// If at most this many new packets are still unprocessed, the dive's loop waits for the rebuilding loop. The wait
+/// takes a fraction of a second.
 const NEAR_PACKETS: u64 = 100;
 
 /// A dive whose state is being rebuilt.
@@ -40,7 +40,7 @@ pub struct Rebuilt {
     pub snapshot: Vec<u8>,
     /// Number of packets in the saved state that was used; 0 if the whole log was replayed.
     pub saved_packets: u64,
-    /// All packets of the dive so far.
+    /// Number and digest of all packets of the dive so far.
     pub consumed: Consumed,
     /// Files of the log, with their numbers of messages.
     pub files: Vec<PartFile>,
@@ -106,11 +106,12 @@ impl Rebuild {
         Ok(Self { thread, packets, sent: 0, progress })
     }
 
-    /// Passes on the packets of a tick that the dive's loop only records.
+    /// Passes the packets of a tick to the rebuilding thread. The dive's loop only records these packets.
     pub fn take(&mut self, inbox: &Inbox) {
         for (source, packet) in inbox.iter() {
             let packet = Packet { received: packet.received, source, bytes: packet.bytes.to_vec() };
-            // If the thread has ended early, `finish` returns its error.
+            // A packet can't be sent if the thread has ended early. [`Rebuild::finish`] then returns the thread's
+            // error.
             self.sent += u64::from(self.packets.send(packet).is_ok());
         }
     }
@@ -156,8 +157,8 @@ struct Rejoined {
 impl Rejoined {
     /// Skips the packets that a saved state contains, and restores the state.
     ///
-    /// If the packets aren't those of the log, the dive is rebuilt from its beginning. Returns the number of packets
-    /// skipped.
+    /// If the state's packets aren't those of the log, the dive is rebuilt from its beginning. Returns the number of
+    /// packets skipped.
     fn start_at(
         &mut self,
         state: &SavedState,

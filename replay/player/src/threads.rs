@@ -150,8 +150,8 @@ fn run_tick(dive: &mut Loop, tick: &mut Tick, after_tick: &mut dyn FnMut(&Loop))
     after_tick(dive);
 }
 
-/// Georeferences the pings of a packet source until the source ends or no receiver takes batches any more.
-/// `unused` returns batches for reuse.
+/// Georeferences the pings of a packet source until the source ends or no receiver takes batches any more. `unused`
+/// delivers used batches for reuse.
 fn place(
     placer: &mut Placer,
     mut driver: Driver,
@@ -192,10 +192,10 @@ fn place(
 
 /// Runs several loops until the source ends, with the navigation of the first loop.
 ///
-/// Packets are decoded and pings are georeferenced only once. Each loop gives the results that it would give
-/// alone. The loops must be armed with the same navigation, which can't be checked.
+/// Packets are decoded and pings are georeferenced only once. Each loop gives the results that it would give alone. The
+/// caller must arm all loops with the same navigation, because this can't be checked here.
 ///
-/// Errors: see [`DriveError`]; loops differ in more than the target, the sections and the requirements on them.
+/// Errors: see [`DriveError`]; loops differ in more than the target, the sections and the requirements on sections.
 pub fn drive_together(
     threads: usize,
     dives: &mut [Loop],
@@ -272,8 +272,8 @@ fn drive_all(
     })
 }
 
-/// Advises and judges in each loop, for all ticks in a batch of georeferenced pings. Advice is for the loop's own
-/// target.
+/// Computes advice and verdicts in each loop, for all ticks in a batch of georeferenced pings. Each loop advises for
+/// its own target.
 fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
     let mut own = Tick::default();
     for (dive, adviser) in dives {

@@ -11,7 +11,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 
 /// Maximum memory of one stream's live results that wait for the replay, bytes.
 ///
-/// In an intact log the live results are only one tick ahead.
+/// With an intact log, the live results are only one tick ahead of the replay.
 const MOST_WAITING: usize = 16 << 20;
 
 /// Streams of results that logs of earlier versions don't have.
@@ -129,10 +129,10 @@ impl Stream {
         }
     }
 
-    /// Adds the live results of a tick. If too many results wait, the replay evidently lacks them, and a difference is
-    /// reported.
+    /// Adds the live results of a tick. If too many of them wait, the replay doesn't have these records, and a
+    /// difference is reported.
     fn wait(&mut self, batch: Batch, name: &'static str) {
-        // After a stream's first difference nothing more of it is compared.
+        // After the first difference in a stream, the rest of the stream isn't compared.
         if self.difference.is_some() {
             return;
         }

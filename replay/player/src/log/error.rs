@@ -133,7 +133,7 @@ pub enum LogError {
         /// Error from the operating system.
         source: io::Error,
     },
-    /// At the end of a recording, the medium neither accepts data nor fails.
+    /// At the end of a recording, the medium accepts no data but reports no error.
     #[error(
         "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; the log's end may be missing"
     )]

@@ -4,7 +4,8 @@
 //! everything after it.
 //!
 //! Three checks detect a wrong length. Most kinds of record imply their length twice, by the record length and by the
-//! lengths of fields. A length must leave room for the next record. Another record must follow.
+//! lengths of fields. The length must leave room for the next record in the file. Another record must begin where it
+//! ends.
 //!
 //! Source: MCAP format specification, "Records".
 
@@ -24,7 +25,7 @@ use super::medium::Medium;
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Length of a record's opcode and length field, bytes.
 const RECORD_HEAD_BYTES: usize = 9;
-/// Maximum number of bytes read to identify a record. They hold the fields of fixed length, and names of usual length.
+/// Maximum number of bytes read to identify a record. This is enough for fields of fixed length and usual names.
 const GLANCE_BYTES: usize = 1024;
 /// Length of a chunk record before its data, without the name of the compression, bytes.
 const CHUNK_HEAD_BYTES: u64 = 40;
@@ -142,7 +143,7 @@ pub(super) struct ChunkPlace {
     pub(super) times: (u64, u64),
     /// Whether the file ends within the chunk.
     pub(super) cut: bool,
-    /// Whether the chunk's header is damaged: its field lengths contradict the record length.
+    /// Whether the chunk's header is damaged, so that its field lengths contradict the record length.
     pub(super) doubtful: bool,
 }
 

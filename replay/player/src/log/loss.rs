@@ -119,11 +119,11 @@ pub enum LossKind {
         /// Number of messages up to the end of this part, as the next part's header states it.
         wanted: u64,
     },
-    /// A file that is named like a part of a recording, but has no data.
+    /// A file that is named like a part of a recording, but isn't a readable log.
     PartUnreadable {
         /// Part number that the file name states.
         part: u32,
-        /// Text that follows "the file can't be read:".
+        /// Reason why the file can't be read, which the text of the loss gives after a colon.
         why: String,
     },
     /// A part whose part metadata is unreadable. Its number was taken from the file name.
@@ -284,7 +284,7 @@ impl LossKind {
 }
 
 impl Loss {
-    /// The same loss in dive time: with times counted from the beginning of the log, `begun`.
+    /// Returns the loss with times counted from `begun`, the beginning of the log.
     #[must_use]
     pub fn in_dive_time(&self, begun: MonoNs) -> Self {
         let dive_time = |at: MonoNs| MonoNs(at.0.saturating_sub(begun.0));

@@ -9,7 +9,7 @@ const SECTOR_BYTES: u64 = 512;
 /// them.
 const MOST_RANGES: usize = 1024;
 
-/// Reads zeros in place of unreadable bytes, and records their ranges. Bytes elsewhere may be intact.
+/// A medium that gives zeros in place of unreadable bytes, and records their ranges. Other bytes may be intact.
 pub(super) struct Medium<R> {
     input: R,
     at: u64,

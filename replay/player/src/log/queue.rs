@@ -33,7 +33,7 @@ pub(super) struct State {
     pub(super) abandoned: AtomicBool,
     /// Whether the recorder has ended, so that the queue is no longer emptied.
     pub(super) closed: AtomicBool,
-    /// Whether nothing is being recorded at present, because of an error.
+    /// Whether an error keeps the recorder from recording at present.
     pub(super) failing: AtomicBool,
     /// Ticks that the loop skipped because the recorder was too far behind.
     pub(super) gaps: ArrayQueue<Gap>,
@@ -69,7 +69,7 @@ impl State {
         }
     }
 
-    /// Returns the duration, up to the latest tick, whose data may not be on the disk yet.
+    /// Returns the time before the latest tick whose data may not be on the disk yet.
     pub(super) fn unsafe_for(&self) -> DurNs {
         let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
         DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))
@@ -101,7 +101,7 @@ pub(super) struct Dropped {
     pub(super) packets: u64,
 }
 
-/// Records messages to devices, and losses of packets, neither of which passes through the loop. Any thread may use it.
+/// Records bytes sent to devices, and losses of packets. They don't pass through the loop. Any thread may use it.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
@@ -181,8 +181,8 @@ impl<R: ByteProducer> Entries<R> {
 
 /// Calls `work` until `is_stopping` returns true and no work is left.
 ///
-/// `work` returns the amount of work that it found, and `idle` waits briefly. The flag is read before the queue.
-/// Everything that was pushed before the flag was set is therefore processed.
+/// `work` returns the amount of work that it found, and `idle` waits briefly. `is_stopping` is asked before each call
+/// of `work`, so everything pushed before the stop is processed.
 pub(super) fn until_stopped(
     is_stopping: impl Fn() -> bool,
     mut work: impl FnMut() -> usize,
@@ -222,7 +222,7 @@ pub(super) struct Entry {
 }
 
 impl<R: ByteConsumer> Queue<R> {
-    /// Takes the next entry if it is complete, and puts its message into `message`.
+    /// Takes the next entry if it is complete, and stores its message in the field `message`.
     pub(super) fn take(&mut self) -> Option<Entry> {
         let mut head = [0; ENTRY_HEAD_BYTES];
         if self.ring.peek(&mut head) < ENTRY_HEAD_BYTES {

@@ -37,10 +37,10 @@ pub struct LogInfo {
     /// Metadata of the log. Entries of this program's own record keep their key. Other entries have the key `<name of
     /// the record>/<key>`.
     pub metadata: BTreeMap<String, String>,
-    /// The sources. A source's index is its number in [`MessageKind`].
+    /// The sources of the log. A source's index is its number in [`MessageKind`].
     ///
-    /// In this program's logs, the channels' metadata contain the numbers. If some are missing, the sources are
-    /// numbered by name: `/raw/...` first, then `/sent/...`.
+    /// In this program's logs, the channels' metadata contain the source numbers. If some numbers are missing, the
+    /// sources are numbered by name: `/raw/...` first, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
     /// Position of this log in a recording with several parts.
     pub part: Option<Part>,
@@ -257,8 +257,7 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Excludes all messages that come after these totals of the recording. Call it before reading the first
-    /// message.
+    /// Excludes all messages that come after the totals `after`. Call it before reading the first message.
     pub(super) fn pass_over(&mut self, after: &Progress) {
         let number = |topic: &str| after.sequences.get(topic).copied().unwrap_or_default();
         self.repeated = self.channels.all().map(|channel| (channel.id, number(&channel.topic))).collect();
@@ -377,7 +376,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Continues from a position of this reader, or of another reader of the same file.
     ///
-    /// Messages, their order and losses are then the same as in a straight read, whatever was read before.
+    /// Messages, their order and losses are then the same as if the log were read straight through.
     ///
     /// Errors: an I/O error.
     pub fn go_to(&mut self, place: &LogPlace) -> Result<(), LogError> {
@@ -396,7 +395,7 @@ impl<R: Read + Seek> LogReader<R> {
             self.read_span(*number, *next)?;
         }
         (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
-        // Damage after the position will be found again when it is read.
+        // The list ends with the losses known at this position. Later damage is found again when it is read.
         self.losses = Losses::of(place.losses.clone());
         self.numbering.clone_from(&place.numbering);
         self.finished = false;
@@ -463,8 +462,8 @@ impl<R: Read + Seek> LogReader<R> {
             return;
         }
         if self.losses.is_full() {
-            // A full list only extends its last loss. The times of that loss are determined at the end, because
-            // searching for times again and again would be slow.
+            // If the list is full, this loss only extends the last one. The times of the last loss are determined at
+            // the end, because searching for times again and again would be slow.
             let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
             self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
             return;
@@ -528,7 +527,7 @@ fn read_chunk<R: Read + Seek>(
     let unpacked = unpack(file, place, |opcode, body| match opcode {
         op::MESSAGE => sound &= batch.push(body),
         op::SCHEMA | op::CHANNEL => definitions.take(opcode, body),
-        // Records of private kinds are skipped. Records of all other kinds belong outside chunks.
+        // Records of private kinds are skipped. Records of all other kinds don't belong in a chunk.
         opcode => misplaced |= opcode < PRIVATE,
     })?;
     if let Unpacked::Bad(kind) = unpacked {

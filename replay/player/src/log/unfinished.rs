@@ -31,14 +31,14 @@ pub struct Unfinished {
     pub span: Option<(MonoNs, MonoNs)>,
     /// Files of the parts, in order; empty if none of them is at [`Self::recording`].
     pub files: Vec<PathBuf>,
-    /// Identifier of the recording, equal for all recordings of a dive.
+    /// Identifier of the recording, which all parts of a dive share.
     pub dive: String,
     /// Number of the last part, and number in its file name.
     pub(super) number: u32,
     pub(super) named: u32,
     /// Totals of all readable messages.
     pub(super) progress: Progress,
-    /// The last file, locked, so that no other program continues the recording. `None` on file systems without locks.
+    /// The last file, locked so that no other program continues the recording. `None` if the file system has no locks.
     _lock: Option<Arc<File>>,
 }
 
@@ -122,7 +122,7 @@ impl Unfinished {
     /// Returns the path that names the latest recording in a folder, if that recording did not end in order.
     ///
     /// The latest recording is the one whose file was modified last. Files that aren't parts of a recording are
-    /// ignored, as are those for which `is_other` returns true.
+    /// ignored. Logs for which `is_other` returns true are ignored too.
     ///
     /// Errors: the folder can't be read.
     pub fn last_in(folder: &Path, is_other: &dyn Fn(&LogInfo) -> bool) -> Result<Option<PathBuf>, LogError> {
@@ -161,7 +161,7 @@ impl Unfinished {
         Ok(has_head && unended(&files)?.is_some())
     }
 
-    /// Returns the same dive, to be continued at another path. `None` if parts of the dive are already there.
+    /// Returns the recording, to be continued at another path. `None` if that path already has parts of the dive.
     #[must_use]
     pub fn at(&self, recording: &Path) -> Option<Self> {
         let present = in_the_way(recording).unwrap_or_default();

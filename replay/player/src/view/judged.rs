@@ -14,7 +14,7 @@ use super::site::Site;
 const EVERY: DurNs = DurNs(2_000_000_000);
 /// Maximum number of stretches in a list. The stretches farthest from the portal are kept.
 ///
-/// The log stays small even if a dive misses everything.
+/// The limit keeps the log small even if a dive misses everything.
 const MOST_STRETCHES: usize = 40;
 
 /// Judgements of all sections so far.
@@ -33,7 +33,7 @@ pub(super) struct Sections {
 }
 
 impl Sections {
-    /// Stores the change of a missed stretch until the next judgement of a section.
+    /// Stores the change of a missed stretch, for use at the next judgement of a section.
     pub(super) fn run(&mut self, id: u64, change: u64) {
         self.changed_runs.push((id, change));
     }

@@ -11,10 +11,10 @@ const SPAN: DurNs = DurNs(500_000_000);
 const MOST_POINTS: usize = 4096;
 /// Length of a point, bytes: three floats.
 ///
-/// Rounding makes the least significant byte of x zero, so that byte holds the head number. A viewer that reads it as
-/// part of x shows x wrong by some micrometres. The head number in a byte of its own would make the stride 13 bytes.
-/// Base64 encodes groups of three bytes, so points would no longer align with groups, and the compressed text would be
-/// a seventh longer.
+/// Rounding makes the least significant byte of x zero, so that byte holds the head number. A viewer that reads this
+/// byte as part of x shows x wrong by some micrometres. If the head number had a byte of its own, the stride would be
+/// 13 bytes. Base64 encodes groups of three bytes, so points would no longer align with groups, and the compressed text
+/// would be a seventh longer.
 const STRIDE: usize = 12;
 const FIELDS: [Field; 4] =
     [Field::float("x", 0), Field::float("y", 4), Field::float("z", 8), Field::byte("head", 0)];

@@ -24,8 +24,8 @@ fn messages() -> Vec<(usize, u64, u32)> {
     messages
 }
 
-/// Messages in the expected reading order: by time, then raw channels by name, then other channels by topic, then
-/// sequence.
+/// Messages in the expected reading order: by time, then by channel, then by sequence. Raw channels come first, by
+/// name; other channels follow, by topic.
 fn wanted() -> Vec<(String, u64, u32)> {
     let kinds = [("raw 1", 1), ("other", 3), ("raw 0", 0), ("sent 0", 2)];
     let mut wanted: Vec<_> =
@@ -341,8 +341,8 @@ fn with_attachment(name: &str) -> (Vec<u8>, usize) {
 fn unreadable_attachment_is_left_out_and_reported() {
     let (whole, at) = with_attachment("notes.txt");
     assert_eq!(read(&whole).1, vec![]);
-    // The data's length comes after the opcode and the record length, two timestamps, and the name and the media type,
-    // each with its own length.
+    // Before the data's length come the opcode, the record length and two timestamps. The name and the media type
+    // follow, each with its own length.
     let data_len_at = at + 9 + 16 + 4 + "notes.txt".len() + 4 + "text/plain".len();
     assert_eq!(whole[data_len_at..data_len_at + 8], 3000_u64.to_le_bytes());
     for len in [u64::MAX, u64::MAX - 3, u64::MAX - 60, 1 << 63, 3001] {

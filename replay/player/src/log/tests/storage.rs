@@ -1,5 +1,5 @@
 //! Recordings on a storage with faults. Each operation fails in turn, once or for a while. Every loss is reported, no
-//! message is written twice, and no cut-off log looks complete.
+//! message is written twice, and no log that was cut off looks complete.
 
 #![expect(
     clippy::disallowed_types,
@@ -213,8 +213,7 @@ fn single_storage_fault_is_recorded_and_loses_no_message() {
             };
             assert_eq!((summary.faults.len(), fault.lost), (1, 0), "{which}");
             assert!(fault.error.contains("Input/output error"), "{which}");
-            // If the sync of the summary fails, the summary may still be complete. Everything before the summary is
-            // synced.
+            // If the summary can't be synced, it may still be complete. Everything before the summary is synced.
             if fault.error.contains("the summary") {
                 continue;
             }
@@ -248,7 +247,7 @@ fn medium_fault_loses_no_message_if_brief_and_no_earlier_message_if_permanent() 
             let which = format!("{lasts} from operation {from} on: {:?}", summary.faults);
             let lost: u64 = summary.faults.iter().map(|fault| fault.lost).sum();
             assert_eq!(summary.messages + lost, 4 * TICKS, "{which}");
-            // Messages that were written but not synced may also be found.
+            // The log may also contain messages that were written but not synced.
             assert!(expected.starts_with(&seen) && seen.len() as u64 >= summary.messages, "{which}");
             let is_end = summary.faults.iter().all(|fault| fault.error.contains("the summary"));
             assert!(!summary.faults.is_empty() && (is_end || !losses.is_empty()), "{which}");
@@ -285,7 +284,8 @@ fn backlog_overflow_loses_and_counts_the_oldest_messages() {
     storage.store(false);
     let (seen, losses) = read_back(&folder);
     assert_eq!(seen.len() as u64, summary.messages);
-    // The messages have one gap. The log's statement of the loss gives the times at the two ends of that gap.
+    // One gap in the messages is wider than 0.1 s. The log's statement of the loss gives the times at the two ends of
+    // that gap.
     let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
     let gaps: Vec<_> = times.windows(2).filter(|pair| pair[1] - pair[0] > 100_000_000).collect();
     let stated = losses.iter().find(
@@ -317,8 +317,8 @@ fn synced_messages_survive_a_power_cut_after_an_error() {
         storage.store(true);
         let (seen, losses) = read_back(&folder);
         assert!(expected.starts_with(&seen), "operation {at}");
-        // At most seven steps of a tenth of a second are lost: half a second between two syncs, and the steps around
-        // the retry.
+        // At most seven steps of a tenth of a second are lost. Half a second lies between two syncs, and the rest is
+        // around the retry.
         assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
         assert!(!losses.is_empty(), "operation {at}");
     }
@@ -392,7 +392,7 @@ fn recording_with_a_fault_is_recovered_as_one_log_that_lists_the_fault() {
     assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
     let told = losses[0].to_string();
     assert!(told.contains(&summary.faults[0].words()), "{told}");
-    // The first part alone lacks the rest of the dive, and is reported as cut off.
+    // Without the later parts, the first part lacks the rest of the dive, so it is reported as cut off.
     let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
     assert!(first.messages < 4 * TICKS);
     assert!(first.losses.iter().any(|loss| loss.kind == LossKind::Truncated), "{:?}", first.losses);
