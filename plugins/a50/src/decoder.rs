@@ -171,7 +171,7 @@ impl State {
     }
 }
 
-/// Reason for withholding a report that was sent this long after its measurement.
+/// Returns the reason for withholding a report that was sent `delay_us` after its measurement.
 fn late(delay_us: i64) -> WithheldReason {
     let seconds = |us: i64| DurNs(us.saturating_mul(1000)).as_secs_f64();
     WithheldReason::Late { age_s: seconds(delay_us), at_most_s: seconds(MOST_DELAY_US) }

@@ -127,7 +127,7 @@ impl Found {
         Ok(())
     }
 
-    /// The report, if no field is missing.
+    /// Returns the report; `None` if a field is missing.
     fn whole(self) -> Option<Velocity> {
         let [x, y, z] = self.velocity_mps;
         let [validity, transmission] = self.times_us;

@@ -1,4 +1,4 @@
-//! I2C transactions with the sensor. A message has the bytes written, followed by the bytes read.
+//! I2C transactions with the sensor. Each message holds the bytes written to the sensor, then the bytes read from it.
 //!
 //! ```text
 //!   measure      AC | status  pressure (2)  temperature (2)      6 bytes
@@ -12,8 +12,8 @@ use headrace_sensor::codec::{Framed, Framing, Verdict};
 /// Command that starts a conversion of pressure and temperature.
 pub const MEASURE: u8 = 0xAC;
 
-/// Smallest command byte. Smaller first bytes are addresses of memory cells. So the first byte gives a transaction's
-/// length.
+/// Smallest command byte. Smaller first bytes are addresses of memory cells. The first byte therefore determines a
+/// transaction's length.
 const FIRST_COMMAND: u8 = 0x80;
 
 /// Length of a measurement transaction.

@@ -100,7 +100,7 @@ impl Access {
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }
 
-    /// Whether a token is the token of this role. The token isn't compared with those of other roles.
+    /// Whether a token is the token of this role. The token isn't compared with the tokens of other roles.
     pub(crate) fn is_token_of(&self, role: Role, token: &str) -> bool {
         self.tokens.as_ref().is_some_and(|tokens| match role {
             Role::Viewer => tokens.viewer.is(token),

@@ -14,7 +14,7 @@ use crate::wire::{SampleRecord, SectionRecord};
 pub enum Fed {
     /// New data since the previous message.
     News(Box<News>),
-    /// Playback has jumped to this time, and later messages refer to the time after the jump.
+    /// Playback has jumped to this time. All later messages refer to the time after the jump.
     Jump(MonoNs),
     /// State of playback.
     Playback(PlaybackState),
@@ -33,7 +33,7 @@ pub struct News {
     pub begun: Option<MonoNs>,
     /// The live state at the end of the tick.
     pub state: Box<LiveStateJson>,
-    /// Displayed data besides the live state.
+    /// Displayed data that isn't in the live state.
     pub beside: Beside,
     /// Samples since the previous message.
     pub samples: Vec<SampleRecord>,
@@ -47,7 +47,7 @@ pub struct News {
     pub notes: Option<Vec<NoteJson>>,
     /// Missed stretches to go back to; `None` if the list hasn't changed.
     pub back: Option<Value>,
-    /// Counts of data dropped so far.
+    /// Counts of samples and events dropped so far.
     pub dropped: Dropped,
 }
 
@@ -127,7 +127,7 @@ pub struct RecordingJson {
     pub path: Option<String>,
 }
 
-/// Numbers of data dropped because the queue was full.
+/// Counts of samples and events that were dropped because the queue to the page's thread was full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Dropped {
     /// Number of dropped samples. Wall samples among these are sent again from the loop's store.

@@ -22,7 +22,7 @@ pub struct Samples {
     chunks: Vec<Chunk>,
     kept: usize,
     visible: usize,
-    /// End time of each tick, ms, with the number of samples up to that time. Kept for seeks.
+    /// End time of each tick, ms, with the number of samples up to that time. Seeks need these marks.
     marks: Vec<(u32, u32)>,
     not_kept: u64,
 }
@@ -45,8 +45,8 @@ impl Samples {
 
     /// Adds the samples of a tick that ended `at_ms` after the dive began.
     ///
-    /// After a seek back, the stored samples of a tick become visible again. `marked` is true for dives that support
-    /// seeks.
+    /// If playback has jumped back, the tick's samples are already stored and become visible again. `marked` is true
+    /// for dives that support seeks.
     pub fn take(&mut self, at_ms: u32, new: &[SampleRecord], marked: bool) {
         if marked && self.marks.last().is_some_and(|(last, _)| at_ms <= *last) {
             self.visible = self.visible.max(self.count_at(at_ms));

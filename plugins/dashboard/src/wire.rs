@@ -1,6 +1,6 @@
 //! Encodes the feed's binary frames, little-endian: a header of 16 bytes, then records of fixed size.
 //!
-//! `docs/reference/page-feed.md` defines them.
+//! `docs/reference/page-feed.md` defines the frames.
 
 use headrace_coverage::{Cause, Unsure, Verdict};
 use headrace_monitor::section_row::SectionRow;

@@ -22,7 +22,7 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Tcp, Carrier::Serial, Carrier::Udp]
 
 /// Longest usual gap between the bytes of a return.
 const SILENCE: DurNs = DurNs::from_millis(100);
-/// Allowance for the head's own processing in the answer timeout.
+/// Part of the answer timeout that allows for the head's own processing.
 const LEISURE: DurNs = DurNs::from_millis(60);
 /// Slowest sound (m/s) and slowest line (bit/s) for which the answer timeout is long enough.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
@@ -31,8 +31,8 @@ const LINE_BAUD: f64 = 115_200.0;
 /// Source: LSTS DUNE, which retries after a second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// Limits beyond which a head is homed. The largest lag is the scan program's period divided by the first value. The
-/// largest lead is the second value. Before the head has joined its program, the limit of the lag is one ping.
+/// Limits beyond which a head is homed. The largest lag is the scan program's period divided by `BEHIND_SHARE`. The
+/// largest lead is `AHEAD_PINGS`. Before the head has joined its program, the largest lag is one ping.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
 /// A head that answers is reported as too slow for its settings if it lags by more than the scan program's period
@@ -136,7 +136,7 @@ impl HeadDriver {
         self.foreign_id = None;
         self.refused = !header.status.accepted() || header.status.overrun();
         let position = u16::try_from(i32::from(header.position) % COUNTS_PER_TURN).unwrap_or(0);
-        // A duplicate or late answer doesn't belong to any command in flight.
+        // Without a command in flight, this is a duplicate or late answer.
         let Some((aim, _)) = self.asked else { return };
         if let Aim::Ping(number) = aim {
             let planned = self.timetable.ping(number).map(|ping| ping.position);

@@ -189,7 +189,8 @@ impl State {
             }
             M::RateOfTurn(raw) => return self.rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
             M::Acceleration(raw) => return self.force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
-            // High-rate messages are ignored, because sources disagree about which code is which.
+            // High-rate messages are ignored, because sources disagree about which code means rate and which means
+            // force.
             _ => (),
         }
         None
@@ -257,7 +258,7 @@ impl State {
 
     /// Handles a timestamp of an SBG unit. Only the kind of timestamp that arrived first is used.
     ///
-    /// The unit stamps samples and filter solutions with one clock but at different times.
+    /// The unit stamps samples and filter solutions with the same clock, but at different times.
     fn sbg_stamp(&mut self, time_us: u32, of_filter: bool) {
         if *self.stamped_by_filter.get_or_insert(of_filter) == of_filter {
             self.stamp(time_us, MICROSECOND);

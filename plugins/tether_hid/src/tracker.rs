@@ -116,7 +116,7 @@ impl CountTracker {
         let repeated = self.note_sequence(report.sequence);
         let now = Seen { count: report.count, at };
         match self.counting {
-            // A repeated change must not be added twice, while reading the same absolute count twice is harmless.
+            // A repeated change must not be added twice. Reading the same absolute count twice is harmless.
             Counting::Delta if repeated => None,
             Counting::Delta => self.take_delta(now),
             Counting::Absolute => self.take_absolute(now),

@@ -108,8 +108,8 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Ended => (close_code::AWAY, "ended"),
     };
     let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
-    // The viewer may already have disconnected. Otherwise wait for the viewer's answer to the close frame, so that the
-    // viewer reads all data sent before. The number of messages read is limited, because a client may flood the server.
+    // The viewer may already have disconnected. Otherwise, wait for its answer to the close frame, so that it reads all
+    // data sent before. The number of messages read is limited, because a client may flood the server.
     let _closed = timeout(Duration::from_millis(500), async {
         if viewer.socket.send(close).await.is_ok() {
             for _ in 0..MOST_AFTER_CLOSE {
@@ -286,8 +286,8 @@ impl Viewer {
     fn obey(&mut self, text: &str) -> Result<&'static str, String> {
         match Asked::parse(text)? {
             Asked::Rate(hz) => {
-                // The minimum interval is slightly shorter than the requested period, so that jitter skips no
-                // state.
+                // The minimum interval is slightly shorter than the requested period, so that no state is skipped
+                // because of jitter.
                 self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
                 Ok("rate")
             }

@@ -1,4 +1,5 @@
-//! Accepts connections at once, with TLS if there is a certificate. A connection without a request in time is closed.
+//! Accepts connections as they arrive, with TLS if there is a certificate. A connection that sends no request in time
+//! is closed.
 
 use std::io;
 use std::net::SocketAddr;
@@ -28,9 +29,9 @@ const HEAD_WITHIN: Duration = Duration::from_secs(10);
 const HANDSHAKE_WITHIN: Duration = Duration::from_secs(5);
 /// Size of a connection's send buffer in the kernel, bytes; the kernel adds as much again for itself.
 ///
-/// The default of some megabytes would hide for a minute that a viewer reads nothing.
+/// With the default size of some megabytes, it takes a minute to notice that a viewer reads nothing.
 const SEND_BUFFER: u32 = 32 << 10;
-/// Maximum number of unsent bytes in a connection's send buffer. The buffer of a stalled viewer fills no further.
+/// Maximum number of unsent bytes in a connection's send buffer. It keeps the buffer of a stalled viewer from filling.
 #[cfg(any(target_os = "android", target_os = "linux"))]
 const MOST_NOT_SENT: u32 = 8 << 10;
 /// Size of a connection's buffer in this program, bytes.
@@ -136,8 +137,8 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Let each new connection run. Otherwise many later connections might arrive first, and this one would be
-        // closed to make room for them.
+        // Lets each new connection run. Otherwise many later connections might arrive first, and the new connection
+        // would be closed to make room for them.
         tokio::task::yield_now().await;
     }
 }
