@@ -53,7 +53,7 @@ impl Turn {
         self.period_s
     }
 
-    /// n: pings per turn. Source: Eq. 3.
+    /// n: pings per turn. Source: Jorge et al. 2021, Eq. 3.
     pub fn steps(&self) -> u32 {
         self.steps
     }
@@ -63,7 +63,7 @@ impl Turn {
         self.period_s / f64::from(self.steps)
     }
 
-    /// omega: angle turned per second, rad/s. Source: Eq. 4.
+    /// omega: angle turned per second, rad/s. Source: Jorge et al. 2021, Eq. 4.
     pub fn rate_radps(&self) -> f64 {
         TAU / self.period_s
     }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 const NOTHING_M: f64 = 0.002;
 /// The margin for position errors leaves at least this share of the allowed distance between passes.
 ///
-/// A larger margin would not help, because no speed compensates for a lost position.
+/// A larger margin does not help, because no speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
 /// Maximum share of the target that the margin for position errors takes.
 const MOST_SHARE: f64 = 0.2;
@@ -43,7 +43,7 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 /// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
 /// distance between neighbouring samples of one turn. The margin is continuous in all inputs, and at most a fifth of
 /// the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
-/// without margin. A larger margin would slow the vehicle by more than it is worth.
+/// without margin. A larger margin costs more speed than it is worth.
 pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
     let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
@@ -163,7 +163,7 @@ impl Margin {
     }
 }
 
-/// Largest speeds without margins, with the first margin, with the first two, and so on, m/s; they never increase.
+/// Largest speeds without margins, with one margin, with two margins, and so on, m/s; they never increase.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.

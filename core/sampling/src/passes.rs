@@ -65,7 +65,7 @@ pub struct Passes {
     /// Turn period of each head, seconds.
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
-    /// Largest error of pass times, seconds, because side-by-side heads see a place at different angles.
+    /// Largest error of pass times, seconds. It arises because side-by-side heads see a place at different angles.
     parallax_s: f64,
     /// Whether the vehicle is so slow that phases along the tunnel have no meaning.
     at_rest: bool,
@@ -83,7 +83,7 @@ enum Pattern {
     Sectors {
         /// The longest period of a sweep there and back, seconds.
         sweep_s: f64,
-        /// Unevenness of two heads' passes where their sectors meet, as in [`Passes::uneven_ends`].
+        /// Unevenness of two heads' passes at the end that their sectors share, as in [`Passes::uneven_ends`].
         uneven: f64,
     },
     /// Heads turn in opposite senses or at different rates.
@@ -233,7 +233,7 @@ impl Phasing {
 
     /// Returns the first pass of each head from now on.
     ///
-    /// Empty if the heads don't all turn continuously, in one sense and at one rate.
+    /// Empty unless all heads turn continuously, in one sense and at one rate.
     pub fn first_passes(&self) -> impl Iterator<Item = HeadPasses> {
         let phases = if let Pattern::Turning(phases) = &self.pattern { Some(phases) } else { None };
         phases.into_iter().flat_map(|phases| {
@@ -396,7 +396,7 @@ impl Passes {
         Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Creates passes of heads in sectors, started by a schedule for the present speed.
+    /// Creates the passes of heads that sweep sectors, as if started by a schedule for the present speed.
     ///
     /// `sweep_s` is the period of a sweep there and back, s.
     ///

@@ -59,27 +59,27 @@ impl Spiral {
         self.speed_mps * self.turn.ping_period_s()
     }
 
-    /// T_x of one head, m: the distance travelled in a turn. Source: Eq. 12.
+    /// T_x of one head, m: the distance travelled in a turn. Source: Jorge et al. 2021, Eq. 12.
     pub fn pitch_m(&self) -> f64 {
         self.speed_mps * self.turn.period_s()
     }
 
     /// Distance along the tunnel between passes over a place, m, for s heads: T_x / s in phase shift, at most 2 T_x / s
     /// in sectors.
-    /// Source: §5.1 and §5.2.
+    /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn t_x_m(&self) -> f64 {
         self.pitch_m() / self.passes_per_turn
     }
 
     /// T_ymax, m: largest distance between samples of a turn, computed from `t_y2_m`, the largest distance for a head
     /// at rest.
-    /// Source: Eq. 13.
+    /// Source: Jorge et al. 2021, Eq. 13.
     pub fn t_y_max_m(&self, t_y2_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_y2_m)
     }
 
     /// T_ymin, m: smallest distance between samples of a turn, computed from the smallest distance for a head at rest
-    /// (T_y1 or T_c). Source: Eq. 14.
+    /// (T_y1 or T_c). Source: Jorge et al. 2021, Eq. 14.
     pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
         math::hypot(self.advance_m(), smallest_step_m)
     }
@@ -101,20 +101,20 @@ impl Spiral {
     }
 
     /// T_max: largest spacing of samples, m, from `t_y2_m`, the largest distance between samples of a turn for a head
-    /// at rest. Source: Eq. 16.
+    /// at rest. Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, t_y2_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y2_m)
     }
 
     /// T_mean: mean spacing of samples, m, from the mean distance between samples of a turn, which includes the advance
-    /// between pings. Source: Eq. 17.
+    /// between pings. Source: Jorge et al. 2021, Eq. 17.
     pub fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_mean_m)
     }
 
     /// T_min: smallest spacing of samples, m, from the smallest distance between samples of a turn, which includes the
     /// advance between pings.
-    /// Source: Eq. 18.
+    /// Source: Jorge et al. 2021, Eq. 18.
     pub fn t_min_m(&self, t_y_min_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_min_m)
     }

@@ -258,7 +258,7 @@ impl Strips {
     /// Returns T_max predicted at a speed, m: the largest spacing T on any strip.
     ///
     /// The result is infinite if no head sees some wide strip. Passes are farther apart on a strip that some heads do
-    /// not see. On such a strip, if it is narrow, the samples on its two sides limit T as well.
+    /// not see. If such a strip is narrow, the samples on its two sides limit T as well.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)

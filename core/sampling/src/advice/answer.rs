@@ -80,7 +80,7 @@ impl core::fmt::Debug for ModeName {
     }
 }
 
-/// Remedy if a lower speed does not help.
+/// Change that helps if a lower speed does not help.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Remedy {
     /// Setting the heads to another mode.
@@ -210,7 +210,8 @@ pub struct Advice {
     pub alternatives: [Option<Alternative>; MAX_MODES],
     /// Restart of the heads in phase for the best speed; `None` if the heads' phases do not depend on the speed.
     pub anew: Option<Anew>,
-    /// Largest speeds with more and more margins, which show what each margin costs; updated every five seconds.
+    /// Largest speeds as more and more margins are added, which show what each margin costs; updated every five
+    /// seconds.
     pub margins: Option<Margins>,
     /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,

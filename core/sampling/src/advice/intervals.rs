@@ -1,6 +1,6 @@
 //! Intervals of speed that meet a coverage target T.
 //!
-//! Heads that are apart along the hull are in phase only at some speeds, so several intervals may meet a target.
+//! Heads that are apart along the hull are in phase only at some speeds, so the target may be met in several intervals.
 //!
 //! The advised speed depends on the heads' measured motion and the vehicle's pose, not on the present speed. The
 //! advised speed is the upper end of the highest interval. If that interval vanishes while heads run out of phase, the
@@ -35,8 +35,8 @@ pub(super) struct Driving<'a> {
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: RemainingTarget,
-    /// Target minus the margin for position errors, if the speed were unlimited, m. `apart_m` is the distance between
-    /// the heads along the hull, m.
+    /// Target minus the margin for position errors at unlimited speed, m. `apart_m` is the distance between the heads
+    /// along the hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
     /// Speed above which the target is missed for any phases of the heads, m/s.

@@ -19,7 +19,7 @@ const STILL_M: [f64; 2] = [0.004, 0.1];
 /// Rotation limit per metre of the movement limit, as a quaternion component, which is half the angle in rad.
 const TURN_PER_M: f64 = 0.2;
 
-/// Number of the rays that find the wall for the advice, and the vehicle's movement after which they are cast again.
+/// Number of rays with which the advice finds the wall, and the vehicle's movement after which the rays are cast again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
     /// Number of rays in a head's ring, spread evenly over a turn; at least one.

@@ -26,7 +26,7 @@ pub struct Going {
 pub(super) struct Limit {
     pub(super) gap_s: f64,
     pub(super) t_y_m: f64,
-    /// Unevenness of the passes on the two sides of a strip between two sectors; `None` for any other strip.
+    /// Unevenness of the passes on the two sides of a strip that lies between two sectors; `None` for any other strip.
     ///
     /// The strip's width is `t_y_m`. See [`crate::passes::Passes::uneven_ends`].
     pub(super) uneven: Option<f64>,
@@ -51,8 +51,8 @@ impl Limit {
     ///
     /// t is the sum of the pass gap and the ping period. w is `swing_mps`, u is `apart_swing_mps`, and a is `apart_m`.
     ///
-    /// Two facts may allow a higher speed, which is then the result: a known largest displacement by swing, and the
-    /// limited size of a circle between two rows of turning points.
+    /// The result is higher than this solution in two cases: the largest displacement by swing is known, or a circle
+    /// between two rows of turning points limits the hole.
     pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let staggered_m =
