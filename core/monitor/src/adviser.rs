@@ -1,6 +1,6 @@
-//! The adviser: the world that computes the speed advice at each update.
+//! The adviser: the ECS world that computes the speed advice at each update.
 //!
-//! Advice depends on the situations alone, not on the verdicts.
+//! Advice depends only on the situation of the vehicle and its heads, not on the verdicts.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -22,20 +22,20 @@ use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
-/// Lowest speed for which the delay between two heads at different places along the hull is computed, m/s. At a
-/// standstill the delay would be infinite.
+/// Lowest speed for which the delay between two heads at different places along the hull is computed, m/s. It is
+/// assumed for slower vehicles, because the delay grows without bound as the speed falls.
 const SLOWEST_MPS: f64 = 0.05;
 
 /// Part of the loop that computes the advice.
 pub struct Adviser {
     part: Part<AdviseStage>,
-    /// Empty placer results. The adviser holds them between two ticks, in place of the results of a tick.
+    /// Empty placer results. The adviser holds them between two ticks, so that it holds no results of a past tick.
     nothing: Arc<Placed>,
 }
 
 /// Advice computed in one tick.
 ///
-/// The list is reused from tick to tick. In a default value the list grows as needed.
+/// The list is reused from tick to tick. The list of a default value grows as needed.
 #[derive(Debug, Default)]
 pub struct Advised {
     /// Advice at each update, in order.
@@ -183,7 +183,7 @@ impl Advisor {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
-    /// Advice to show at an update. `begun` is the receive time of the first packet.
+    /// Returns the advice to show at an update. `begun` is the receive time of the first packet.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let was_astern = self.advisor.is_astern();

@@ -116,7 +116,7 @@ impl App {
         self.outlets.push(Box::new(outlet));
     }
 
-    /// Keeps the contents of the result streams of every tick, for recording or comparison.
+    /// Makes the result streams keep the contents of every tick, for recording or comparison.
     pub fn keep_results(&mut self) {
         self.keeps_results = true;
     }

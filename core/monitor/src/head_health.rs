@@ -62,7 +62,7 @@ impl SameRange {
     }
 }
 
-/// A return of a head, compared with the design.
+/// A return of a head, compared with the design profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heard {
     /// Range that the head reports, m.
@@ -85,7 +85,7 @@ impl HeadHealth {
             return;
         };
         if self.hears_nothing() {
-            // When the head gets returns again, all averages start anew.
+            // The head gets returns again after a whole turn without any, so all averages start anew.
             *self = Self { last_rad: angle_rad, ..Self::default() };
         }
         self.unheard_rad = 0.0;
@@ -145,7 +145,7 @@ mod tests {
         let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
-        // A single return is enough: the head counts as detecting the wall again.
+        // After a single return, the head counts as detecting the wall again.
         let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
         // Three quarters of each turn give no return, as beside a side tunnel or an absorbing wall.
@@ -183,8 +183,8 @@ mod tests {
             hearing.is_deaf(std::iter::empty())
         };
         assert!(stuck(202, 0.4) && !stuck(199, 0.4));
-        // The wall's distance varies by less than the limit if the head is in the centre of a round pipe, or
-        // near it.
+        // In the centre of a round pipe or near it, the wall's distance varies by less than the limit, so a constant
+        // range isn't suspicious.
         assert!(!stuck(4000, 0.0) && !stuck(4000, 0.2));
     }
 }

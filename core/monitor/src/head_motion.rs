@@ -130,7 +130,7 @@ impl MeasuredMotion {
 
     /// Whether the head may have restarted at a distant angle.
     ///
-    /// A head that resumes after a stall moves a normal step.
+    /// A head that resumes after a stall is not elsewhere, because its first step is of normal size.
     fn is_elsewhere(&self, silence: DurNs, size_rad: f64) -> bool {
         let by_far = self.step_rad.zip(self.rate_radps()).is_some_and(|(step_rad, rate_radps)| {
             let turned_rad = (rate_radps * silence.as_secs_f64()).abs();

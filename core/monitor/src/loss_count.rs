@@ -12,7 +12,7 @@ const BINS: usize = 2048;
 const WORDS: usize = BINS / 64;
 /// Number of pings at which the counts are halved, so that old pings lose weight.
 const WINDOW: u32 = 4096;
-/// Minimum divisor, in pings, of a loss share. With fewer pings, a single loss would count too much.
+/// Minimum divisor, in pings, of a loss share, so that a single loss among few pings doesn't count too much.
 const LEAST: u32 = 100;
 /// Weight of the overall loss share, in pings, in the estimate of the loss share after a lost ping. This weight matters
 /// while few pings are lost.
@@ -112,7 +112,8 @@ impl LossCount {
         let was_deaf = self.hearing.hears_nothing();
         self.hearing.add(angle_rad, heard);
         if was_deaf && heard.is_some() {
-            // Losses while the head detected nothing say nothing about the losses from now on.
+            // While the head detected nothing, all its returns were missing. These losses don't predict the losses from
+            // now on.
             *self = Self { hearing: self.hearing, ..Self::default() };
         }
     }
@@ -202,7 +203,7 @@ mod tests {
             }
             count.at_most()
         };
-        // In each turn, 280 of the 400 pings detect the wall. An angle counts from its third detection on.
+        // In each turn, 280 of the 400 pings detect the wall. An angle's pings count from its third detection on.
         let early = at_most(0..1000);
         assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
         assert_eq!(at_most(1000..1100), LossRate::default());

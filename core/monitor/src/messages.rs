@@ -137,7 +137,7 @@ pub enum Placement {
 /// A georeferenced ping or an advice update, and its position among the tick's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedItem {
-    /// Index of the ping's reading. For an advice update: index of the first reading after it.
+    /// Index of the ping's reading. For an advice update, it is the index of the first reading after the update.
     pub event: usize,
     /// The ping or update.
     pub placement: Placement,

@@ -1,6 +1,6 @@
-//! The placer: the world that converts packets to readings, fixes and georeferenced pings.
+//! The placer: the ECS world that converts packets to readings, fixes and georeferenced pings.
 //!
-//! Its entities are the vehicle and its sensors. It uses no results of the loop's other parts.
+//! Its entities are the vehicle and its sensors. It uses no results of the adviser or the surveyor.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -45,7 +45,7 @@ pub struct Placer {
 
 /// Results of the placer for a tick. The other parts of the loop read no other data of the placer.
 ///
-/// The lists are reused from tick to tick. In a default value they grow as needed.
+/// The lists are reused from tick to tick. The lists of a default value grow as needed.
 #[derive(Debug, Default)]
 pub struct Placed {
     /// Packets of the tick, in the order of consumption.
@@ -139,7 +139,7 @@ impl Placer {
             poses.0.keep();
         }
         part.insert_state("poses", poses);
-        // During a tick, these lists are swapped with those of `Placed`.
+        // During a tick, these lists are swapped with the lists of `Placed`.
         part.insert_resource(Inbox::default());
         part.insert_resource(Events::default());
         part.insert_resource(UnreadPackets::default());

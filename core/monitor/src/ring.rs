@@ -12,8 +12,8 @@ const HEADER_BYTES: usize = 20;
 /// Maximum packet length, bytes.
 pub const MAX_PACKET_BYTES: usize = 4096;
 
-/// Value of `order` in live packets. In replayed packets `order` is the order of consumption recorded in the
-/// log.
+/// Value of `order` in live packets. In a replayed packet, `order` is the packet's place in the recorded order of
+/// consumption.
 pub const NO_ORDER: u64 = u64::MAX;
 
 /// Reason for which a packet was not written.
@@ -90,7 +90,7 @@ impl<R: ByteProducer> Port<R> {
         time.copy_from_slice(&received.0.to_le_bytes());
         place.copy_from_slice(&order.to_le_bytes());
         length.copy_from_slice(&len.to_le_bytes());
-        // The reader waits until the whole packet is present, so the two writes need no synchronisation.
+        // The reader waits until the whole packet is present, so header and bytes may be written separately.
         self.ring.push(&header);
         self.ring.push(bytes);
         Ok(())

@@ -55,9 +55,9 @@ pub struct SectionRow {
     /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
     #[serde(skip)]
     pub settled: bool,
-    /// Whether the section is open although driving on won't change it.
+    /// Whether the section is open although driving on does not change it.
     ///
-    /// The vehicle began or turned back there, so some heads have not been in the section.
+    /// In such a section some heads have not been, because the vehicle began or turned back there.
     pub not_inspected: bool,
     /// Reason for `cannot_say`. For a section with `not_inspected`, the reason is `NotInspected`, which the
     /// report omits.

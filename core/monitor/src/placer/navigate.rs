@@ -19,7 +19,7 @@ use headrace_sensor::reading::Reading;
 pub(super) enum Positioned {
     /// A sonar ping. The fix is for the ping's time of validity.
     Ping { event: usize, sensor: Entity, fix: Result<Fix, NoFix> },
-    /// An advice update at a multiple of the advice period. `before` is the index of the next event.
+    /// An advice update at a multiple of the advice period. `before` is the index of the first event after the update.
     Beat { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
 }
 
@@ -149,7 +149,7 @@ mod tests {
             (1.199, None),
             (1.2, Some(1.2)),
             (1.21, None),
-            // Time on the packets' clock goes back, then catches up.
+            // The time of the packets goes back, then catches up.
             (0.3, None),
             (1.39, None),
             (1.43, Some(1.4)),

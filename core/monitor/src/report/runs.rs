@@ -16,7 +16,7 @@ pub struct RunReport {
     pub id: u32,
     /// Main cause: the cause that applies to most sections of the stretch.
     pub cause: Cause,
-    /// All causes of the stretch's sections: the main cause first, then the others by frequency.
+    /// All causes of the stretch's sections: the main cause first, then the other causes by frequency.
     pub causes: Vec<Cause>,
     /// Figures for the causes that the text names. The figures for a cause come from a section with this cause.
     #[serde(skip)]
@@ -38,7 +38,7 @@ pub struct RunReport {
     pub hole_clock: String,
     /// Time at which the stretch was first flagged, seconds on the log's clock.
     pub raised_s: f64,
-    /// Time at which the stretch was cleared or merged into another one, seconds on the log's clock; `None` before.
+    /// Time at which the stretch was cleared or merged into another stretch, seconds on the log's clock; `None` before.
     pub cleared_s: Option<f64>,
     /// Number of the stretch into which this stretch was merged.
     pub merged_into: Option<u32>,
