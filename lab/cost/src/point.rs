@@ -116,7 +116,7 @@ pub struct Error {
 /// A measured setting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Method: the line in the chart that the marker belongs to.
+    /// Method of the setting. The chart draws the points of a method as one line.
     pub method: String,
     /// Name of the varied parameter.
     pub knob: String,

@@ -140,7 +140,7 @@ impl Maker {
     /// Finds a dive's tables in the cache; `None` if the log's digest is unknown or the dive is missing from the
     /// cache.
     ///
-    /// Waits for a free thread. The dive isn't counted.
+    /// Waits for a free thread. The dive isn't added to the counts of replayed or cached dives.
     ///
     /// Errors: a broken dive in the cache can't be removed.
     pub async fn kept(

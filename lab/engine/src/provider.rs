@@ -126,7 +126,7 @@ pub struct Asked {
 
 /// Replays the dives listed by its input plan, partition by partition.
 ///
-/// The node has an input instead of being a leaf, because a distributing engine can divide a list but knows nothing of
+/// The node gets its list of dives from an input plan. A distributing engine can divide a list, but knows nothing of
 /// replays.
 #[derive(Debug)]
 pub struct ReplayExec {
@@ -186,7 +186,7 @@ impl ExecutionPlan for ReplayExec {
         vec![&self.listed]
     }
 
-    /// The list of dives is already divided into the required partitions.
+    /// Returns false, because the list of dives is already divided into the required partitions.
     fn benefits_from_input_partitioning(&self) -> Vec<bool> {
         vec![false]
     }

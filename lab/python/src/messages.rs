@@ -50,7 +50,7 @@ impl Message {
 /// lock.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Messages {
-    /// A lock allows threads to share an iterator.
+    /// The lock allows several threads to share one iterator.
     reading: Mutex<Reading>,
 }
 

@@ -137,7 +137,7 @@ fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
 fn packing(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     let (half, packed) = (filled(PACKED_M / 2)?, filled(PACKED_M)?);
     let moved_m = packed.fidelity(0.0, 10.0).moved_m;
-    // The unpacked part is the same in both stores, so the difference is packed samples alone.
+    // Both stores have the same unpacked part, so their difference consists of packed samples alone.
     let [fewer, more] = [half.usage(), packed.usage()];
     let bytes = (more.bytes - fewer.bytes) as f64 / (more.kept - fewer.kept).max(1) as f64;
     let costs = in_turns(inputs.effort.rounds(), &[PACKED_M, OPEN_M], |metres| {

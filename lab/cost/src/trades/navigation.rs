@@ -41,8 +41,8 @@ const MOMENT_S: f64 = 0.1;
 const TIMED_S: f64 = 15.0;
 /// Difference between the errors of two settings below which the settings count as equal, m.
 const RESOLUTION_M: f64 = 5e-4;
-/// A beam width of more than a turn. With it, navigation uses no return, since consecutive returns of a head are too
-/// close to each other.
+/// Minimum angle between two used returns of a head, radians. No two returns differ by so much, so navigation uses only
+/// a head's first return.
 const NO_RETURNS_RAD: f64 = 1e9;
 
 /// A scene together with the chainage at which its dive starts.
@@ -153,22 +153,22 @@ fn places(inputs: &Inputs<'_>) -> Result<Vec<Place>, CostError> {
 const FOUR_HEADS: &str = "\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }";
 
-/// The field scene with VITA 2 and four heads.
+/// Returns the field scene with VITA 2 and four heads.
 ///
-/// The vehicle file's slack_sd_m = 0.02 is for a taut cable.
+/// The cable is nearly taut here, because the vehicle file's slack_sd_m = 0.02 is for a taut cable.
 fn four_heads(field: &str) -> String {
     let four = field.replace("vita1.toml", "vita2-4.toml").replace("\"sonar_0\"", FOUR_HEADS);
     four.replace(SLACK, "tether_slack = { reach_m = 0.03, period_s = 30 }")
 }
 
-/// The field scene with VITA 2 and four heads from a chainage on. Legs are given in metres and m/s.
+/// Returns the field scene with VITA 2 and four heads, started at chainage `from_m`. Legs are given in metres and m/s.
 ///
 /// Errors: the shipped scene isn't as expected.
 pub(super) fn field_of_four(from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     moved(&four_heads(file("vita1-field.toml")?), from_m, legs)
 }
 
-/// The field scene from another chainage on. Legs are given in metres and m/s.
+/// Returns the field scene, started at chainage `from_m`. Legs are given in metres and m/s.
 fn moved(text: &str, from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     const START: &str = "start_m = 5\n";
     const LEG: &str = "[[trajectory.legs]]\ndistance_m = 130\nspeed_mps = 0.16\n";

@@ -31,7 +31,7 @@ const DECIDES_M: f64 = 0.05;
 const RESOLUTION_M: f64 = 1e-4;
 /// Minimum number of seeds, since differences need a spread.
 const LEAST_SEEDS: u32 = 2;
-/// At most this many seconds of a dive are timed. The simulation advances in slices of a second.
+/// Maximum number of seconds of a dive that are timed. The simulation advances in slices of a second.
 const TIMED_S: u32 = 8;
 /// Number of seeds when the number of rays is varied. It is small, since a simulation with [`MANY_RAYS`] takes long.
 const RAYS_SEEDS: u32 = 2;

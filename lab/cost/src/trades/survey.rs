@@ -31,7 +31,7 @@ const SHIPPED_MODE: &str = "fast";
 const PLACES: [[f64; 2]; 5] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 0.0]];
 /// Speed at which the vehicle returns without inspecting, m/s.
 ///
-/// The value is the rounded speed of the demonstration's pilot when in a hurry.
+/// The demonstration's pilot drives at about this speed when in a hurry.
 const WAY_BACK_MPS: f64 = 0.3;
 /// Share of the tunnel that is assumed to be inspected a second time.
 const AGAIN_SHARE: f64 = 0.1;

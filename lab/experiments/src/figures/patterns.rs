@@ -67,7 +67,8 @@ pub(crate) struct Sectors {
     pub line_m: f64,
     /// Positions at which head 0 passes the line, m.
     pub at_line: Vec<f64>,
-    /// The two distances between passes on the line by the paper's formula, the shorter one first, m.
+    /// The two distances between passes on the line, m, by the formula of Jorge et al. 2021. The shorter one comes
+    /// first.
     pub alternating_m: [f64; 2],
     /// Arc length of the middle of head 0's sector, m.
     pub middle_m: f64,

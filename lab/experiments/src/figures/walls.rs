@@ -19,7 +19,8 @@ const START_M: f64 = 5.0;
 const CELLS: [u32; 2] = [40, 100];
 /// Number of lines along the wall on which passes are counted.
 const LINES: u32 = 360;
-/// A line on the wall counts as occluded by another head if its largest gap exceeds this multiple of the usual gap.
+/// Another head counts as occluding a line on the wall if the line's largest gap exceeds this multiple of the usual
+/// gap.
 const IN_SHADOW: f64 = 1.5;
 /// Share of cells whose distances lie within the colour scale.
 ///
@@ -78,7 +79,7 @@ pub(crate) struct Panel {
     pub distances_m: Vec<f64>,
     /// Mean distance of the cells from the surface, m.
     pub mean_m: f64,
-    /// The longest gap between passes along the tunnel, among lines with at least two passes.
+    /// The longest gap between passes along the tunnel, of all lines with at least two passes.
     pub widest: Option<Gap>,
     /// Arc lengths of the start and end of each strip of wall in which some gap between passes exceeds 1.5 times the
     /// usual one, T_x / s, m.

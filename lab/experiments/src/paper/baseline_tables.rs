@@ -1,4 +1,4 @@
-//! Tables 3 and 4: the printed baseline beside the recomputed one.
+//! Tables 3 and 4 of Jorge et al. 2021: the printed baseline (predictions) beside the recomputed one.
 
 use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;

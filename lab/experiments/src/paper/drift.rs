@@ -9,9 +9,9 @@ use headrace_sampling::section;
 use super::PaperError;
 use super::modes::Mode;
 
-/// Greatest offset of the vehicle from the centre, up, down and sideways, m (§8.1).
+/// Greatest offset of the vehicle from the centre, up, down and sideways, m (Jorge et al. 2021, §8.1).
 const DRIFT_M: f64 = 1.5;
-/// Greatest yaw relative to the tunnel's direction, degrees (§8.1).
+/// Greatest yaw relative to the tunnel's direction, degrees (Jorge et al. 2021, §8.1).
 const YAW_DEG: f64 = 15.0;
 /// Number of computed ranges per turn, a hundredth of a degree apart.
 ///
@@ -19,7 +19,7 @@ const YAW_DEG: f64 = 15.0;
 /// length.
 const SOUNDINGS: u32 = 36_000;
 
-/// Mounting positions of the heads on the vehicle (§8).
+/// Mounting positions of the heads on the vehicle (Jorge et al. 2021, §8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Rig {
     /// One head, 0.15 m below the vehicle's middle.

@@ -34,7 +34,7 @@ pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }
 
-/// Values of an input, such as the perimeter or the speed, that agree with the printed numbers of all wanted rows.
+/// Interval of an input, such as the perimeter or the speed, that agrees with the printed numbers of all `wanted` rows.
 fn of_rows(
     rows: impl IntoIterator<Item = Line>,
     wanted: impl Fn(&str, u8) -> bool,

@@ -39,8 +39,8 @@ fn rises(ring: [bool; 8]) -> usize {
 
 /// Prunes and thins the image until neither step changes it, so that only single lines remain.
 ///
-/// One pass may not suffice. The end of a spur may be two pixels, neither of which is removed while the other is
-/// there. A removed spur may leave a filled corner.
+/// One pass may not be enough. Where a spur ends in two pixels, neither is removed while the other is there. A removed
+/// spur may leave a filled corner.
 pub(super) fn clean(image: &mut Image) {
     loop {
         let before = image.pixels().len();

@@ -30,7 +30,7 @@ impl Deviation {
         let direction = [place[1] - centre[0], place[2] - centre[1]];
         let length_m = math::hypot(direction[0], direction[1]);
         let hit = profile.cast_from_inside(centre, direction);
-        // The range is in units of the direction's length.
+        // The profile returns the range in units of the direction's length.
         let (arc_m, wall_m) = hit.map_or((0.0, 0.0), |hit| (hit.arc_m, hit.range_m * length_m));
         Self { x_m: place[0], arc_m, deviation_m: length_m - wall_m }
     }

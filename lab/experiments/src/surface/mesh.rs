@@ -106,7 +106,7 @@ impl MeshIndex<'_> {
         let last = centre.iter().zip(&self.bins).map(|(c, n)| (n - 1 - c).max(*c)).max().unwrap_or(0);
         let mut best = f64::INFINITY;
         for shell in first..=last {
-            // All bins from this shell on are at least this far from the position, so none has a nearer triangle.
+            // All bins from this shell on are at least this far from the position, so no nearer triangle is left.
             if best <= (shell - 1) as f64 * self.bin_m {
                 break;
             }

@@ -46,7 +46,7 @@ pub(crate) struct Settings {
     pub margin_cells: usize,
     /// Relative residual at which the solver stops.
     pub tolerance: f64,
-    /// Maximum number of steps of the solver.
+    /// Maximum number of iterations of the solver.
     pub steps_max: usize,
 }
 
@@ -198,7 +198,7 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
     }
     let cell_m = settings.scale * largest / f64::from(1_u32 << settings.depth);
     let margin = settings.margin_cells as f64;
-    // The box consists of whole cells, and the samples are centred in it.
+    // The box consists of whole cells, with the samples in its middle.
     let cells = extents.map(|extent| (extent / cell_m).ceil() + 2.0 * margin);
     let nodes: f64 = cells.iter().map(|n| n + 2.0).product();
     if nodes > NODES_MAX as f64 {
