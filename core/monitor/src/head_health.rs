@@ -37,9 +37,9 @@ pub struct HeadHealth {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct SameRange {
     range_m: f64,
-    /// Angle that the head turned during these returns, radians.
+    /// Angle that the head turned during the returns with the same range, radians.
     turned_rad: f64,
-    /// Smallest and largest deviation from the design wall during these returns, m.
+    /// Smallest and largest deviation from the design wall during the returns with the same range, m.
     off_m: [f64; 2],
 }
 

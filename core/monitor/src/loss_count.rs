@@ -71,8 +71,8 @@ pub struct LossCount {
     heard_before: Angles,
     /// For each angle: whether the ping just before the last ping at that angle was lost.
     followed_lost: Angles,
-    /// Three counts: all pings at wall within range; the pings that count for losses by chance; and those of the latter
-    /// that followed a lost ping.
+    /// Three counts: all pings at wall within range; the pings that count for losses by chance; and, among the second
+    /// count, the pings that followed a lost ping.
     any: Count,
     by_chance: Count,
     after_lost: Count,

@@ -107,8 +107,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    // A perpendicular beam is assumed for the step along the wall. Whether the mode is also fine enough in corners is
-    // tested later, with the section's samples.
+    // A perpendicular beam is assumed for the step along the wall. The section's samples later show whether the mode is
+    // also fine enough in corners.
     let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),

@@ -96,7 +96,7 @@ impl<R: ByteProducer> Port<R> {
         Ok(())
     }
 
-    /// Whether a packet of `len` bytes would fit into the ring now.
+    /// Whether a packet of `len` bytes fits into the ring now.
     pub fn has_room(&self, len: usize) -> bool {
         self.ring.vacant() >= HEADER_BYTES + len
     }

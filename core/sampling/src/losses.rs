@@ -21,7 +21,7 @@ const STRETCH_M: f64 = 0.25;
 const MAY_FAIL: f64 = 0.05;
 /// Maximum number of passes required over a place.
 ///
-/// More passes would take too long in practice. Instead, the heads must lose fewer returns.
+/// More passes take too long in practice. Instead, the heads must lose fewer returns.
 pub const MOST_PASSES: f64 = 10.0;
 /// A hole that chance makes with a lower probability than this does not count as caused by chance.
 const HARDLY: f64 = 1e-3;

@@ -18,10 +18,10 @@ const LEFT_SHARE: f64 = 0.6;
 const MOST_SHARE: f64 = 0.2;
 /// Share of the travel time from the foremost to the rearmost head that counts towards the time between passes.
 ///
-/// The share is below 1, because only some neighbouring passes are by these two heads, and holes between their passes
-/// grow by less than the heads' separation. With this share, 93 % of the errors of a hole's size D are within two
-/// standard deviations, in the dives of `tests/tests/navigation/fusion.rs` with four heads. In similar dives, these are
-/// 80 % of the errors with a share of 0, and 99 % with a share of 1.
+/// The share is below 1 for two reasons. Only some neighbouring passes are by the foremost and the rearmost head, and
+/// holes between their passes grow by less than the heads' separation. With this share, 93 % of the errors of a hole's
+/// size D are within two standard deviations, in the dives of `tests/tests/navigation/fusion.rs` with four heads. In
+/// similar dives, it is 80 % of the errors with a share of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as at rest, m/s.
 const SLOW_MPS: f64 = 0.01;
@@ -240,7 +240,7 @@ mod tests {
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
-        // If the distance between samples of one turn nearly equals the target, the margin reduces the allowed
+        // Here the distance between samples of one turn nearly equals the target. The margin then reduces the allowed
         // distance between passes to three fifths of the distance without margin.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);

@@ -378,7 +378,7 @@ impl Passes {
 
     /// Creates passes of continuously rotating heads, evenly phased in order of their numbers.
     ///
-    /// Heads with equal turn periods have these passes after a start by a schedule for the present speed. Heads with
+    /// Heads with equal turn periods pass like this if a schedule has started them for the present speed. Heads with
     /// unequal turn periods run out of step, and have no reliable phases. `turn_s` returns the turn period of a head,
     /// seconds.
     /// Errors: no head.

@@ -42,7 +42,7 @@ pub struct Strip {
 }
 
 impl Strip {
-    /// Whether this strip and another one differ only in their places on the wall.
+    /// Whether this strip and the strip `other` differ only in their places on the wall.
     fn is_like(&self, other: &Self) -> bool {
         let same_wait = (self.wait - other.wait).abs() <= 0.0;
         self.seen_by == other.seen_by && self.hidden == other.hidden && same_wait

@@ -385,8 +385,9 @@ mod tests {
         assert_eq!(quantile(&[], 0.5), None);
     }
 
-    /// Ranks of the sign test at 5 %, from tables (Conover, "Practical nonparametric statistics", A3): the first and
-    /// the last of 6 to 8 values, the second of 9 to 11, the third of 12 to 14, the sixth of 20.
+    /// Ranks of the sign test at 5 %. For 6 to 8 values, they are the first and the last; for 9 to 11 values, the
+    /// second; for 12 to 14, the third; for 20, the sixth. Source: Conover, "Practical nonparametric statistics", table
+    /// A3.
     #[test]
     fn median_intervals_match_published_tables() {
         for (count, rank) in [(1, 1), (5, 1), (6, 1), (8, 1), (9, 2), (11, 2), (12, 3), (14, 3), (20, 6)] {

@@ -117,8 +117,8 @@ fn omitting_an_effect_changes_the_result() {
     );
 }
 
-/// At a confidence of k standard deviations (sigma), the plan aims at a smaller hole, T - k (sigma - 2 mm): the plan
-/// ignores the first 2 mm of sigma.
+/// At a confidence of k standard deviations (sigma), the plan aims at a smaller hole: T - k (sigma - 2 mm). It ignores
+/// the first 2 mm of sigma.
 #[test]
 fn survey_hours_at_confidence_k_equal_the_hours_for_a_smaller_target() {
     let trade = measured(sureness::measure);

@@ -328,7 +328,8 @@ impl Campaign {
         register_listed(session, name, rows.schema(), std::iter::once(path))
     }
 
-    /// The program version with the most dives in the cache for these parameters, apart from this version.
+    /// The program version with the most dives in the cache for the campaign's parameters, apart from this program's
+    /// version.
     fn other_version(&self) -> Option<String> {
         let versions = std::fs::read_dir(self.maker.cache().folder()).ok()?.filter_map(Result::ok);
         let counted = versions.filter_map(|entry| {

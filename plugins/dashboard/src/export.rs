@@ -1,4 +1,4 @@
-//! Exports a dive as one file: the page together with all data that a server would send.
+//! Exports a dive as one file: the page together with all data that a server sends during a dive.
 
 use std::io::{self, Write as _};
 use std::thread::JoinHandle;

@@ -117,7 +117,7 @@ pub struct RateJson {
 pub struct RecordingJson {
     /// Whether the dive is recorded.
     pub on: bool,
-    /// Whether data is being lost, or would be lost in a power cut.
+    /// Whether data is being lost now, or will be lost if the power fails.
     pub fails: bool,
     /// Text about the recording, the same on all screens; `None` if recording works.
     pub words: Option<String>,

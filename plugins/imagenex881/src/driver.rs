@@ -306,8 +306,8 @@ impl Driver for HeadDriver {
 
 /// Time limit for the head's answer to a command.
 ///
-/// The timeout is twice the sum of three durations: the two-way travel time at the range setting, the transmission of
-/// the command and the longest return on a serial line, and the processing allowance.
+/// The timeout is twice the sum of three durations. These are the two-way travel time at the range setting, the
+/// transmission of the command and of the longest return on a serial line, and the processing allowance.
 fn answer_time(command: &Command) -> DurNs {
     let sound_s = 2.0 * f64::from(command.range_m) / SLOWEST_SOUND_MPS;
     let line_s = (COMMAND_BYTES + MAX_RETURN_BYTES) as f64 * 10.0 / LINE_BAUD;

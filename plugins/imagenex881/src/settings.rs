@@ -48,7 +48,7 @@ const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m:
 pub struct Settings {
     /// Command that requests a ping in mid-turn.
     pub command: Command,
-    /// Step in counts of 0.3 degrees, one of those supported by the command.
+    /// Step in counts of 0.3 degrees. It is one of the steps that the command supports.
     pub step_counts: u8,
     /// Time between two successive pings.
     pub ping_period: DurNs,

@@ -14,7 +14,7 @@ use mavlink::dialects::ardupilotmega::{
     ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
 };
 
-/// Least and greatest distance of an emulated distance sensor, cm: about those of a Ping1D.
+/// Least and greatest distance of an emulated distance sensor, cm: about the limits of a Ping1D.
 const LEAST_CM: u16 = 30;
 const MOST_CM: u16 = 5000;
 /// Qualities of distances with and without an echo, per cent.

@@ -121,7 +121,7 @@ impl PingDriver {
         }
     }
 
-    /// Handles a timeout. Settings are sent again, since a device that missed a setting would measure differently.
+    /// Handles a timeout. Settings are sent again, because a device that missed a setting measures differently.
     fn give_up(&mut self, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
         self.asked = None;
         let Some((bytes, tries)) = self.again.take().filter(|(_, tries)| *tries > 0) else { return };

@@ -79,7 +79,7 @@ struct Seen {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     from_zero: bool,
-    /// Time of the first of these rejected reports.
+    /// Time of the first of the rejected reports that agree.
     since: MonoNs,
     last: Seen,
     agreeing: u32,

@@ -1,4 +1,4 @@
-//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, as the port threads would do.
+//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, like port threads.
 
 use std::time::{Duration, Instant};
 
@@ -196,7 +196,7 @@ impl Driver {
         sent
     }
 
-    /// Sets the end of the previous tick to `until`, after both the feed and the loop have jumped there.
+    /// Sets the end of the previous tick to `until`, after the feed and the loop have jumped to this time.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }

@@ -48,7 +48,7 @@ pub enum EffectInfluenceError {
 pub struct LeftOut {
     /// Names of the effects that are left out of the simulation.
     pub effects: Vec<&'static str>,
-    /// Cost of these effects, ns of processor time per sonar return.
+    /// Cost of the effects that are left out, ns of processor time per sonar return.
     pub price_ns: Mean,
     /// Mean change of the hole diameter D over the sections if the effects are left out, m.
     pub hole_m: Mean,
@@ -76,8 +76,8 @@ pub struct EffectInfluence {
 }
 
 impl LeftOut {
-    /// Whether leaving out these effects changes the hole diameter D by at most [`HOLE_LIMIT_M`], and the passed share
-    /// by at most [`PASSED_LIMIT`].
+    /// Whether the changes are negligible: at most [`HOLE_LIMIT_M`] for the hole diameter D, and at most
+    /// [`PASSED_LIMIT`] for the passed share.
     ///
     /// The whole confidence intervals must be within the limits.
     pub fn is_free(&self) -> bool {
@@ -248,7 +248,7 @@ fn total_price_ns(scene: &Scene) -> Result<Mean, EffectInfluenceError> {
     Ok(Mean::of(&rounds?))
 }
 
-/// Returns the cost that these effects add, ns of processor time per sonar return.
+/// Returns the cost that `effects` add, ns of processor time per sonar return.
 ///
 /// Errors: see [`EffectInfluenceError`].
 fn added_price_ns(scene: &mut Scene, effects: &[&str]) -> Result<Mean, EffectInfluenceError> {

@@ -169,7 +169,7 @@ fn allowance_bytes<'a>(open: impl Iterator<Item = &'a RecorderPort>, is_of_ports
 fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &mut Vec<u16>) {
     order.clear();
     for (source, packet) in inbox.iter() {
-        // The caller has checked that all of these entries fit.
+        // The caller has checked that all entries of this tick fit.
         if port.raw(source.0, packet.received, packet.received, packet.bytes).is_ok() {
             order.push(source.0);
         }

@@ -77,7 +77,7 @@ pub struct Report {
     pub position_gaps: Vec<PositionGapReport>,
     /// Stretches of wall off the design profile, in the order of chainage.
     pub wall_stretches: Vec<WallStretchReport>,
-    /// Undeclared openings that would explain missed stretches, in the order of the stretches' numbers.
+    /// Undeclared openings that explain missed stretches, in the order of the stretches' numbers.
     pub suggested_openings: Vec<SuggestedOpeningReport>,
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,

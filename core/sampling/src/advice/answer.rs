@@ -122,7 +122,7 @@ impl Remedy {
 /// Alternative to the present mode: the largest speed with all heads in another mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
-    /// The mode to which all heads would be set.
+    /// The mode in which all heads are assumed to turn.
     pub mode: ModeName,
     /// The largest speed that meets the target with the heads started in phase, m/s.
     ///

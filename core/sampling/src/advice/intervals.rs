@@ -2,9 +2,9 @@
 //!
 //! Heads that are apart along the hull are in phase only at some speeds, so the target may be met in several intervals.
 //!
-//! The advised speed depends on the heads' measured motion and the vehicle's pose, not on the present speed. The
-//! advised speed is the upper end of the highest interval. If that interval vanishes while heads run out of phase, the
-//! next interval may be far lower, and the advice jumps. [`EASE`] provides hysteresis in both directions.
+//! The advised speed depends on the heads' measured motion and the vehicle's pose, not on the present speed. It is the
+//! upper end of the highest interval. If that interval vanishes while heads run out of phase, the next interval may be
+//! far lower, and the advice jumps. [`EASE`] provides hysteresis against jumps up and down.
 
 use super::search::{self, SPEED_MARGIN};
 use crate::margin::RemainingTarget;
@@ -149,7 +149,7 @@ impl Driving<'_> {
     /// Zero if all lower speeds meet the target.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
         const STEP: f64 = 0.99;
-        /// The search stops at this share of the upper speed, because no pilot would go more slowly.
+        /// The search stops at this share of the upper speed, because no pilot goes more slowly.
         const SLOWEST: f64 = 0.2;
         if !self.phasing.fits_some_speeds() {
             return 0.0;

@@ -137,8 +137,8 @@ mod tests {
                 let told_m = staggered_m(along_m, across_m, uneven, 0.0);
                 let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
                 assert!(widest_m <= told_m + 1e-9, "{what}");
-                // If the circle's centre is not between the rows, `told_m` is only an upper bound, because the samples
-                // of the other row also limit a circle that is centred on one row.
+                // If the circle's centre is not between the rows, `told_m` is only an upper bound. The circle is then
+                // centred on one row, and the samples of the other row limit it as well.
                 let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
                 assert!(!is_between || widest_m > told_m - 0.005, "{what}");
                 assert!((staggered_m(along_m, across_m, 0.0, uneven * along_m) - told_m).abs() < 1e-12);

@@ -1,5 +1,5 @@
-//! Cost of finer settings in the live loop: the rays that the advice casts in a ring around each head, the length of
-//! a tick, and the vertices of a surveyed profile.
+//! Cost of finer settings in the live loop. The settings are the number of rays that the advice casts around each head,
+//! the length of a tick, and the number of vertices of a surveyed profile.
 
 use headrace_coverage::Verdict;
 use std::fmt::Write as _;

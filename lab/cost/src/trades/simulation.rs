@@ -299,7 +299,7 @@ fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepar
     Ok((prepared, references.get(1).map_or(f64::NAN, Differences::change_m)))
 }
 
-/// Differences of a changed scene's results from those of the original scene, one value per seed.
+/// Differences between the results of a changed scene and of the original scene, one value per seed.
 #[derive(Default)]
 struct Differences {
     hole_m: Vec<f64>,

@@ -81,8 +81,8 @@ pub(crate) struct Panel {
     pub mean_m: f64,
     /// The longest gap between passes along the tunnel, of all lines with at least two passes.
     pub widest: Option<Gap>,
-    /// Arc lengths of the start and end of each strip of wall in which some gap between passes exceeds 1.5 times the
-    /// usual one, T_x / s, m.
+    /// Arc lengths, m, of the start and end of each strip of wall with wide gaps. A gap between passes is wide if it
+    /// exceeds 1.5 times the usual gap, T_x / s.
     pub wide_m: Vec<[f64; 2]>,
     /// Arc lengths of the start and end of each strip of wall without passes, m.
     pub unseen_m: Vec<[f64; 2]>,

@@ -31,8 +31,8 @@ const BINS_MAX: f64 = 4e6;
 impl MeshIndex<'_> {
     /// Builds the index with bins of side `bin_m`, m. The side should be about that of a triangle.
     ///
-    /// The side is enlarged if there would be too many bins. Returns `None` for a mesh without triangles, with an
-    /// invalid vertex index, or with a vertex that isn't finite.
+    /// The side is enlarged if it gives too many bins. Returns `None` for a mesh without triangles, with an invalid
+    /// vertex index, or with a vertex that isn't finite.
     pub(crate) fn new(mesh: &Mesh, bin_m: f64) -> Option<MeshIndex<'_>> {
         let known = |t: &[u32; 3]| t.iter().all(|k| (*k as usize) < mesh.vertices.len());
         let finite = |p: &Xyz| p.iter().all(|c| c.is_finite());

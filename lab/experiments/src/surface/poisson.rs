@@ -5,9 +5,9 @@
 //! of chi^2 at the samples. The field jumps from negative to positive at the wall. The surface is the level set at the
 //! mean of the field's values at the samples.
 //!
-//! The implementation differs from the paper's tool in one respect: cells of the finest size fill a box around the
-//! samples, while the tool's octree has coarser cells away from samples. A tunnel is so slim that the whole box is
-//! small.
+//! The implementation differs from the tool used by Jorge et al. 2021 in one respect. Here, cells of the finest size
+//! fill a box around the samples; the tool's octree has coarser cells away from samples. A tunnel is so slim that the
+//! whole box is small.
 //!
 //! Source: Kazhdan, Hoppe, "Screened Poisson surface reconstruction", 2013; the paper's §8.2.
 
@@ -92,12 +92,12 @@ pub enum PoissonError {
         /// Allowed values.
         wanted: &'static str,
     },
-    /// The grid would be too large.
+    /// The grid needs too many nodes.
     #[error(
         "the grid would have {nodes:.0} nodes; at most {NODES_MAX} are allowed; a smaller depth needs fewer"
     )]
     TooLarge {
-        /// Number of grid nodes that would be needed.
+        /// Number of nodes that the grid needs.
         nodes: f64,
     },
     /// The solver hasn't converged within its step limit.

@@ -103,8 +103,8 @@ impl Tls {
 /// Errors: system errors.
 pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
-    // The option SO_REUSEADDR is set on Unix only, as in the standard library. On other systems the option
-    // would let two programs share a port.
+    // The option SO_REUSEADDR is set on Unix only, as in the standard library. On other systems it lets two programs
+    // share a port.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
     // Accepted connections inherit the size of the send buffer and the limit of unsent bytes.
@@ -124,7 +124,7 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
     loop {
         match listener.accept().await {
             Ok((tcp, from)) => {
-                // Without TCP_NODELAY, TCP would delay small messages.
+                // Without TCP_NODELAY, TCP delays small messages.
                 if let Err(error) = tcp.set_nodelay(true) {
                     tracing::debug!(%error, "a connection of the page delays small messages");
                 }

@@ -40,7 +40,7 @@ pub(super) enum Admission {
     Known,
     /// The definition contradicts a known channel.
     Conflict,
-    /// The channel would exceed a limit on the log's content.
+    /// The channel exceeds a limit on the log's content.
     Beyond(Many),
 }
 

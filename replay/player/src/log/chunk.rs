@@ -46,8 +46,8 @@ pub(super) fn unpack<R: Read + Seek>(
         // Adding a decompressor fails only if the decompressor has no name, and this one has a name.
         tracing::error!(%error, "chunks packed by zstd can't be read");
     }
-    // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum would then
-    // cover data that is missing.
+    // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum then cover
+    // data that is missing.
     let head = chunk_head(place);
     reader.insert(head.len()).copy_from_slice(&head);
     reader.notify_read(head.len());

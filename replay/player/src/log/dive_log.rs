@@ -301,7 +301,7 @@ impl<R: Read + Seek> DiveLog<R> {
         }
         (self.earlier, self.late, self.delivered) = (place.earlier.clone(), place.late, place.delivered);
         self.reader.go_to(&place.place)?;
-        // Which sources are known depends on the position, so the sources are numbered anew.
+        // The known sources depend on the position, so they are numbered anew.
         self.number_sources();
         Ok(())
     }

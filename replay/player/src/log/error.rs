@@ -102,11 +102,11 @@ pub enum LogError {
     /// Two files have the same part number.
     #[error("{} and {} are both part {number} of the recording; name one of them", one.display(), other.display())]
     PartTwice {
-        /// Part number that both files have.
+        /// Part number that the two files have.
         number: u32,
         /// Path of one of the files.
         one: PathBuf,
-        /// Path of the other file.
+        /// Path of the file that has the same part number as `one`.
         other: PathBuf,
     },
     /// The topic of a result doesn't begin with the result prefix.

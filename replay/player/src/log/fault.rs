@@ -81,7 +81,7 @@ pub enum RecordingEvent {
 }
 
 impl RecordingEvent {
-    /// Whether new data is being lost, or would be lost in a power cut.
+    /// Whether new data is being lost now, or will be lost if the power fails.
     pub fn fails(&self) -> bool {
         matches!(self, Self::Failed { .. } | Self::Behind | Self::Late { .. })
     }
@@ -130,7 +130,7 @@ impl RecordingHealth {
         }
     }
 
-    /// Whether new data is being lost, or would be lost in a power cut.
+    /// Whether new data is being lost now, or will be lost if the power fails.
     pub fn fails(&self) -> bool {
         self.has_failed || self.is_behind || self.is_late
     }

@@ -69,9 +69,9 @@ pub const TICK_HEAD_BYTES: usize = 20;
 
 /// One tick of the loop, as stored in a `/loop/tick` message.
 ///
-/// Layout, little-endian: u64 index of the tick, u64 time in ns, u32 count, then as many u16. These are the source
-/// numbers of the packets that the tick consumed, one per packet, in the order of consumption. The packets of one
-/// source are consumed in the order of their sequence numbers, so the list identifies every packet.
+/// Layout, little-endian: u64 index of the tick, u64 time in ns, u32 count, then as many u16. The u16 are the source
+/// numbers of the packets that the tick consumed, in the order of consumption. The packets of one source are consumed
+/// in the order of their sequence numbers, so the list identifies every packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tick<'a> {
     /// Number of the tick in the dive, from 0.
@@ -188,7 +188,7 @@ pub(crate) fn stream_of(topic: &str) -> Option<usize> {
 
 /// Decodes a message of a result stream: index of the tick, number of the first record, and words.
 ///
-/// The words are those of [`headrace_monitor::result_stream`]. All numbers are u64, little-endian.
+/// [`headrace_monitor::result_stream`] defines the words. All numbers are u64, little-endian.
 pub(crate) fn read_results(message: &[u8]) -> Option<(u64, u64, Vec<u64>)> {
     let (words, rest) = message.as_chunks::<8>();
     let mut words = words.iter().map(|word| u64::from_le_bytes(*word));

@@ -1,7 +1,7 @@
 //! Finds record boundaries in a file that may be damaged.
 //!
-//! A record is an opcode, a u64 length and that many bytes. It has no start marker, so a wrong length would lose
-//! everything after it.
+//! A record is an opcode, a u64 length and that many bytes. It has no start marker, so a wrong length hides the start
+//! of everything after it.
 //!
 //! Three checks detect a wrong length. Most kinds of record imply their length twice, by the record length and by the
 //! lengths of fields. The length must leave room for the next record in the file. Another record must begin where it
@@ -300,8 +300,8 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
 
 /// Identifies a chunk, which implies its length twice.
 ///
-/// If the two lengths differ, the right length is the one after which another record begins. If both are the largest
-/// u64, the writer never closed the chunk.
+/// If the two lengths differ, another record begins after the right one. If both lengths are the largest u64, the
+/// writer never closed the chunk.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,

@@ -33,12 +33,12 @@ pub enum LossKind {
         /// Maximum length of a chunk or attachment, bytes.
         limit: u64,
     },
-    /// Chunks that would unpack to many times the length of the log. None of their messages is delivered.
+    /// Chunks that unpack to many times the length of the log. None of their messages is delivered.
     Swells {
         /// Maximum unpacked length, as a multiple of the log's length up to the chunk.
         limit: u64,
     },
-    /// A chunk that would take more memory to unpack than allowed.
+    /// A chunk that needs more memory to unpack than allowed.
     Window {
         /// Maximum memory for unpacking a chunk, bytes.
         limit: u64,
@@ -54,7 +54,7 @@ pub enum LossKind {
     Stamped {
         /// Number of messages not delivered because of their timestamps.
         messages: u64,
-        /// Earliest timestamp of these messages, ns.
+        /// Earliest timestamp of the messages that were not delivered, ns.
         first: u64,
     },
     /// An attachment that fails its checksum, or that the log lists but doesn't have.
@@ -110,7 +110,7 @@ pub enum LossKind {
         /// Number of the last missing part.
         last: Option<u32>,
     },
-    /// A part whose totals contradict those in the next part's header.
+    /// A part whose totals contradict the totals in the next part's header.
     PartUnlike {
         /// Number of the part with contradicting totals.
         part: u32,

@@ -141,7 +141,7 @@ fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
         // The log's writer stated this loss. A writer numbers only messages that it writes, so the loss leaves no
         // break.
         LossKind::Stated(_) => false,
-        // A loss of these kinds may affect several positions in the file, but states only one range.
+        // A loss of this kind may affect several positions in the file, but states only one range.
         LossKind::Swells { .. } | LossKind::Beyond { .. } | LossKind::Unreadable(_) => true,
         _ => known.offset <= to && from <= known.offset.saturating_add(known.bytes),
     }

@@ -37,8 +37,8 @@ pub(super) struct State {
     pub(super) failing: AtomicBool,
     /// Ticks that the loop skipped because the recorder was too far behind.
     pub(super) gaps: ArrayQueue<Gap>,
-    /// Log time of the latest tick that the loop recorded or skipped (`handed_ns`), and log time up to which all data
-    /// is synced or given up (`certain_ns`), ns. Both are 0 before the first tick.
+    /// `handed_ns` is the log time of the latest tick that the loop recorded or skipped, ns. `certain_ns` is the log
+    /// time up to which all data is synced or given up, ns. Both are 0 before the first tick.
     pub(super) handed_ns: AtomicU64,
     pub(super) certain_ns: AtomicU64,
     /// Number of the recorder's steps so far, which distinguishes a stuck recorder from a slow one.

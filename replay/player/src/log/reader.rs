@@ -463,7 +463,7 @@ impl<R: Read + Seek> LogReader<R> {
         }
         if self.losses.is_full() {
             // If the list is full, this loss only extends the last one. The times of the last loss are determined at
-            // the end, because searching for times again and again would be slow.
+            // the end, because searching for them again and again is slow.
             let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
             self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
             return;

@@ -45,7 +45,7 @@ struct OpenPart {
     fresh: bool,
     /// Number of synced raw messages in this part.
     raw_messages: u64,
-    /// Number of synced messages in this part, and total length of these messages, bytes.
+    /// Number of synced messages in this part, and the total length of the synced messages, bytes.
     certain: (u64, u64),
     /// Log time of the last message before this part.
     before: Option<MonoNs>,

@@ -534,8 +534,8 @@ impl Scan {
 
 /// Sets the times of losses from the pieces of the log around them.
 ///
-/// If `read` is true, all pieces have been read, and their times are those of their messages. Before that, the times
-/// come from chunk headers, which may be wrong.
+/// If `read` is true, all pieces have been read, and their times are the times of their messages. Before reading, the
+/// times come from chunk headers, which may be wrong.
 pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     for loss in losses.list_mut().iter_mut().filter(|loss| !matches!(loss.kind, LossKind::Stated(_))) {
         let next = spans.partition_point(|span| span.at < loss.offset);

@@ -4,7 +4,7 @@
 //! type, the media type, and the recording as the browser made it. The message has its own chunk, so damage to it
 //! affects nothing else.
 //!
-//! A replay doesn't read these messages, because the operator's commands contain everything that the loop needs.
+//! A replay doesn't read voice messages, because the operator's commands contain everything that the loop needs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -55,7 +55,7 @@ impl VoicePort {
     /// The recording is as safe as sensor data. It is written within a second, and written again to another part if
     /// the medium fails.
     ///
-    /// Errors: see [`NotKept`]. After an error, the recording is not in the log.
+    /// Errors: see [`NotKept`]; the recording was not accepted.
     pub fn keep(&self, voice: &Voice) -> Result<(), NotKept> {
         if self.state.failing.load(Ordering::Acquire) || self.state.voices_end.load(Ordering::SeqCst) {
             return Err(NotKept::Failing);

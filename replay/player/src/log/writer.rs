@@ -102,7 +102,7 @@ pub struct ResultChannel {
 pub struct Summary {
     /// Number of messages of all channels in the log.
     pub messages: u64,
-    /// Length of these messages, uncompressed and without framing, bytes.
+    /// Total length of the messages, uncompressed and without framing, bytes.
     pub message_bytes: u64,
     /// Number of chunks, including the one with the channel definitions.
     pub chunks: u32,
@@ -159,8 +159,7 @@ struct Channel {
 /// Chunks are compressed by zstd at its lowest level. A dive produces some hundred kB/s, which even a small computer
 /// compresses a thousand times faster. A smaller file is therefore worth more than the speed of lz4.
 pub struct LogWriter<W: Write> {
-    /// Declared before `writer`, so that it is dropped first. Otherwise the `mcap` crate's writer would end the log on
-    /// drop.
+    /// Declared before `writer`, so that it is dropped first. Otherwise the `mcap` crate's writer ends the log on drop.
     medium: Closing,
     writer: mcap::Writer<NoSeek<Counted<W>>>,
     raw: Vec<Channel>,

@@ -22,8 +22,8 @@ const FIELDS: [Field; 4] =
 ///
 /// The lower half of each float is then zero and compresses well.
 const PARTS_PER_M: f64 = 256.0;
-/// Maximum distance of a point from the cloud's origin, m. Farther points would have fewer zero bits, and are
-/// dropped.
+/// Maximum distance of a point from the cloud's origin, m. Farther points are dropped, because they have fewer zero
+/// bits.
 const FARTHEST_M: f64 = 128.0;
 
 /// Points of the current point cloud.

@@ -110,7 +110,7 @@ fn unclosed_chunk_delivers_its_messages() {
             let header = MessageHeader { channel_id, sequence: 0, log_time: n, publish_time: n };
             writer.write_to_known_channel(&header, &(n * n * 0x9E37_79B9).to_le_bytes()).unwrap();
         }
-        // The writer must not be dropped, because that would finish the file.
+        // The writer must not be dropped, because dropping it finishes the file.
         std::mem::forget(writer);
         let mut reader = open(file.get_ref());
         let seen = read_all(&mut reader);
