@@ -84,7 +84,7 @@ impl Obstacle {
 
     /// Whether a point is inside a box.
     ///
-    /// Always false for cylinders, since these represent heads, and heads may share a position.
+    /// Always false for cylinders, because these represent heads, and heads may share a position.
     pub fn holds(&self, place: Vec3<Body>) -> bool {
         match self {
             Self::Box { least, most } => {

@@ -85,7 +85,7 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let rank = share.clamp(0.0, 1.0) * (sorted.len().checked_sub(1)? as f64);
     let below = usize::try_from(math::floor_to_i64(rank)).ok()?;
     let (from, part) = (*sorted.get(below)?, rank - below as f64);
-    // Equal or infinite neighbours are returned without interpolation, since infinity minus infinity is NaN.
+    // Equal or infinite neighbours are returned without interpolation, because infinity minus infinity is NaN.
     match sorted.get(below + 1) {
         Some(to) if part > 0.0 && *to > from => Some(from + part * (to - from)),
         _ => Some(from),

@@ -104,7 +104,7 @@ pub async fn execute(
 /// Errors: only those of the engine itself. If the scheduler is missing, the first query returns an error.
 pub fn session(scheduler: &str, maker: Arc<Maker>) -> Result<SessionContext, Error> {
     let config = SessionConfig::new_with_ballista()
-        // Each task has one dive, since a task with several dives ends only when its longest replay ends.
+        // Each task has one dive, because a task with several dives ends only when its longest replay ends.
         .set_usize(BALLISTA_SCHEDULER_MAX_PARTITIONS_PER_TASK, 1)
         .with_ballista_grpc_client_max_message_size(MESSAGE_BYTES as usize)
         .with_ballista_logical_extension_codec(Arc::new(Codec::new(maker)));

@@ -62,7 +62,7 @@ pub enum Made {
         /// Folder of the Parquet files.
         folder: PathBuf,
     },
-    /// There are no tables, since the log can't be read or replayed. The row of `dives` gives the reason.
+    /// There are no tables, because the log can't be read or replayed. The row of `dives` gives the reason.
     Unread(Arc<Tables>),
 }
 

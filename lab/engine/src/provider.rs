@@ -118,7 +118,7 @@ impl TableProvider for ReplayTable {
 /// The request that applies to each dive of an input plan. It can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Asked {
-    /// Table and parameters. The list of dives is empty, since the dives come from the input plan.
+    /// Table and parameters. The list of dives is empty, because the dives come from the input plan.
     pub replayed: Replayed,
     /// The requested columns of the table; `None` means all columns.
     pub projection: Option<Vec<usize>>,

@@ -139,7 +139,7 @@ impl Log {
         Ok(Profile::of(vehicle.tunnel.profile))
     }
 
-    /// Sources of the log, in order of their numbers. Reads the log to its end, once, since a log may define channels
+    /// Sources of the log, in order of their numbers. Reads the log to its end, once, because a log may define channels
     /// late.
     ///
     /// Raises LogError on an I/O error.

@@ -133,7 +133,7 @@ impl Reading {
         Ok(())
     }
 
-    /// Checks that the log has the requested source. The check is at the log's end, since only then all sources are
+    /// Checks that the log has the requested source. The check is at the log's end, because only then all sources are
     /// known.
     fn check_source(&self) -> Result<(), Failure> {
         let sources = &self.log.header().sources;

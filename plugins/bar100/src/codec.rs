@@ -103,7 +103,7 @@ impl Status {
     /// Status of a sensor that is ready, in normal mode, and has sound memory.
     pub const IDLE: Self = Self(0x40);
 
-    /// Checks a status byte. Busy is accepted, since this sensor nearly always reports busy.
+    /// Checks a status byte. Busy is accepted, because this sensor nearly always reports busy.
     ///
     /// Errors: not ready, bus high, or wrong constant, mode or memory bits.
     /// Source: status checks of Blue Robotics' `KellerLD` library.

@@ -18,7 +18,7 @@ const CONVERSION: DurNs = DurNs(10_000_000);
 const AFTER_CALIBRATION: DurNs = DurNs::from_millis(150);
 /// Interval between attempts to read the calibration.
 const RETRY: DurNs = DurNs::from_millis(500);
-/// Number of consecutive bad answers after which the calibration is read again, since the sensor may have been
+/// Number of consecutive bad answers after which the calibration is read again, because the sensor may have been
 /// replaced.
 const READ_AGAIN_AFTER: u32 = 20;
 

@@ -243,7 +243,7 @@ impl State {
 
     /// Handles a message of a Bosch unit; returns the acceleration once all three components have arrived.
     ///
-    /// Turn rates are not reported, since the unit has none about its pitch axis.
+    /// Turn rates are not reported, because the unit has none about its pitch axis.
     fn take_bosch(&mut self, message: bosch::Message) -> Told {
         let [x, y, z] = &mut self.acceleration_mps2;
         match message {

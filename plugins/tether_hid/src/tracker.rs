@@ -4,7 +4,7 @@
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other. If
 //!   [`PERSIST`] consecutive reports agree, the counter has really moved, and the reports weren't corrupt.
 //!   - If the first of these reports was near zero, the device counts from zero again. The length continues from its
-//!     latest value. The restart is recorded, since the device may have been replugged.
+//!     latest value. The restart is recorded, because the device may have been replugged.
 //!   - Otherwise the counter's new value is accepted.
 //! - A step back to near zero is accepted at once only if the winch can cover it in a second. This holds after a
 //!   silence too.

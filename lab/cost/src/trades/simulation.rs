@@ -29,11 +29,11 @@ const OTHER_RAYS: u32 = 769;
 const DECIDES_M: f64 = 0.05;
 /// Smallest difference of the hole diameter D that counts, m. Rounding in the simulation is far smaller.
 const RESOLUTION_M: f64 = 1e-4;
-/// Minimum number of seeds, since differences need a spread.
+/// Minimum number of seeds, because differences need a spread.
 const LEAST_SEEDS: u32 = 2;
 /// Maximum number of seconds of a dive that are timed. The simulation advances in slices of a second.
 const TIMED_S: u32 = 8;
-/// Number of seeds when the number of rays is varied. It is small, since a simulation with [`MANY_RAYS`] takes long.
+/// Number of seeds when the number of rays is varied. It is small, because a simulation with [`MANY_RAYS`] takes long.
 const RAYS_SEEDS: u32 = 2;
 
 /// A scene and the effects that may be left out of it.
@@ -157,7 +157,7 @@ const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[tra
 
 /// The scenes in which the number of rays is varied.
 ///
-/// The scenes are short, since a dive with a thousand rays per beam takes long. Both references are compared in the
+/// The scenes are short, because a dive with a thousand rays per beam takes long. Both references are compared in the
 /// first scene.
 fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     let lengths = inputs.effort.pick(&[("field", 7.0)][..], &[("field", 20.0), ("boulders", 0.6)]);

@@ -24,7 +24,7 @@ const LINES: u32 = 360;
 const IN_SHADOW: f64 = 1.5;
 /// Share of cells whose distances lie within the colour scale.
 ///
-/// The cells at a floor's corners lie beyond the scale, since a Poisson surface rounds corners off.
+/// The cells at a floor's corners lie beyond the scale, because a Poisson surface rounds corners off.
 const SCALE_SHARE: f64 = 0.93;
 
 /// Number of heads, their mode, whether they are in sector offset, and whether their phases are aligned.

@@ -8,7 +8,7 @@ use super::Xyz;
 use super::wall::Stretch;
 use crate::Spread;
 
-/// Coordinates closer to zero than this become zero, since the triangulation's exact predicates refuse values below
+/// Coordinates closer to zero than this become zero, because the triangulation's exact predicates refuse values below
 /// 1e-142.
 const TINY_M: f64 = 1e-100;
 

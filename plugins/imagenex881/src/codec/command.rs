@@ -119,7 +119,7 @@ pub enum CommandError {
 
 /// Linear scale of a byte: value = zero + code * num / den.
 ///
-/// The factor is a fraction, since a product with 0.3 or 0.01 has a rounding error for some codes.
+/// The factor is a fraction, because a product with 0.3 or 0.01 has a rounding error for some codes.
 struct Scale {
     field: &'static str,
     unit: &'static str,

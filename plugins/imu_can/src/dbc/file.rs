@@ -310,8 +310,8 @@ fn wide_ids(text: &str) -> BTreeMap<String, u64> {
 fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
     let words = error.to_string();
     let line = if matches!(error, can_dbc::DbcError::Pest(_)) {
-        // The line number is parsed from ` --> 3:1`, since other ways of getting it require naming the parser's grammar
-        // types.
+        // The line number is parsed from ` --> 3:1`, because other ways of getting it require naming the parser's
+        // grammar types.
         let at = words.split_once("--> ").and_then(|(_, at)| at.split(':').next());
         at.and_then(|line| line.trim().parse().ok()).unwrap_or(1)
     } else {
