@@ -21,9 +21,9 @@ const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 /// Health of a head; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeadHealth {
-    /// Angle of the last ping, radians.
+    /// Angle of the latest ping, radians.
     last_rad: f64,
-    /// Angle turned since the last return, radians.
+    /// Angle turned since the latest return, radians.
     unheard_rad: f64,
     /// Angle turned while returns came, radians; at most a turn.
     heard_rad: f64,

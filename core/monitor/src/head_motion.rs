@@ -42,9 +42,9 @@ pub struct MeasuredMotion {
     last: Option<(MonoNs, f64)>,
     /// Signed angle of the head's most recent step, radians.
     last_step_rad: f64,
-    /// Unsigned angle turned through since the last turning point or start, radians.
+    /// Unsigned angle turned through since the latest turning point or start, radians.
     since_turning_rad: f64,
-    /// Size of the last complete sweep between two turning points, radians.
+    /// Size of the latest complete sweep between two turning points, radians.
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,

@@ -66,17 +66,17 @@ impl Angles {
 /// are not lost by chance, and none of them is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
-    /// Whether the wall was detected at each angle in the last turn, and in the turn before that.
+    /// Whether the wall was detected at each angle in the latest turn, and in the turn before that.
     heard: Angles,
     heard_before: Angles,
-    /// For each angle: whether the ping just before the last ping at that angle was lost.
+    /// For each angle: whether the ping just before the latest ping at that angle was lost.
     followed_lost: Angles,
     /// Three counts: all pings at wall within range; the pings that count for losses by chance; and, among the second
     /// count, the pings that followed a lost ping.
     any: Count,
     by_chance: Count,
     after_lost: Count,
-    /// Whether the last ping was lost.
+    /// Whether the latest ping was lost.
     was_lost: bool,
     /// Health of the head.
     hearing: HeadHealth,

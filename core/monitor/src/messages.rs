@@ -150,7 +150,7 @@ pub struct Standing {
     pub metres: Metres,
     /// Chainage at which the first missed stretch begins, m; `None` if no stretch is missed.
     pub missed_from_m: Option<f64>,
-    /// Last judged stretch without a verdict.
+    /// Most recently judged stretch that neither passes nor fails.
     pub unsure: Option<Stretch>,
     /// Whether every part of the wall visible to the heads here has the verdict pass.
     pub passed: bool,

@@ -58,7 +58,7 @@ pub struct Placed {
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
     pub(super) commands: Commands,
-    /// Fix of the vehicle at the last advice update.
+    /// Fix of the vehicle at the latest advice update.
     pub vehicle: VehicleState,
     /// Traffic of each sensor so far, in the order of sources.
     pub health: Vec<SensorHealth>,

@@ -98,7 +98,7 @@ impl Navigator {
     }
 }
 
-/// Time of the last advice update at or before `now`; `None` if this update was already emitted.
+/// Time of the latest advice update at or before `now`; `None` if this update was already emitted.
 fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     let period = ADVICE_PERIOD.0.unsigned_abs();
     let last = MonoNs(now.0 - now.0 % period);
