@@ -35,7 +35,7 @@ pub use search::SPEED_MARGIN;
 const ALTERNATIVES_EVERY: u32 = 25;
 /// Number of iterations that solve for the speed and the position margin, which depend on each other.
 const FALLS: u32 = 3;
-/// At speeds below this, the direction of travel is unclear and the previous direction is used, m/s.
+/// Speed below which the direction of travel is unclear, m/s. The previous direction is then used.
 const UNDER_WAY_MPS: f64 = 0.02;
 /// Maximum number of stored stretches of wall outside a head's range limits.
 const OUT_OF_REACH: usize = 16;
@@ -54,9 +54,9 @@ struct Fastest {
 struct Chosen {
     /// Advised speed, m/s; `None` if no speed meets the target.
     advised_mps: Option<f64>,
-    /// Lower end of the interval of speeds that ends at the advised speed, m/s.
+    /// Lower end of the interval of suitable speeds whose upper end is the advised speed, m/s.
     from_mps: f64,
-    /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
+    /// Speed that meets the target and is nearest to the present speed, m/s.
     nearest_mps: Option<f64>,
     /// Whether the advised speed meets the target only if passes from several swings of the vehicle are taken together.
     by_several_swings: bool,
@@ -78,7 +78,7 @@ pub struct Task {
     pub looks: Looks,
 }
 
-/// Computes speed advice; caches the rings of the heads until the vehicle moves.
+/// Computes speed advice. Caches the rays from the heads to the wall until the vehicle moves.
 #[derive(Debug, Clone)]
 pub struct Advisor {
     profile: Profile,
@@ -104,7 +104,7 @@ pub struct Advisor {
     astern: bool,
     /// Largest speed that met the target in the previous update.
     last_mps: Option<f64>,
-    /// Distance that the vehicle may move before the heads' rings are recast, m.
+    /// Distance that the vehicle may move before the heads' rays are cast again, m.
     still_m: f64,
     /// Speed at which passes from several swings of the vehicle together meet the target, m/s; zero if there is none.
     swung_mps: f64,
@@ -227,7 +227,7 @@ impl Advisor {
         advice
     }
 
-    /// Returns the advice for a vehicle at `pose`, from which the heads' rings have been cast.
+    /// Returns the advice for a vehicle at `pose`, from which the heads' rings of rays have been cast.
     fn advise_at(
         &mut self,
         pose: &Pose,
@@ -354,7 +354,7 @@ impl Advisor {
         speed_mps * (1.0 - SPEED_MARGIN)
     }
 
-    /// Returns the motion of the vehicle and its beams for the prediction of spacing.
+    /// Returns the motion of the vehicle and its beams, from which the spacing is predicted.
     fn going(&self, pose: &Pose, situation: &Situation, phasing: &Phasing, swing: Swing<'_>) -> Going {
         let periods_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
         let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
@@ -368,10 +368,10 @@ impl Advisor {
         }
     }
 
-    /// Updates the heads' rings for the vehicle's pose; returns `false` if no turning head has a ring.
+    /// Updates the heads' rings of rays for the vehicle's pose; returns `false` if no turning head has a ring.
     ///
-    /// A head's ring is outdated once the vehicle has moved. If several rings are outdated, each call recasts only one,
-    /// because the vehicle moves little between calls.
+    /// A head's ring of rays is outdated once the vehicle has moved. If several rings are outdated, each call recasts
+    /// only one, because the vehicle moves little between calls.
     fn look(&mut self, situation: &Situation, pose: &Pose) -> bool {
         let count = self.heads.len().max(1);
         let present = |number: usize| situation.heads.get(number).is_some_and(Option::is_some);
@@ -471,16 +471,16 @@ impl Advisor {
         Ok(Fastest { speed_mps, advised_mps: driving.kept_back_mps(speed_mps), t_y_m })
     }
 
-    /// Returns the distance that the vehicle may move before the heads' rings are recast, m.
+    /// Returns the distance that the vehicle may move before the heads' rays are cast again, m.
     fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
         if let Some(anew_m) = self.task.looks.anew_m {
             return anew_m;
         }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // A vehicle that swings too much for any speed also does so at a slightly different position.
+            // If the vehicle swings too much at any speed, a slightly different position does not help.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
-            // The distance between samples that limits the speed is unknown.
+            // The distance between samples that limits the speed is unknown, so the target stands in for it.
             Err(_) => (self.task.target.max_hole_m, 0.0),
         };
         ring_cache::still_m(

@@ -8,7 +8,7 @@ use headrace_geometry::time::DurNs;
 
 /// Duration without a return after which a head counts as silent.
 ///
-/// Headrace does not wait for a silent head, and leaves it out of the advice.
+/// Headrace stops waiting for the returns of a silent head, and leaves the head out of the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
 /// Tolerance, in steps, with which a turn must be a whole number of steps. It is needed because steps are given in

@@ -455,8 +455,8 @@ impl Passes {
         self.turns_s.into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns these passes as they would be with evenly phased heads and without parallax. Heads that are not phased
-    /// with each other stay unchanged.
+    /// Returns these passes with evenly phased heads and without parallax. Heads that are not phased with each other
+    /// stay unchanged.
     #[must_use]
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
@@ -467,7 +467,7 @@ impl Passes {
         even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
     }
 
-    /// Returns the longest time between passes of all heads if their phases were even, seconds; zero without a head.
+    /// Returns the longest time between passes of all heads with even phases, seconds; zero without a head.
     pub fn even_gap_s(&self) -> f64 {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
@@ -479,7 +479,7 @@ impl Passes {
     /// Returns the phase error of each head relative to the first head that turns, radians.
     ///
     /// The error is an angle of the head's turn, in [-pi, pi). If it is positive, the head passes the wall later, and
-    /// farther ahead, than it should by the schedule for `scheduled` heads. `None` for an absent head, for heads that
+    /// farther ahead, than the schedule for `scheduled` heads requires. `None` for an absent head, for heads that
     /// aren't phased with each other, and at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {

@@ -116,7 +116,7 @@ impl Sounding {
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// The distance follows the shorter way around the perimeter, as the sizes of holidays do.
+    /// The distance follows the shorter way around the perimeter, like the diameter of a hole.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)

@@ -17,7 +17,7 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
 ///
 /// `None` if `t_y_m` alone reaches the target, or if the times aren't positive. `pass_gap_s` is the time between passes
 /// (T_rev / s for s evenly interleaved heads), `ping_period_s` the time between pings (T_s).
-/// Source: Eq. 16 solved for v (docs/decisions/0005-advice-and-plan.md).
+/// Source: Jorge et al. 2021, Eq. 16, solved for v (docs/decisions/0005-advice-and-plan.md).
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
     let time_s = pass_gap_s + ping_period_s;
     along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
@@ -89,7 +89,7 @@ impl Spiral {
     ///
     /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with the distance of a single step.
     /// [`Spiral::t_y_mean_m`] uses the advance between two pings instead.
-    /// Source: Eq. 15.
+    /// Source: Jorge et al. 2021, Eq. 15.
     pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }

@@ -30,7 +30,7 @@ pub struct Strip {
     pub arc: Arc,
     /// The heads that see the strip.
     pub seen_by: HeadSet,
-    /// Whether any part of the strip is hidden from a head whose beam would otherwise sweep it.
+    /// Whether any part of the strip is hidden from a head whose beam sweeps over it.
     ///
     /// If true, the head's pings stop up to one angular step before the strip's edge. If the strip is only outside the
     /// head's sector, pings stop exactly at its edge.
@@ -290,7 +290,7 @@ impl Strips {
         })
     }
 
-    /// Returns the speed that would be the largest for a target if every head saw all of the wall, m/s.
+    /// Returns the largest speed for a target, m/s, on the assumption that every head sees all of the wall.
     ///
     /// `None` if no speed meets the target.
     pub fn bound_if_all_seen_mps(

@@ -22,9 +22,9 @@ impl Interval {
 
     /// Median with its 95 % interval by the sign test; `None` without values.
     ///
-    /// The bounds are two values equally far from the least and the largest rank. They are the innermost pair that
-    /// covers the true median with a probability of at least 95 %. For fewer than six values, the bounds are the least
-    /// and the largest value, which cover the median with a smaller probability.
+    /// The rank of the lower bound is as far from the first as the rank of the upper bound is from the last. The bounds
+    /// are the innermost pair that covers the true median with a probability of at least 95 %. For fewer than six
+    /// values, the bounds are the least and the largest value, which cover the median with a smaller probability.
     pub fn median(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -220,7 +220,7 @@ impl Trade {
         self.error_axis.rsplit(", ").next().unwrap_or_default()
     }
 
-    /// Difference of two errors up to which they count as equal, in the unit of the error.
+    /// Largest difference of two errors that count as equal, in the unit of the error.
     ///
     /// This is a tenth of `decides`, and at least the reference's own error.
     pub fn resolution(&self) -> f64 {

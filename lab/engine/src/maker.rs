@@ -35,7 +35,7 @@ impl Counts {
         self.replayed.load(Ordering::Relaxed)
     }
 
-    /// Adds dives that another process replayed, and dives that were in the cache.
+    /// Adds the numbers of dives that another process replayed or found in the cache.
     pub fn add(&self, replayed: usize, cached: usize) {
         self.replayed.fetch_add(replayed as u64, Ordering::Relaxed);
         self.cached.fetch_add(cached as u64, Ordering::Relaxed);

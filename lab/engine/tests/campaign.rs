@@ -105,7 +105,7 @@ fn threads_shards_and_repeated_runs_give_the_same_tables() {
         }
     }
     assert!(union == all, "all shards together differ from one run");
-    // The folders of all shards, merged into one folder, form a cache.
+    // If the folders of all shards are merged into one folder, this folder is a cache.
     let moved = cache("1-2").join(headrace_tables::program_version());
     let copied = Command::new("cp").arg("-r").arg(&moved).arg(cache("2-2")).status().unwrap();
     assert!(copied.success());

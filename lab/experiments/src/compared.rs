@@ -30,9 +30,9 @@ pub struct RunRow {
     pub sectors: bool,
     /// Distance T_x between passes, m.
     pub t_x: Pair,
-    /// Distance T_y between pings: mean, standard deviation, least, largest, m.
+    /// Distance T_y between pings, m: mean, standard deviation, least, largest.
     pub t_y: [Pair; 4],
-    /// Combined distance T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
+    /// Combined distance T, m: mean, least, largest; `None` for one head, which Table 5 leaves out.
     pub t: Option<[Pair; 3]>,
     /// The speed that gives the paper's distance T_x between passes, m/s.
     pub paper_speed_mps: f64,

@@ -35,8 +35,8 @@ pub struct HiddenRow {
 /// The layouts: three heads; four heads with neighbours a quarter turn apart, in two arrangements; four heads with
 /// neighbours half a turn apart.
 ///
-/// In the first arrangement of quarter turns, the occluded forward and aft heads follow each other on either wall after
-/// half a turn. In the second arrangement, the same heads follow each other after a quarter turn.
+/// In the first arrangement with quarter turns, the occluded forward and aft heads follow each other on either wall
+/// after half a turn. In the second arrangement, the same heads follow each other after a quarter turn.
 const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"), (4, "[0, 90, 90, 0]")];
 
 /// Simulates all layouts in MEDIUM, as in Figure 13.

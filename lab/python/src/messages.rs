@@ -11,7 +11,7 @@ use pyo3::{Py, PyRef, Python, pyclass, pymethods};
 use crate::errors::Failure;
 
 /// Maximum number of messages that are read ahead without the interpreter's lock. `AHEAD_BYTES` is the maximum number
-/// of their bytes.
+/// of bytes of these messages.
 const AHEAD: usize = 512;
 const AHEAD_BYTES: usize = 1 << 20;
 

@@ -213,7 +213,7 @@ impl CalibrationCells {
         *cell = Some(word.word);
     }
 
-    /// The calibration; `None` until every part is known. `overrides` take precedence over the memory.
+    /// The calibration; `None` until every part of it is known. `overrides` take precedence over the memory.
     ///
     /// Errors: an undefined mode, or impossible limits.
     pub fn calibration(&self, overrides: &Overrides) -> Result<Option<Calibration>, CalibrationError> {

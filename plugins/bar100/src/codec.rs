@@ -152,7 +152,7 @@ impl MemoryWord {
 }
 
 impl Transaction {
-    /// Length in bytes of the transaction that begins with `first`; `None` if unknown.
+    /// Length, in bytes, of the transaction that begins with `first`; `None` if unknown.
     pub fn length(first: u8) -> Option<usize> {
         match first {
             MEASURE => Some(MEASURE_BYTES),
@@ -188,7 +188,7 @@ impl Transaction {
     }
 }
 
-/// Separates transactions: each message is one transaction. A transaction with a bad status counts as a bad frame.
+/// Separates transactions. Each message is one transaction, and one with a bad status counts as a bad frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Transactions;
 

@@ -95,7 +95,7 @@ impl Access {
     /// Returns the role of a token; `None` for a wrong token.
     pub(crate) fn role_of(&self, token: &str) -> Option<Role> {
         let tokens = self.tokens.as_ref()?;
-        // The text is always compared with both roles' tokens, so that the response time does not reveal a match.
+        // The text is always compared with both tokens, so that the response time does not reveal a match.
         let (operates, sees) = (tokens.operator.is(token), tokens.viewer.is(token));
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }

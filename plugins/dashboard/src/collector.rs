@@ -32,8 +32,8 @@ pub(crate) const WAITING: usize = 64;
 const MOST_SAMPLES: usize = 20_000;
 /// Maximum length of wall whose samples are read from the loop's store for one message, m.
 const MENDED_AT_ONCE_M: f64 = 10.0;
-/// Shortest piece of wall for which samples are read from the loop's store, m. If so short a piece still has too many
-/// samples, some of them are left out.
+/// Shortest piece of wall for which samples are read from the loop's store, m. If even this piece has too many samples,
+/// some of them are left out.
 const SHORTEST_MENDED_M: f64 = 0.01;
 /// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
@@ -44,7 +44,7 @@ const SECTIONS_AT_ONCE: usize = 4096;
 const EVERY: DurNs = DurNs(200_000_000);
 /// Averaging window for the sensors' rates of readings.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
-/// Minimum change in the length of the way back after which the way is sent again, m.
+/// Minimum change in the length of the way back after which the list of missed stretches is sent again, m.
 const WAY_STEP_M: f64 = 0.5;
 /// Minimum interval between two lists of missed stretches to go back to.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
@@ -156,8 +156,8 @@ impl Collector {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call this method before the one
-    /// that handles the notice, tick or end.
+    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call this method before the
+    /// method that handles the notice, the tick or the end.
     pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let mut value =

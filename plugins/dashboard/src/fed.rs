@@ -27,7 +27,8 @@ pub enum Fed {
 pub struct News {
     /// End time of the latest tick.
     pub now: MonoNs,
-    /// Whether a seek skips this tick. Only the samples of a skipped tick are used; the state follows with the jump.
+    /// Whether a seek skips this tick. Only the samples of a skipped tick are used, because the state is sent after the
+    /// jump.
     pub is_skipped: bool,
     /// Time at which the dive began; `None` while unknown.
     pub begun: Option<MonoNs>,
@@ -121,7 +122,7 @@ pub struct RecordingJson {
     pub fails: bool,
     /// Text about the recording, the same on all screens; `None` if recording works.
     pub words: Option<String>,
-    /// How much of an interrupted dive's log has been read again, percent; `None` if the dive's state is complete.
+    /// Share of an interrupted dive's log that has been read again, percent; `None` if the dive's state is complete.
     pub read_again_pct: Option<u8>,
     /// Path of the recording.
     pub path: Option<String>,

@@ -455,8 +455,7 @@ impl Model {
         section_frame(self.seq, &all)
     }
 
-    /// Returns alerts, notes, history and the missed stretches to go back to as messages, for an exported
-    /// file.
+    /// Returns messages for an exported file: alerts, notes, history, and the missed stretches to go back to.
     pub fn closing(&self) -> Vec<Value> {
         let mut all = self.lists();
         all.push(self.history.message(self.seq));

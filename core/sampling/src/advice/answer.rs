@@ -50,7 +50,7 @@ impl Reason {
     }
 }
 
-/// Name of a mode, in a fixed-size form for advice that is saved and restored.
+/// Name of a mode. It has a fixed size, so that advice can be saved and restored.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModeName {
     len: u8,
@@ -170,7 +170,7 @@ pub struct Advice {
     ///
     /// At lower speeds, heads that are apart along the hull run out of phase.
     pub from_mps: f64,
-    /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
+    /// Speed that meets the target and is nearest to the present speed, m/s.
     ///
     /// `None` if the present speed meets the target, or if no speed near the present speed meets the target.
     pub nearest_mps: Option<f64>,
@@ -188,7 +188,7 @@ pub struct Advice {
     pub sure_m: f64,
     /// The longest time between two head passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
-    /// The longest time between two head passes if the passes were evenly spread, seconds.
+    /// The longest time between two head passes if passes are evenly spread, seconds.
     pub even_pass_gap_s: f64,
     /// T_y: the largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,

@@ -39,7 +39,7 @@ pub(super) struct Driving<'a> {
     /// along the hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
-    /// Speed above which the target is missed for any phases of the heads, m/s.
+    /// Speed above which the target is missed, whatever the heads' phases, m/s.
     pub(super) bound_mps: f64,
 }
 
@@ -56,7 +56,7 @@ impl Driving<'_> {
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
-        // The gap between the passes of all heads is the shortest of any strip, so this simple test rejects most
+        // Where all heads see the wall, the gap between passes is the shortest. This simple test therefore rejects most
         // speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
         if speed_mps * gap_s > most_m {
@@ -144,7 +144,7 @@ impl Driving<'_> {
         (best.1 <= self.sure.at_m(best.0) * (1.0 + EASE)).then_some(best.0)
     }
 
-    /// Returns the lower end of the interval below a speed that meets the target, m/s.
+    /// Returns the lower end of the interval that ends at `speed_mps` and whose speeds all meet the target, m/s.
     ///
     /// Zero if all lower speeds meet the target.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
@@ -165,9 +165,10 @@ impl Driving<'_> {
         0.0
     }
 
-    /// Returns the speed nearest to `speed_mps` that meets the target, m/s, within a factor of two.
+    /// Returns the speed nearest to `speed_mps` that meets the target, m/s. It is at least half and at most twice
+    /// `speed_mps`.
     ///
-    /// `None` if `speed_mps` itself meets the target, or if no speed within this factor meets it.
+    /// `None` if `speed_mps` itself meets the target, or if no speed within this range meets it.
     pub(super) fn nearest_mps(&self, speed_mps: f64) -> Option<f64> {
         const STEPS: i32 = 70;
         const STEP: f64 = 0.01;

@@ -369,8 +369,8 @@ impl PlannedMode {
 
 /// Returns the more severe of two errors.
 ///
-/// From least to most severe: samples of a turn too far apart, a strip that no head sees, any other error. Of two
-/// errors of the same kind, the error with the larger value is more severe.
+/// The order from least to most severe is: samples of a turn too far apart, a strip that no head sees, any other error.
+/// Of two errors of the same kind, the error with the larger value is more severe.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),

@@ -134,8 +134,7 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// Records the distance between two neighbouring samples of a head, at each place between the two that the head
-    /// sees.
+    /// Records the distance between two neighbouring samples of a head, at each place between them that the head sees.
     fn add(
         &mut self,
         planner: &Planner,

@@ -48,7 +48,8 @@ pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<G
 
 type Function = (&'static str, fn(f64) -> f64, fn(f64) -> f64, [f64; 2]);
 
-/// Name, the core's function, the platform's function, and the range of arguments.
+/// For each function: its name, the implementation in `core`, the platform's implementation, and the range of
+/// arguments.
 #[expect(clippy::disallowed_methods, reason = "the platform's functions are the reference for the core's")]
 const FUNCTIONS: [Function; 4] = [
     ("sine", math::sin, |x| x.sin(), [-7.0, 7.0]),

@@ -39,7 +39,7 @@ const DECIDES_M: f64 = 0.05;
 const MOMENT_S: f64 = 0.1;
 /// Length of the timed part of a dive, s.
 const TIMED_S: f64 = 15.0;
-/// Difference between the errors of two settings below which the settings count as equal, m.
+/// Largest difference between the errors of two settings that count as equal, m.
 const RESOLUTION_M: f64 = 5e-4;
 /// Minimum angle between two used returns of a head, radians. No two returns differ by so much, so navigation uses only
 /// a head's first return.
@@ -233,7 +233,7 @@ fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
 struct Prepared {
     scene: String,
     settings: Vec<Setting>,
-    /// The distinct settings. The default belongs to the lines of several varied parameters, but is measured once.
+    /// The distinct settings. The default lies on the lines of several varied parameters, but is measured only once.
     unique: Vec<(u32, Way)>,
     /// For each distinct setting, the number of simulated seeds and the errors.
     errors: Vec<(u32, Vec<Error>)>,
@@ -442,7 +442,8 @@ impl Dived {
     }
 }
 
-/// Mean delay between passing the true end of a section and the section's flag, s; `None` without flags.
+/// Mean delay from the moment at which the vehicle passes the true end of a section to the section's flag, s; `None`
+/// without flags.
 fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
     let end_s = dive.report.dive.duration_s;
     let passed_s = |chainage_m: f64| {
@@ -464,8 +465,8 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
 /// Error of the references.
 ///
 /// One comparison is between two computations of the true hole D_true. The other is between true places and the
-/// readings of a taut cable. The readings pass through emulator, bytes and decoder, and share only the trajectory with
-/// the true places.
+/// readings of a taut cable. The readings pass through emulator, bytes and decoder, so they share only the trajectory
+/// with the true places.
 fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostError> {
     let (mut hole_m, mut displacement_m) = (0.0_f64, 0.0_f64);
     for place in places.iter().filter(|place| place.all_knobs) {

@@ -410,7 +410,7 @@ impl Figures {
     }
 }
 
-/// Numbers of the features that beam axes hit with a detected return.
+/// Numbers of the features that the axis of a beam hits with a detected return.
 fn features_hit(scene: &Scene) -> Result<Vec<u16>, CostError> {
     let mut simulation = Simulation::with_truth(scene)?;
     let mut hit = Vec::new();
@@ -493,7 +493,7 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    // A dive in which no section has a hole diameter D gives no finite change.
+    // A dive in which no section has a hole diameter D gives a change that isn't finite.
     let is_known = |point: &&Point| figure(point, "change of D").is_finite();
     let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);

@@ -15,7 +15,7 @@ const RANGE_M: f64 = 10.0;
 const POINTS: u32 = 60;
 /// Number of rays of a simulated beam: the largest number that a scene allows.
 const RAYS: usize = 64;
-/// The footprint is also simulated for every curve point whose number is a multiple of this number.
+/// The footprint is also simulated for every curve point whose number is a multiple of `SIMULATED`.
 const SIMULATED: u32 = 6;
 
 /// Data of Figure 15.

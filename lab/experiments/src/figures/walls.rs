@@ -200,7 +200,7 @@ fn lines(dive: &Dive, window: Window) -> Vec<Line> {
     (0..LINES).map(line).collect()
 }
 
-/// The largest gap between passes. If one head occludes several adjacent lines, the gap of their middle line is
+/// The largest gap between passes. If another head occludes several adjacent lines, the gap of their middle line is
 /// returned.
 fn widest(lines: &[Line]) -> Option<Gap> {
     let mut lengths: Vec<f64> = lines.iter().filter_map(Line::widest).map(|gap| gap.length_m()).collect();

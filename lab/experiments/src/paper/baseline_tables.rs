@@ -43,8 +43,8 @@ pub struct SeveralHeadsRow {
     pub t_y_max_m: Cell,
 }
 
-/// A printed number beside recomputed numbers at two speeds: the speed that the paper states, and the speed at which
-/// the printed digits result.
+/// A printed number beside recomputed numbers at two speeds: the speed that the paper states, and the speed that gives
+/// the printed digits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AtBothSpeeds {
     /// The number recomputed at [`STATED_SPEED_MPS`].

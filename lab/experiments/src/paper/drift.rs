@@ -105,7 +105,7 @@ fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f
     Ok(largest_m)
 }
 
-/// All combinations of the drifts -1, 0 and 1 times the maximum: left, up and in heading.
+/// All combinations of three drifts (left, up, in heading), each of which is -1, 0 or 1 times its maximum.
 fn extremes() -> impl Iterator<Item = [f64; 3]> {
     const ENDS: [f64; 3] = [-1.0, 0.0, 1.0];
     ENDS.into_iter().flat_map(|y| ENDS.into_iter().flat_map(move |z| ENDS.map(|yaw| [y, z, yaw])))

@@ -47,7 +47,7 @@ pub struct Tables {
     pub consistent_speed_mps: Interval,
     /// The perimeter used for the recomputed means, m.
     pub perimeter_m: f64,
-    /// Perimeters that, with rounding, give all printed means of Tables 3 and 4 except the means of copied rows, m.
+    /// Perimeters that, with rounding, give the printed means of all rows of Tables 3 and 4 that aren't copies, m.
     pub consistent_perimeter_m: Interval,
     /// Table 1: overlap of beams.
     pub table_1: Table<OverlapRow>,

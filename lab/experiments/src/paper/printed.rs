@@ -10,7 +10,7 @@ use super::PaperError;
 /// Tolerance for rounding errors of recomputed values, as a share of a printed number's last digit. In floating point,
 /// 0.196 x 8 / 2 is slightly off 0.784.
 const ROUNDING: f64 = 1e-6;
-/// Maximum number of decimals of a printed number; no table has as many.
+/// Maximum number of decimals of a printed number. It is larger than in any table.
 const MOST_DECIMALS: usize = 6;
 
 /// A number with its printed digits.

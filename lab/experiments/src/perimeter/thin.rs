@@ -73,7 +73,7 @@ fn to_single(image: &mut Image) {
 /// Whether the neighbours of an edge pixel stay connected if the pixel is removed.
 fn needless(image: &Image, pixel: usize) -> bool {
     let ring = image.round(pixel).map(|k| image.set[k]);
-    // Yokoi's connectivity number for eight neighbours: the number of runs of clear sides, separated by set corners.
+    // Yokoi's connectivity number for eight neighbours: the number of runs of clear sides that set corners separate.
     let pieces: usize =
         [0, 2, 4, 6].into_iter().filter(|k| !ring[*k] && (ring[k + 1] || ring[(k + 2) % 8])).count();
     pieces == 1

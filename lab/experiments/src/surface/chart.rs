@@ -104,8 +104,7 @@ impl Chart {
 
 /// The sample and its periodic image on the other side of the seam.
 ///
-/// The images extend the wall by half a perimeter on either side, which is more than any gap that a triangle could
-/// bridge.
+/// The images extend the wall by half a perimeter on either side. No triangle bridges such a wide gap.
 fn images(perimeter_m: f64, sample: &Deviation) -> [Vertex; 2] {
     let sigma = math::wrap(sample.arc_m, perimeter_m);
     let other = if sigma < perimeter_m / 2.0 { sigma + perimeter_m } else { sigma - perimeter_m };

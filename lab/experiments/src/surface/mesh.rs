@@ -154,7 +154,8 @@ fn bounds(places: &[Xyz]) -> (Xyz, Xyz) {
 
 /// The point of a triangle nearest to `place`.
 ///
-/// This is the foot on the triangle's plane if the foot is inside the triangle, and otherwise a point on an edge.
+/// This is the foot of the perpendicular on the triangle's plane if the foot is inside the triangle, and otherwise a
+/// point on an edge.
 fn nearest_of(place: Xyz, [a, b, c]: [Xyz; 3]) -> Xyz {
     let (u, v, w) = (sub(b, a), sub(c, a), sub(place, a));
     let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));

@@ -38,9 +38,9 @@ pub(crate) struct Settings {
     pub depth: u32,
     /// Weight of the constraint that the surface passes through the samples; 0 to 1000.
     pub point_weight: f64,
-    /// Approximate number of samples per cell on the grid level on which a normal is splatted; must be above 0.
+    /// Approximate number of samples per cell on the grid level on which a normal is spread; must be above 0.
     pub samples_per_node: f64,
-    /// Ratio of the cube of 2^depth cells to the largest extent of the samples; at least 1.
+    /// Ratio of the side of the cube of 2^depth cells to the largest extent of the samples; at least 1.
     pub scale: f64,
     /// Margin between the samples and the edge of the grid, cells; at least 2.
     pub margin_cells: usize,

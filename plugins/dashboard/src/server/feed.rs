@@ -19,8 +19,8 @@ use crate::site::May;
 
 /// Time from a viewer's pong to the next WebSocket ping, and timeout of a pong.
 ///
-/// Ping and timeout together drop a stalled viewer within [`STALLED_AFTER`], even if the viewer's machine buffers the
-/// feed unread.
+/// Pings and the timeout drop a stalled viewer within [`STALLED_AFTER`], even if its machine buffers the feed while the
+/// viewer reads nothing.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(8);
 /// Minimum speed at which a viewer must read a long message, bytes per second. Slower viewers are dropped.

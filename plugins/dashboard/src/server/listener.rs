@@ -22,7 +22,8 @@ use super::stall::Stream;
 
 /// Pause after accepting a connection has failed.
 const PAUSE: Duration = Duration::from_millis(100);
-/// Timeout for the head of a request. Silent and idle connections are closed, and so are unfinished requests.
+/// Timeout for the head of a request. Silent and idle connections are closed, and so are connections with unfinished
+/// requests.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// Timeout of a TLS handshake.
 #[cfg(feature = "tls")]
