@@ -123,7 +123,8 @@ impl Adviser {
         self.report(into);
     }
 
-    /// Creates the advice result that readers see before the first tick, with room for a tick of any size.
+    /// Creates the advice result that readers see before the first tick, with room for the advice of a tick of any
+    /// size.
     /// Allocates: all memory of the list.
     pub(super) fn advised_with_room(&self) -> Advised {
         let mut advised = Advised { entries: Vec::with_capacity(MAX_TICK_PACKETS), ..Advised::default() };
@@ -299,8 +300,8 @@ mod tests {
         assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
     }
 
-    /// The vehicle yaws by 0.01 rad/s. Two heads at opposite angles turn in 8 s, so one of them passes every 4 s.
-    /// At 0.1 m/s, the rear one of two heads 0.8 m apart reaches a place 8 s after the front one.
+    /// The vehicle yaws by 0.01 rad/s. Two heads at opposite angles turn in 8 s, so one of them passes any place every
+    /// 4 s. At 0.1 m/s, the rear one of two heads 0.8 m apart reaches a place 8 s after the front one.
     #[test]
     fn swing_covers_the_time_between_passes_and_the_delay_between_heads() {
         let swung = |apart_m: f64, speed_mps: f64| {
@@ -323,13 +324,13 @@ mod tests {
         }
         let side_by_side = swung(0.0, 0.1);
         assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
-        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the second head arrives 16 s after the
-        // first. Only the rotation within the most recent 30 s counts.
+        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the second head arrives 16 s after the first
+        // head. Only the rotation within the most recent 30 s counts.
         let at_rest = swung(0.8, 0.0);
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }
 
-    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
+    /// The types listed in this test are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_adviser() {
         let (_, adviser) = armed().split().unwrap();

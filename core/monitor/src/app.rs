@@ -13,7 +13,7 @@ use headrace_sensor::device::{Device, SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_vehicle::{CONSOLE_ID, Mission};
 
-/// A plugin: an addition to the loop, such as an outlet or a system.
+/// A plugin, which adds something to the loop, such as an outlet or a system.
 pub trait Plugin {
     /// Registers sources and outlets, and resources and systems of the loop's worlds.
     ///

@@ -133,7 +133,7 @@ impl SensorHealth {
     }
 }
 
-/// The time span between two packets, extended to include time `at`.
+/// Extends the time span between two packets to include time `at`.
 pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, MonoNs) {
     span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
 }
@@ -152,7 +152,7 @@ pub struct HeadSpecification {
     /// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's modes at that
     /// setting.
     ///
-    /// The setting is the head's present one or a longer one. `None` if no setting is long enough.
+    /// The setting is the head's present setting or a longer one. `None` if no setting is long enough.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 
@@ -222,8 +222,8 @@ pub(super) struct LastSample {
     pub(super) unbroken: bool,
 }
 
-/// Reach of a head: the chainages where its samples land now, and have landed so far; `None` before its first
-/// ping with a fix.
+/// Reach of a head: the chainages where its samples land now, and all chainages where they have landed so far. `None`
+/// before its first ping with a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadFrontier(pub Option<HeadReach>);
 

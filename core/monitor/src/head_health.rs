@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math::{self, TAU};
 
-/// Angle without a return after which a head counts as detecting no wall, radians: a whole turn.
+/// A head counts as detecting no wall after it has turned by this angle without a return, radians: a whole turn.
 ///
 /// Absorbing walls and side tunnels suppress returns over less than a turn.
 const DEAF_RAD: f64 = TAU;
@@ -102,10 +102,10 @@ impl HeadHealth {
 
     /// Whether the head is deaf, which means that it detects no wall.
     ///
-    /// A head is deaf in three cases. A whole turn gave no return. All returns of half a turn have the same
-    /// range although the wall's distance varies. Nearly all returns are off the design while another head
-    /// detects the wall: `others` has the other heads' [`HeadHealth::elsewhere`]. If the returns of all heads
-    /// are off the design, the position or the design is wrong, and no head counts as deaf.
+    /// A head is deaf in three cases. A whole turn gave no return. All returns of half a turn have the same range
+    /// although the wall's distance varies. Nearly all returns are off the design while another head detects the wall;
+    /// `others` has the [`HeadHealth::elsewhere`] of the other heads. If the returns of all heads are off the design,
+    /// the position or the design is wrong, and no head counts as deaf.
     pub fn is_deaf(&self, mut others: impl Iterator<Item = f64>) -> bool {
         let [most, least] = ELSEWHERE;
         self.hears_nothing()
@@ -128,8 +128,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// Health of a head after this many pings, each of which detects the wall, something other than the wall,
-    /// or nothing.
+    /// Health of a head after this many pings. Each ping detects the wall, something other than the wall, or nothing.
     fn hearing(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> HeadHealth {
         let mut hearing = HeadHealth::default();
         for ping in 0..pings {

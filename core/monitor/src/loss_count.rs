@@ -21,7 +21,7 @@ const USUAL: f64 = 50.0;
 /// successive turns.
 const NEARLY_ALL: f64 = 0.75;
 
-/// Number of pings, and number of pings among them that gave no return.
+/// Number of pings, and number of these pings that gave no return.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Count {
     all: u32,
@@ -61,9 +61,9 @@ impl Angles {
 
 /// Sonar returns that one head loses by chance; part of the loop's state.
 ///
-/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
-/// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such missing returns
-/// are not lost by chance, and none of them is counted.
+/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side tunnel, or
+/// wall at a grazing angle, gives no return in turn after turn. Such missing returns aren't losses by chance, so they
+/// are not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
     /// Whether the wall was detected at each angle in the latest turn, and in the turn before that.
@@ -91,8 +91,8 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping a turn ago counts, because the head detected the wall at this angle a turn before that ping and
-            // a turn after it.
+            // The ping a turn ago is counted, because the head detected the wall at this angle a turn before that ping
+            // and a turn after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {
@@ -123,7 +123,8 @@ impl LossCount {
         &self.hearing
     }
 
-    /// Upper bound of the rate of random losses. Until enough pings are counted, all lost pings count.
+    /// Upper bound of the rate at which returns are lost by chance. Until enough pings are counted, all lost pings
+    /// count.
     pub fn at_most(&self) -> LossRate {
         if self.by_chance.all >= LEAST {
             self.rate()
@@ -170,9 +171,9 @@ mod tests {
         assert!(!count.hearing().hears_nothing() && count.rate() == LossRate::default());
     }
 
-    /// Whether a ping is lost at random, `in_hundred` times in a hundred.
+    /// Whether a ping is lost at random, with a probability of `in_hundred` per cent.
     ///
-    /// Splitmix64 makes the losses uncorrelated with turns of 400 pings.
+    /// The hash Splitmix64 makes the losses uncorrelated with turns of 400 pings.
     fn chance(ping: u32, in_hundred: u64) -> bool {
         let mut z = u64::from(ping).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

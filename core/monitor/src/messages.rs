@@ -40,7 +40,7 @@ pub struct Doubts {
     pub cable: Option<CableDoubt>,
     /// Vehicle file setting that is likely wrong.
     pub setting: Option<SettingDoubt>,
-    /// Whether the heads' pitch and yaw on their mounts are not verified yet.
+    /// Whether the pitch and yaw of the heads on their mounts are not verified yet.
     pub unverified_mounts: bool,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s.
     pub stand_s: u32,
@@ -58,9 +58,10 @@ pub enum Outcome {
         /// Arc length of the end point, m.
         arc_m: f64,
     },
-    /// No sample, for this reason. The aim is the point at which the beam meets the design profile; `None` if unknown.
+    /// No sample, for the given reason. The aim is the point at which the beam meets the design profile; `None` if
+    /// unknown.
     Lost(Loss, Option<WallPoint>),
-    /// A return that can't be placed, with the reason for the missing fix.
+    /// A return that can't be placed because there is no fix, with the reason for that.
     Unplaced(NoFix),
 }
 

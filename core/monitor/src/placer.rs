@@ -104,7 +104,7 @@ impl Placed {
         self.commands.0.clear();
     }
 
-    /// Returns the placer's results for an empty tick that follows this tick.
+    /// Returns the placer's results for an empty tick after this one.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut poses = self.poses.clone();
         poses.next_tick();
@@ -301,7 +301,7 @@ mod tests {
     use crate::fixtures::armed;
     use crate::resources::{Plan, TunnelDesign};
 
-    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
+    /// The types listed in this test are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_placer() {
         let (placer, _) = armed().split().unwrap();

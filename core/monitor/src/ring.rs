@@ -170,7 +170,7 @@ mod model_tests {
     use super::*;
     use crate::byte_ring::model::{Hasty, ModelConsumer, explore, packets_by};
 
-    /// Lengths of two test packets, bytes. The ring holds one packet and the header of the other.
+    /// Lengths of two test packets, bytes. The ring has room for one packet and the header of the other.
     const LENGTHS: [usize; 2] = [3, 5];
     const CAPACITY: usize = 2 * HEADER_BYTES + 5;
 
@@ -195,8 +195,8 @@ mod model_tests {
         })
     }
 
-    /// In every interleaving the reader reads packets whole and in order. A packet is either read or was
-    /// refused by the ring.
+    /// In every interleaving the reader gets packets whole and in order. A packet is either read or was refused by the
+    /// ring.
     #[test]
     fn packets_are_read_whole_or_refused() {
         let executions = explored("header then body in the loop's ring", |consumer| consumer);

@@ -1,10 +1,10 @@
-//! Driver of a head. It keeps one command in flight, and keeps the head on its scan program: the planned
+//! Driver of a head. It keeps one command in flight. It also keeps the head on its scan program, which is the planned
 //! sequence of pings.
 //!
 //! The driver first locates the head. It then homes the head, the short way, to the program's current position, and
-//! requests each ping of the program when due. After a late or lost answer the head lags. The driver then polls it as
-//! soon as it has answered, until it has caught up. A head far off its program (power-cycled, or turned by hand) is
-//! homed again.
+//! requests each ping of the program when due. After a late or lost answer the head lags. Until it has caught up, the
+//! driver polls it as soon as it has answered. A head far off its program (power-cycled, or turned by hand) is homed
+//! again.
 
 use std::collections::VecDeque;
 

@@ -6,7 +6,7 @@ use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
 /// Range setting while homing, m: the shortest one. It must differ from the configured setting, so that returns of
-/// homing can be told from samples.
+/// homing can be distinguished from samples.
 const RANGE_M: u8 = 1;
 
 /// Position and stepping direction of a head.

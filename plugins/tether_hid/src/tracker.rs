@@ -86,7 +86,7 @@ struct Jump {
 }
 
 impl CountTracker {
-    /// Creates a tracker; `max_counts_per_s` is the maximum speed of the winch or the vehicle, in counts.
+    /// Creates a tracker; `max_counts_per_s` is the maximum speed of the winch or the vehicle, in counts per second.
     pub fn new(counting: Counting, width: Width, max_counts_per_s: f64) -> Self {
         Self {
             counting,

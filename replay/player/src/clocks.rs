@@ -1,7 +1,7 @@
 //! Handles logs whose messages have timestamps from several clocks, e.g. time since boot and UNIX time.
 //!
-//! Such timestamps have no common order. Only messages of the clock with the most messages are played. The others are
-//! dropped and reported.
+//! Such timestamps have no common order. Only messages of the clock with the most messages are played. All other
+//! messages are dropped and reported.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 
 /// Minimum offset between two clocks, far longer than any dive. Timestamps with smaller gaps come from one clock.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Maximum number of clocks that are distinguished. Messages of further clocks are assigned to no clock.
+/// Maximum number of clocks that are distinguished. Messages of further clocks count for no clock.
 const MAX_CLOCKS: usize = 100;
 
 /// A clock, described by the range of its timestamps. The ranges of two clocks are more than a year apart.

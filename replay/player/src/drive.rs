@@ -44,7 +44,7 @@ pub trait PacketSource {
 pub struct Pace {
     /// Length of a tick in packet time; must be positive.
     pub tick: DurNs,
-    /// Seconds of packet time per second of wall time; `None` is as fast as possible.
+    /// Seconds of packet time per second of wall time; `None` means as fast as possible.
     pub speed: Option<f64>,
 }
 

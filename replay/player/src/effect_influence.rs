@@ -43,7 +43,7 @@ pub enum EffectInfluenceError {
     Seeds(usize),
 }
 
-/// Cost of some effects of a scene, and change of the results if these effects are left out.
+/// Cost of some effects of a scene, and the change of the results without these effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
     /// Names of the effects that are left out of the simulation.
@@ -90,7 +90,7 @@ impl LeftOut {
     }
 }
 
-/// Measures the effects of a scene. `scenes` has this scene once per seed.
+/// Measures the effects of a scene. `scenes` contains this scene once per seed.
 ///
 /// `note` is called with the number of finished dives and the maximum number of dives.
 ///
@@ -237,7 +237,7 @@ impl Figures {
     }
 }
 
-/// Number of rounds. Each round simulates the scene once, and for a comparison once more without the effects.
+/// Number of rounds. Each round simulates the scene once. A comparison simulates it once more, without the effects.
 const ROUNDS: usize = 5;
 
 /// Returns the cost of simulating with all effects, ns of processor time per sonar return.

@@ -27,7 +27,7 @@ pub enum PlaybackCommand {
     Step(u32),
     /// Plays until a section is judged, then pauses.
     StepSection,
-    /// Sets the speed: seconds of the dive per second of wall time; `None` is as fast as possible.
+    /// Sets the speed, seconds of the dive per second of wall time; `None` means as fast as possible.
     Speed(Option<f64>),
     /// Jumps to a time on the log's clock, forward or back. Playback stays playing or paused.
     Seek(MonoNs),
@@ -57,7 +57,7 @@ pub trait PlaybackObserver {
     /// Called after each tick that is played.
     fn after_tick(&mut self, dive: &Loop);
 
-    /// Called after each tick that a jump skips. Notices of such a tick must not be displayed.
+    /// Called after each tick that a jump skips. Notices of a skipped tick must not be displayed.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
     /// Called when playback pauses, after a jump, and at the end of the log. `ended` is true only at the end of the
@@ -281,7 +281,8 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Jumps to the last tick that ends at or before `to`. Starts from here, or from the nearest earlier snapshot.
+    /// Jumps to the last tick that ends at or before `to`. Starts from the current position, or from the nearest
+    /// earlier snapshot.
     ///
     /// Errors: see [`PlaybackError`].
     pub fn seek(&mut self, to: MonoNs, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {

@@ -77,7 +77,8 @@ impl Player {
         self.reader.header()
     }
 
-    /// Maps the log's sources to the loop's sources by name. The operator's input comes after the sensors.
+    /// Maps the log's sources to the loop's sources by name. The number of the operator's input follows those of the
+    /// sensors.
     ///
     /// Before this call, no message of the log has a source in the loop.
     pub fn connect(&mut self, sources: &[SourceInfo]) {
@@ -104,7 +105,7 @@ impl Player {
 
     /// Continues from a position of this player, or of another player of the same log and vehicle.
     ///
-    /// Losses are then counted as if the log had been played straight through. Losses found after the position stay in
+    /// Losses are then counted as if the log had been played straight through. Losses found behind the position stay in
     /// the list until playback passes them again.
     ///
     /// Errors: the log can't be read at that position.

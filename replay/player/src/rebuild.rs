@@ -1,7 +1,8 @@
-//! Rebuilds the state of an interrupted dive from its log, on a thread of its own, while new packets are only recorded.
+//! Rebuilds the state of an interrupted dive from its log, on a thread of its own. Meanwhile, new packets are only
+//! recorded.
 //!
-//! The log is replayed into a second loop, followed by the new packets. When the second loop has caught up, its state
-//! is restored into the dive's loop.
+//! A second loop replays the log, and then processes the new packets. When it has caught up, its state is restored into
+//! the dive's loop.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -116,12 +117,12 @@ impl Rebuild {
         }
     }
 
-    /// Returns the time in the log up to which the state has been rebuilt.
+    /// Returns the time in the log up to which the state is rebuilt.
     pub fn at(&self) -> MonoNs {
         MonoNs(self.progress.at_ns.load(Ordering::Relaxed))
     }
 
-    /// Whether [`Rebuild::finish`] takes a fraction of a second only, or the thread has ended early.
+    /// Whether [`Rebuild::finish`] takes only a fraction of a second, or the thread has ended early.
     pub fn is_near(&self) -> bool {
         let behind = self.sent.saturating_sub(self.progress.taken.load(Ordering::Relaxed));
         self.thread.is_finished() || self.progress.read.load(Ordering::Relaxed) && behind <= NEAR_PACKETS
@@ -135,7 +136,7 @@ impl Rebuild {
         self.thread.join().unwrap_or(Err(PlaybackError::Log(LogError::Panicked)))
     }
 
-    /// Tells the thread to end without a result. Doesn't wait for the thread, because the thread's medium may not
+    /// Tells the thread to end without a result. Doesn't wait for the thread, because the medium that it reads may not
     /// respond.
     pub fn cancel(self) {
         self.progress.cancelled.store(true, Ordering::Relaxed);
@@ -155,7 +156,7 @@ struct Rejoined {
 }
 
 impl Rejoined {
-    /// Skips the packets that a saved state contains, and restores the state.
+    /// Skips the packets that a saved state contains, and restores the saved state.
     ///
     /// If the state's packets aren't those of the log, the dive is rebuilt from its beginning. Returns the number of
     /// packets skipped.

@@ -14,7 +14,7 @@ use crate::log::format::{HEAD_WORDS, RESULT_PREFIX, STREAMS};
 use crate::log::{RecorderPort, ResultChannel};
 use crate::view;
 
-/// Free bytes that the largest tick needs in the recorder's queue: packets, their headers, and the list of their
+/// Free bytes that the largest tick needs in the recorder's queue, for packets, their headers, and the list of their
 /// sources.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
@@ -74,7 +74,7 @@ pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
 /// the loop consumes nothing until there is room. Recorded input is therefore never dropped.
 ///
 /// A dive that reads ports doesn't wait, see [`RecorderOutlet::of_ports`]. If all recorders have ended, the dive
-/// continues without recording; their handles return the errors.
+/// continues without recording, and the recorders' handles return the errors.
 pub struct RecorderOutlet {
     ports: Cell<Vec<RecorderPort>>,
     is_of_ports: bool,
@@ -137,8 +137,8 @@ impl Outlet for Recording {
             // earlier.
             let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
             if count > 0 && port.vacant_bytes() < needed {
-                // Ticks are skipped only in a dive that reads ports. In other dives the allowance has reserved the
-                // room.
+                // Ticks are skipped only in a dive that reads ports. In any other dive, the loop's allowance has
+                // reserved the room.
                 port.skip(time.now, count as u64);
                 continue;
             }

@@ -20,7 +20,7 @@ use xxhash_rust::xxh64::xxh64;
 use crate::atomic_file::AtomicFile;
 use crate::log::file_digest;
 
-/// Interval between two saved states. Replaying ten minutes of a log takes some seconds.
+/// Interval between two saved states. Replaying ten minutes of a log takes only some seconds.
 const INTERVAL: DurNs = DurNs::from_millis(600_000);
 /// Bytes of a state written at a time.
 const PIECE_BYTES: usize = 1 << 20;
@@ -129,7 +129,7 @@ pub struct StateKeeper {
     consumed: Consumed,
     /// Time at which the next state is to be saved.
     due: Option<MonoNs>,
-    /// A state that is written once all its packets are on the medium, and the state's time.
+    /// A state, and its time. It is written once all its packets are on the medium.
     waiting: Option<(MonoNs, SavedState)>,
     states: Sender<SavedState>,
     ended: Arc<AtomicBool>,

@@ -1,8 +1,8 @@
 //! Drives a loop from a log on several threads, or several loops that share one navigation.
 //!
-//! The placer, which georeferences pings, runs on one thread. The adviser runs on another, and all other work on the
-//! caller's thread. Bounded queues pass batches of ticks between the threads. Each part processes all ticks in order,
-//! so the results are identical bit for bit on any number of threads.
+//! The placer, which georeferences pings, runs on one thread. The adviser, which computes the speed advice, runs on
+//! another. All remaining work runs on the caller's thread. Bounded queues pass batches of ticks between the threads.
+//! Each part processes all ticks in order, so the results are identical bit for bit on any number of threads.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 /// and one for all remaining work.
 pub const MOST_THREADS: usize = 3;
 
-/// Number of ticks in a batch. One queue operation then passes some milliseconds of work.
+/// Number of ticks in a batch. One queue operation then passes some milliseconds of work to another thread.
 const BATCH_TICKS: usize = 32;
 /// Maximum number of batches of ticks that wait in the queue between two threads.
 const MOST_WAITING: usize = 4;
@@ -74,8 +74,8 @@ impl Batch {
 
 /// Runs the loop until the source ends, as fast as possible, on up to `threads` threads including the caller's.
 ///
-/// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`], which runs
-/// instead if `threads` is one.
+/// `after_tick` is called on the caller's thread after every tick. If `threads` is one, [`drive`] runs instead. Its
+/// results are the same.
 ///
 /// Errors: see [`DriveError`]. Packets fed before the error have been processed, unless a thread has panicked.
 pub fn drive_on(

@@ -205,8 +205,8 @@ impl Verifier {
             if let Some(tick) = left {
                 stream.part(tick, name, What::Missing);
             }
-            // Logs of earlier versions have no channel for states or alerts. A log without any results isn't the log
-            // of a live dive.
+            // Logs of earlier program versions have no channel for states or alerts. A log without any results isn't
+            // the log of a live dive.
             let is_told = has_results && (has_channel(name) || !LATER.contains(&name));
             verified.same += stream.same;
             verified.unrecorded += stream.unrecorded;
@@ -219,7 +219,7 @@ impl Verifier {
     /// Compares a record of the replay with the live record of the same number.
     fn compare(&mut self, number: usize, name: &'static str, record: Record<'_>) -> Result<(), LogError> {
         while self.streams.get(number).is_some_and(|stream| stream.waiting.is_empty()) && self.read()? {}
-        // A truncated log ends before its dive did, so missing live records are no difference.
+        // A truncated log ends before its dive did. Live records missing at the end are therefore no difference.
         let cut_off = self.reader.has_losses();
         let Some(stream) = self.streams.get_mut(number).filter(|stream| stream.difference.is_none()) else {
             return Ok(());

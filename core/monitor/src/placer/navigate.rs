@@ -53,8 +53,8 @@ pub(super) fn navigate(
     let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
-        // Time may stall or go back. Each advice update is emitted once. After a gap, only the latest update is
-        // emitted.
+        // Time may stall or go back, but each advice update is emitted only once. After a gap, only the latest update
+        // is emitted.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
@@ -83,8 +83,7 @@ pub(super) fn navigate(
 }
 
 impl Navigator {
-    /// Whether the source of an event is a stuck inertial unit or velocity log. Repeated readings are
-    /// ignored.
+    /// Whether the source of an event is a stuck inertial unit or velocity log. Its repeated readings are ignored.
     fn hangs(&mut self, event: &Event) -> bool {
         let source = event.source.index();
         let bit = 1_u64 << (source % 64);

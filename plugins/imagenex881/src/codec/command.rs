@@ -286,7 +286,7 @@ pub(crate) fn step_deg(counts: u8) -> f64 {
     STEP.value(counts)
 }
 
-/// Largest step of the head that is not above `counts`. Steps are in counts of 0.3 degrees.
+/// Largest step that the head supports and that is not above `counts`. Steps are in counts of 0.3 degrees.
 pub(crate) fn step_at_most(counts: i32) -> u8 {
     STEP_CODES.into_iter().rfind(|code| i32::from(*code) <= counts).unwrap_or(0)
 }

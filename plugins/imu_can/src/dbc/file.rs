@@ -7,8 +7,8 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use super::layout::{Bits, DATA_BYTES, Layout, Order};
 use crate::frame::CanId;
 
-/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. In the worst
-/// case, lists of one-letter names, the parser takes 75 bytes of memory for each byte of text.
+/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. The worst case
+/// is a text with lists of one-letter names: the parser takes 75 bytes of memory for each byte of it.
 const MOST_BYTES: usize = 1 << 20;
 
 /// Maximum number of names that an error lists.

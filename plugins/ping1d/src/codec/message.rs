@@ -100,7 +100,7 @@ record! {
 pub struct Profile {
     /// Distance and parameters of the ping.
     pub distance: Distance,
-    /// Echo strengths, evenly spaced over the scan. There are at most as many as fit a payload.
+    /// Echo strengths, evenly spaced over the scan; at most as many as fit in a payload.
     pub strengths: Bytes<MAX_STRENGTHS>,
 }
 

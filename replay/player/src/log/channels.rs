@@ -29,7 +29,8 @@ pub(super) enum ChannelKind {
 pub(super) struct Channel {
     pub(super) definition: Definition,
     pub(super) kind: ChannelKind,
-    /// Sort rank among messages with equal times. Raw channels are ordered by source, then other channels by topic.
+    /// Sort rank among messages with equal times. Raw channels come first, by source; all other channels follow, by
+    /// topic.
     pub(super) rank: u32,
 }
 

@@ -82,7 +82,7 @@ pub(super) fn unpack<R: Read + Seek>(
 
 /// Whether the checksum of everything before the data end record matches.
 ///
-/// Also true if there is no checksum, or a record is too large to read.
+/// Also true if there is no checksum, or if a record is too large to be read.
 pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Result<bool, LogError> {
     let reader = reader(|options| options.with_emit_chunks(true).with_validate_data_section_crc(true));
     let result = drive(file, 0..u64::MAX, reader, &mut |opcode, _| opcode != op::DATA_END)?;

@@ -219,8 +219,8 @@ impl<R: Read + Seek> DiveLog<R> {
         !(self.between.is_empty() && self.earlier.is_empty() && self.reader.losses().is_empty())
     }
 
-    /// Returns the number of messages delivered out of order: after a message with a later log time. It is 0 for a log
-    /// with ticks.
+    /// Returns the number of messages delivered out of order, which means after a message with a later log time. It is
+    /// 0 for a log with ticks.
     pub fn late(&self) -> u64 {
         self.late + self.reader.late()
     }

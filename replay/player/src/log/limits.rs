@@ -12,7 +12,7 @@ use headrace_geometry::time::MonoNs;
 pub(super) const LATEST: MonoNs = MonoNs(i64::MAX as u64);
 /// Maximum length of a record outside chunks, bytes.
 ///
-/// Also the maximum for all records of a chunk together, with [`RECORD_COST`] added for each.
+/// It is also the maximum for all records of a chunk together, with [`RECORD_COST`] added for each record.
 pub(super) const MAX_UNPACKED_BYTES: u64 = 32 << 20;
 /// Memory that a message takes in addition to its content, bytes.
 pub(super) const RECORD_COST: u64 = 64;

@@ -90,10 +90,10 @@ pub enum LossKind {
         /// Number of the channel with two definitions.
         channel: u16,
     },
-    /// All records are readable, but the summary isn't where the footer says, so records are missing or were
+    /// All records are readable, but the summary isn't where the footer says. Records are therefore missing, or were
     /// inserted.
     Displaced,
-    /// All records are readable, but their common checksum doesn't match, so a byte has changed at an unknown
+    /// All records are readable, but their common checksum doesn't match. A byte has therefore changed at an unknown
     /// position.
     DataSection,
     /// Damage within one part of a recording.
@@ -126,7 +126,7 @@ pub enum LossKind {
         /// Reason why the file can't be read, which the text of the loss gives after a colon.
         why: String,
     },
-    /// A part whose part metadata is unreadable. Its number was taken from the file name.
+    /// A part whose part metadata is unreadable, so that its number was taken from the file name.
     PartByName {
         /// Part number that the file name states.
         part: u32,

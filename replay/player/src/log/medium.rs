@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// Length of a disk sector, the smallest unit treated as unreadable, bytes.
 const SECTOR_BYTES: u64 = 512;
-/// Maximum number of unreadable ranges kept. More ranges are joined to the last one, together with the bytes between
+/// Maximum number of unreadable ranges kept. Further ranges are joined to the last one, together with the bytes between
 /// them.
 const MOST_RANGES: usize = 1024;
 

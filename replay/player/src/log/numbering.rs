@@ -69,7 +69,7 @@ impl Numbering {
     ///
     /// Also reports a part that was closed without an end record.
     pub(super) fn of(scan: &mut Scan, part: Option<&Part>, channels: &Channels, end: u64) -> Option<Self> {
-        // If the log was not closed, the scan has already reported that as a loss.
+        // If the log was not closed, the scan has already reported a loss.
         if part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
             let kind = LossKind::Metadata(PART_END.to_owned());
             scan.losses.push(Loss { kind, offset: end, bytes: 0, from: None, to: None });

@@ -29,7 +29,7 @@ pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 /// State that both ends of a recorder share, apart from the queue.
 pub(super) struct State {
     pub(super) stopping: AtomicBool,
-    /// Whether the recording ends without an end mark, so that a later dive can continue it.
+    /// Whether the recording ends without an end mark. A later dive can then continue it.
     pub(super) abandoned: AtomicBool,
     /// Whether the recorder has ended, so that the queue is no longer emptied.
     pub(super) closed: AtomicBool,

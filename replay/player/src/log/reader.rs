@@ -287,14 +287,14 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Returns the damage found so far.
     ///
-    /// Damage to the framing is known after opening, damage within chunks only after reading them. The list is
+    /// Damage to the framing is known after opening. Damage within chunks is known only after reading them. The list is
     /// complete when [`LogReader::next`] has returned `None`.
     pub fn losses(&self) -> &[Loss] {
         self.losses.list()
     }
 
-    /// Returns the number of messages delivered out of order: after a message with a later log time. It is 0 for a log
-    /// with ticks.
+    /// Returns the number of messages delivered out of order, which means after a message with a later log time. It is
+    /// 0 for a log with ticks.
     pub fn late(&self) -> u64 {
         self.late
     }
@@ -389,7 +389,7 @@ impl<R: Read + Seek> LogReader<R> {
         for (number, times) in &place.corrected {
             self.correct(*number, *times);
         }
-        // Messages before the definition of their channel must be lost again, as in a straight read.
+        // Messages before the definition of their channel must be lost again, as if the log were read straight through.
         self.channels.go_to(&place.defined);
         for (number, next) in &place.open {
             self.read_span(*number, *next)?;

@@ -45,7 +45,7 @@ const EVENTS: usize = 64;
 /// Starts recorders on threads of their own.
 pub struct Recorder;
 
-/// The loop's end of a recorder. Its methods don't block, allocate or make system calls.
+/// The end of a recorder that the loop uses. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
     /// An end of the queue that doesn't cache its index, so that the port is `Sync` and can be a resource of the loop's
     /// world.

@@ -3,8 +3,8 @@
 //! If a part can't be written any more, it is left without an end. The recording begins another part, and repeats in it
 //! the messages that may be missing from the previous part.
 //!
-//! After an error, nothing written since the latest sync is reliable: a file system may discard it and report success
-//! the next time. Messages are therefore kept in memory until they are synced.
+//! After an error, nothing written since the latest sync is reliable, because a file system may discard it and report
+//! success the next time. Messages are therefore kept in memory until they are synced.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(8);
 const LAST_ATTEMPTS: u32 = 3;
 /// Maximum number of statements of losses kept while no part can be begun.
 const MAX_STATEMENTS: usize = 100;
-/// Maximum number of names tried for a part, if files with these names exist.
+/// Maximum number of names tried for a part. Another name is tried if a file with the previous name exists.
 const NAMES: u32 = 1000;
 
 /// The part of the recording that is being written.

@@ -206,8 +206,8 @@ impl Scan {
         }
     }
 
-    /// Whether a chunk has earlier times than the chunk before it because another log begins between them, or within
-    /// the chunk before it.
+    /// Whether a chunk has earlier times than its predecessor because another log begins between them, or within the
+    /// predecessor.
     fn goes_back_into_other_log<R: Read + Seek>(
         &mut self,
         file: &mut LogFile<R>,
@@ -464,7 +464,7 @@ impl Scan {
 
     /// Searches all chunks for channel definitions. Truncated logs of other writers have definitions nowhere else.
     ///
-    /// Definitions in intact chunks take precedence over those outside chunks.
+    /// Definitions in intact chunks take precedence over definitions outside chunks.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for number in 0..self.spans.len() {
             let Some(span) = self.spans.get(number).copied() else { break };

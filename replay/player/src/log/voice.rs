@@ -1,7 +1,7 @@
 //! Voice recordings in a log: passes them from the operator's page to the recorder, and reads them back.
 //!
-//! A message of `/notes/voice` has in little-endian order: u32 id of the note, u32 seconds, u16 length of the media
-//! type, the media type, and the recording as the browser made it. The message has its own chunk, so damage to it
+//! A message of `/notes/voice` contains, in little-endian order: u32 id of the note, u32 seconds, u16 length of the
+//! media type, the media type, and the recording as the browser made it. The message has its own chunk, so damage to it
 //! affects nothing else.
 //!
 //! A replay doesn't read voice messages, because the operator's commands contain everything that the loop needs.
@@ -52,8 +52,8 @@ pub struct VoicePort {
 impl VoicePort {
     /// Passes a recording to the log, without blocking.
     ///
-    /// The recording is as safe as sensor data. It is written within a second, and written again to another part if
-    /// the medium fails.
+    /// The recording is as safe as sensor data. It is written within a second. If the medium fails, it is written again
+    /// to another part.
     ///
     /// Errors: see [`NotKept`]; the recording was not accepted.
     pub fn keep(&self, voice: &Voice) -> Result<(), NotKept> {
@@ -79,7 +79,8 @@ pub fn encode(voice: &Voice) -> Vec<u8> {
     message
 }
 
-/// Decodes a message. The recording must pass the page's own checks, because a log may come from anywhere.
+/// Decodes a message. The recording must pass the checks that the page applies to it, because a log may come from
+/// anywhere.
 ///
 /// Errors: see [`VoiceMessageError`].
 pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {

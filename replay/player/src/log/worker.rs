@@ -1,4 +1,4 @@
-//! The work of a recorder: takes entries from the queue and writes them to the log.
+//! The work of a recorder, which takes entries from the queue and writes them to the log.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -26,7 +26,8 @@ const BATCH: usize = 256;
 /// A message derived from results, such as one for viewers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
-    /// Number of the result channel for the message. The message is ignored if the log has no such channel.
+    /// Number of the result channel to which the message is written. The message is ignored if the log has no such
+    /// channel.
     pub channel: u16,
     /// Log time of the derived message.
     pub at: MonoNs,
@@ -123,7 +124,7 @@ impl RecorderWorker {
         }
     }
 
-    /// Returns a port that records messages to devices, and losses of packets, which don't pass through the loop.
+    /// Returns a port that records messages to devices and losses of packets. Neither passes through the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
@@ -143,7 +144,7 @@ impl RecorderWorker {
         &self.state
     }
 
-    /// Writes some entries of the queue. Also syncs, or tries again after an error, if due.
+    /// Writes some entries of the queue. If due, also syncs, or tries again after an error.
     ///
     /// `now` is the time since the recording began, which never goes back. Returns whether the queue had entries.
     pub fn step(&mut self, now: Duration) -> bool {

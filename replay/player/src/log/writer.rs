@@ -1,4 +1,4 @@
-//! Writes a log on the caller's thread. Only this module encodes messages as records.
+//! Writes a log on the caller's thread. No other module encodes messages as records.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,7 +25,7 @@ use super::space::LeftOut;
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Span of dive time at which a chunk is closed.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
-/// Bytes that each chunk adds to the summary, and bytes that each channel in a chunk adds.
+/// Bytes that each chunk adds to the summary, and bytes that each channel in the chunk adds to it.
 ///
 /// Source: MCAP format specification, "Chunk Index".
 const CHUNK_INDEX_BYTES: u64 = 80;
@@ -51,7 +51,8 @@ pub struct LogHeader {
     /// Numbers of the sources that are sonars. Their long packets are echoes, which are dropped first when a disk
     /// fills.
     pub sonars: Vec<u16>,
-    /// Metadata of this part, if the recording has parts. The part continues the message numbers of earlier parts.
+    /// Metadata of this part, if the recording has parts. The message numbers of this part continue those of earlier
+    /// parts.
     pub part: Option<PartHead>,
 }
 
@@ -93,7 +94,7 @@ pub struct ResultChannel {
     pub message_encoding: String,
     /// Whether the messages are dropped together with echoes when the disk fills.
     ///
-    /// True if the channel has a record per echo, or if a replay doesn't need the channel.
+    /// True if the channel has a record per echo, or if a replay doesn't need the channel's messages.
     pub follows_echoes: bool,
 }
 
@@ -133,7 +134,7 @@ pub struct PartSummary {
     pub raw_messages: u64,
 }
 
-/// Destination of a message: a channel, identified by its content.
+/// Destination of a message, which is a channel identified by its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Lane {
     Raw(u16),
@@ -443,7 +444,7 @@ fn write_metadata<W: Write>(
     Ok(())
 }
 
-/// Number of bytes passed to the medium so far, and whether more may be passed.
+/// Number of bytes passed to the log's medium so far, and whether more may be passed.
 #[derive(Default)]
 struct Medium {
     bytes: AtomicU64,

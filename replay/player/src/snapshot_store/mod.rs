@@ -66,12 +66,12 @@ impl SnapshotStore {
         self.used_bytes += references;
     }
 
-    /// Returns the bytes of the snapshot of time `at`. [`SnapshotStore::latest`] returns such times.
+    /// Returns the bytes of the snapshot of time `at`, which [`SnapshotStore::latest`] has returned.
     pub fn load(&self, at: MonoNs) -> Option<Vec<u8>> {
         self.snapshots.get(&at).map(|blocks| blocks.concat())
     }
 
-    /// Returns the memory needed for blocks that aren't stored yet, bytes.
+    /// Returns the memory that the blocks not stored yet will need, bytes.
     fn growth(&self, blocks: &BTreeSet<&[u8]>) -> usize {
         blocks.iter().filter(|block| !self.blocks.contains(**block)).map(|block| block_bytes(block)).sum()
     }

@@ -37,8 +37,8 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// Adds a sample of a head, received at `at`. Returns the previous cloud if it was full or too old for the
-    /// sample.
+    /// Adds a sample of a head, received at `at`. If the current cloud was full, or too old for the sample, returns
+    /// that cloud and begins another.
     pub(super) fn add(&mut self, at: MonoNs, head: u8, [x_m, y_m, z_m]: [f64; 3]) -> Option<PointCloud> {
         let full = if self.data.len() >= MOST_POINTS * STRIDE { self.close() } else { self.close_before(at) };
         if self.began.is_none() {
@@ -53,7 +53,7 @@ impl Points {
         full
     }
 
-    /// Returns the current cloud if it is too old at `at`, or the clock was set back.
+    /// Returns the current cloud if it is too old at `at`, or if the clock was set back.
     pub(super) fn close_before(&mut self, at: MonoNs) -> Option<PointCloud> {
         let age = at.since(self.began?).0;
         if (0..SPAN.0).contains(&age) { None } else { self.close() }

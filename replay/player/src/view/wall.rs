@@ -132,7 +132,7 @@ impl Wall {
 
 /// Returns the colour, sample count and verdict of a cell.
 ///
-/// A cell without a sample is transparent in an open section, and dark in a judged one, so that holes are visible.
+/// A cell without a sample is transparent in an open section, and dark in a judged section, so that holes are visible.
 fn cell(column: Option<&Column>, row: usize) -> [u8; FIELDS.len()] {
     let Some(column) = column else { return [0; FIELDS.len()] };
     let samples = column.samples.get(row).copied().unwrap_or(0);

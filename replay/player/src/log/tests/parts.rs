@@ -179,7 +179,7 @@ fn damaged_parts_lose_only_their_damaged_messages() {
     let folder = Folder::new("damaged");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let whole = all(&mut DiveLog::open(&folder.files()).unwrap());
-    // As after a power cut, part 3 has no end, and part 4 is still empty.
+    // As after a power cut, part 3 has no end, and part 4 is empty.
     let third = std::fs::read(folder.part(3)).unwrap();
     std::fs::write(folder.part(3), &third[..third.len() * 2 / 3]).unwrap();
     std::fs::write(folder.part(4), []).unwrap();

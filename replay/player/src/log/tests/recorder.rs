@@ -68,8 +68,8 @@ fn slow_medium_loses_nothing_if_the_loop_waits_for_the_queue() {
     }
 }
 
-/// A medium on which each flush waits until the test releases it. After the test has dropped its sender, no
-/// flush waits.
+/// A medium on which each flush waits until the test releases it. Flushes no longer wait after the test has dropped its
+/// sender.
 struct Held(mpsc::Receiver<()>);
 
 impl Write for Held {
@@ -383,8 +383,7 @@ fn counts_of_dropped_packets_are_recorded_per_source_every_few_seconds() {
     );
 }
 
-/// Every dropped packet is counted while the recorder is too slow, but the source of some dropped packets is then
-/// unknown.
+/// While the recorder is too slow, every dropped packet is counted. The source of some dropped packets is then unknown.
 #[test]
 fn dropped_packets_beyond_the_queue_capacity_are_counted() {
     let (medium, flushed) = slow(0);

@@ -33,7 +33,7 @@ enum Op {
 /// Decides whether an operation fails, by its kind and number.
 type Plan = Box<dyn FnMut(Op, u64) -> Option<io::Error> + Send>;
 
-/// Content of a file, and number of its bytes that survive a power cut.
+/// Content of a file, and the number of its bytes that survive a power cut.
 #[derive(Debug, Clone, Default)]
 struct Content {
     bytes: Vec<u8>,
@@ -169,8 +169,8 @@ fn eio() -> io::Error {
     io::Error::from_raw_os_error(5)
 }
 
-/// Returns the messages of a dive without faults, and the number of storage operations.
-/// The first operations write the header.
+/// Returns the messages of a dive without storage faults, and the number of storage operations. The first operations
+/// write the header.
 fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     let folder = Folder::new(name);
     let storage = Faulty::new(|_, _| None);
@@ -182,8 +182,8 @@ fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     (seen, storage.with(|world| world.ops))
 }
 
-/// Returns the number of operations before the first message. They create the first part, and write and sync its
-/// header.
+/// Returns the number of storage operations before the first message. They create the first part, and write and sync
+/// its header.
 fn header_ops() -> u64 {
     let folder = Folder::new("header");
     let storage = Faulty::new(|_, _| None);
@@ -224,7 +224,7 @@ fn single_storage_fault_is_recorded_and_loses_no_message() {
             // The part in which the fault occurred must have no end record.
             let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
             let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
-            // A part without synced content was removed, and created again under the same name.
+            // A part without synced content is removed, and created again under the same name.
             let is_anew = fault.continued.as_ref() == Some(&fault.path);
             assert!(is_anew || alone.iter().any(is_cut), "{which}: {alone:?}");
             if let [RecordingEvent::Failed { .. }, RecordingEvent::Resumed(resumed)] = events.as_slice() {
@@ -251,7 +251,7 @@ fn medium_fault_loses_no_message_if_brief_and_no_earlier_message_if_permanent() 
             assert!(expected.starts_with(&seen) && seen.len() as u64 >= summary.messages, "{which}");
             let is_end = summary.faults.iter().all(|fault| fault.error.contains("the summary"));
             assert!(!summary.faults.is_empty() && (is_end || !losses.is_empty()), "{which}");
-            // The first part is kept, even if no other part can be created.
+            // The first part must be kept, even if no other part can be created.
             assert!(folder.0.join("dive.mcap").exists());
             if lasts < u64::MAX && from < ops / 2 {
                 assert_eq!((lost, seen.len()), (0, expected.len()), "{which}: {events:?}");
