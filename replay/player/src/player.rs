@@ -105,7 +105,7 @@ impl Player {
 
     /// Continues from a position of this player, or of another player of the same log and vehicle.
     ///
-    /// Losses are then counted as if the log had been played straight through. Losses found behind the position stay in
+    /// Losses are then counted as if the log had been played straight through. Losses found beyond the position stay in
     /// the list until playback passes them again.
     ///
     /// Errors: the log can't be read at that position.

@@ -75,7 +75,7 @@ pub enum LogError {
         /// Path of the folder without a log.
         folder: PathBuf,
     },
-    /// Several logs were named, and one of them isn't part of a recording.
+    /// Several logs were to be read as one recording, and one of them isn't part of a recording.
     #[error(
         "{} is not a part of a recording; name one log, or only the parts of one recording",
         path.display()

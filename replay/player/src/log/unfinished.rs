@@ -119,7 +119,7 @@ impl Unfinished {
         Ok(last.map(unfinished))
     }
 
-    /// Returns the name of the latest recording in a folder, as a path. `None` if that recording ended in order.
+    /// Returns the name of the latest recording in a folder, as a path. `None` if that recording can't be continued.
     ///
     /// The latest recording is the one whose file was modified last. Files that aren't parts of a recording are
     /// ignored. Logs for which `is_other` returns true are ignored too.

@@ -124,7 +124,7 @@ impl RecorderWorker {
         }
     }
 
-    /// Returns a port that records messages to devices and losses of packets. Neither passes through the loop.
+    /// Returns a port that records two things that bypass the loop: messages to devices, and losses of packets.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }

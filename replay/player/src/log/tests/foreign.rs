@@ -184,7 +184,7 @@ fn wrong_message_length_loses_at_most_two_messages() {
         let mut bytes = bytes.clone();
         bytes[at + 1..at + 9].copy_from_slice(&u64::to_le_bytes(lie));
         let (seen, losses) = read(&bytes);
-        // With some wrong lengths, no record seems to begin at the cut. The length of the previous message then seems
+        // With some wrong lengths, no record seems to begin at `at`. The length of the previous message then seems
         // wrong too.
         let lost = if (22..1000).contains(&lie) { 1 } else { 2 };
         assert_eq!(seen.len(), 400 - lost, "length {lie}");
