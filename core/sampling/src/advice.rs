@@ -639,8 +639,8 @@ impl Advisor {
 
     /// Returns the first remedy that makes the target possible without further remedies.
     ///
-    /// The order is: a steady heading, then the tunnel's centre if samples of a turn are close enough there, then the
-    /// fastest mode.
+    /// The remedies are tried in this order: a steady heading, then the tunnel's centre if samples of a turn are close
+    /// enough there, then the fastest mode.
     fn remedy(
         &self,
         situation: &Situation,

@@ -303,7 +303,7 @@ pub fn hull_rule(apart_m: f64, heads: usize, speed_mps: f64, turn_s: f64) -> Res
 ///
 /// The distances are measured along the tunnel. `pitch_m` is T_x of one continuously rotating head (v T), `heads` the
 /// number s, `share` the position in the sector from 0 to 1. The sum of the distances is 2 T_x / s everywhere. In the
-/// middle of the sector, the two are equal; at its ends, one of them is zero.
+/// middle of the sector, the two distances are equal; at its ends, one of them is zero.
 /// Errors: fewer than two heads, a pitch below zero, a share outside 0 to 1.
 /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
 pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2], SamplingError> {

@@ -17,7 +17,8 @@ use headrace_geometry::math;
 ///
 /// At most the share [`MAY_FAIL`] of all stretches may miss the target because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches of wall that may miss the target because of lost returns. The other 95 in 100 stretches meet it.
+/// Share of stretches of wall that may miss the target because of lost returns. The other 95 % of the stretches meet
+/// it.
 const MAY_FAIL: f64 = 0.05;
 /// Maximum number of passes required over a place.
 ///

@@ -267,7 +267,8 @@ pub struct Given {
 ///
 /// A point beats another point if its error and cost are no worse and one of them is clearly better. An error is
 /// clearly better if it is smaller by more than `resolution`. A cost is clearly better if its upper bound is below the
-/// other's lower bound. Noise in the costs of equal settings therefore removes no point from the front.
+/// lower bound of the other point's cost. Noise in the costs of equal settings therefore removes no point from the
+/// front.
 pub fn front(points: &mut [Point], resolution: f64) {
     let beats = |one: &Point, other: &Point| {
         let (error, others) = (one.error(), other.error());

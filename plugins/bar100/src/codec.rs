@@ -30,11 +30,11 @@ pub struct Status(u8);
 pub struct Measurement {
     /// Status byte of the sensor.
     pub status: Status,
-    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0: a sensor returns 0 before the
-    /// conversion is done.
+    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper limit. Never 0, because a sensor returns 0
+    /// before the conversion is done.
     pub pressure_counts: u16,
-    /// Temperature in counts. One count is 0.05 degrees Celsius / 16. Never 0: a sensor returns 0 before the conversion
-    /// is done.
+    /// Temperature in counts. One count is 0.05 degrees Celsius / 16. Never 0, because a sensor returns 0 before the
+    /// conversion is done.
     pub temperature_counts: u16,
 }
 

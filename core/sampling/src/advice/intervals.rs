@@ -51,8 +51,8 @@ impl Driving<'_> {
 
     /// Checks whether a speed meets the target when the target is enlarged by the share `more`.
     ///
-    /// On a miss, returns an equal or lower speed, m/s. No speed between the returned and the tested speed meets the
-    /// target.
+    /// If the tested speed misses the target, returns the same or a lower speed, m/s. No speed between the returned and
+    /// the tested speed meets the target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);

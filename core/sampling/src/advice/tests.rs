@@ -205,7 +205,7 @@ fn sector_alternatives_use_the_sweep_time_of_their_mode() {
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
     assert!((fast - advice.v_max_mps).abs() < 1e-9, "the present mode: {fast} {}", advice.v_max_mps);
     // The longest time between passes is 21.6 s plus a ping period. The samples of a turn are so close together that
-    // they hardly matter.
+    // their distance hardly matters.
     assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
 }
 

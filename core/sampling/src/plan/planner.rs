@@ -145,8 +145,8 @@ impl Planner {
 
     /// Returns the largest T_max over all tolerated poses, with the heads evenly phased for the speed, m.
     ///
-    /// The result includes strips that the vehicle hides from some of its heads. The result is infinite if no head sees
-    /// some strip.
+    /// The result includes strips that the vehicle hides from some of its heads. It is infinite if no head sees some
+    /// strip.
     ///
     /// Errors: a speed that isn't above zero.
     /// Source: Jorge et al. 2021, Eq. 16.

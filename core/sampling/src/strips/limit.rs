@@ -49,7 +49,8 @@ impl Limit {
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
     ///
-    /// t is the sum of the pass gap and the ping period. w is `swing_mps`, u is `apart_swing_mps`, and a is `apart_m`.
+    /// In this equation, t is the sum of the pass gap and the ping period. w is `swing_mps`, u is `apart_swing_mps`,
+    /// and a is `apart_m`.
     ///
     /// The result is higher than this solution in two cases: the largest displacement by swing is known, or a circle
     /// between two rows of turning points limits the hole.

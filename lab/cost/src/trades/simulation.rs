@@ -312,8 +312,8 @@ impl Differences {
         spread(&self.hole_m).map_or(f64::NAN, |change| change.middle.abs())
     }
 
-    /// The errors: first the magnitude of the mean change of the hole diameter D, with an interval; then the changes
-    /// with their signs.
+    /// Returns the errors: first the magnitude of the mean change of the hole diameter D, with an interval; then the
+    /// changes with their signs.
     fn errors(&self) -> Vec<Error> {
         let size = spread(&self.hole_m).map(|Interval { low, middle, high }| Interval {
             low: if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) },

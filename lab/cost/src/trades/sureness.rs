@@ -134,8 +134,8 @@ fn point(
     })
 }
 
-/// Errors of verdicts that require `confidence` standard deviations, in simulated dives with field effects. The first
-/// half is driven at `speed_mps`, the second half faster.
+/// Errors of verdicts that require `confidence` standard deviations, in simulated dives with field effects. The vehicle
+/// drives the first half of a dive at `speed_mps`, and the second half faster.
 fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Error>, CostError> {
     let half_m = inputs.effort.pick(8.0, 15.0);
     let legs = [(half_m, speed_mps), (half_m, HURRY * speed_mps)];

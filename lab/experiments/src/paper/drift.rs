@@ -15,8 +15,8 @@ const DRIFT_M: f64 = 1.5;
 const YAW_DEG: f64 = 15.0;
 /// Number of computed ranges per turn, a hundredth of a degree apart.
 ///
-/// Every step of Table 2 is a whole multiple of this angle. The last step before a corner is found to 0.2 % of its
-/// length.
+/// Every step of Table 2 is a whole number of hundredths of a degree. The last step before a corner is found to 0.2 %
+/// of its length.
 const SOUNDINGS: u32 = 36_000;
 
 /// Mounting positions of the heads on the vehicle (Jorge et al. 2021, §8).

@@ -481,8 +481,8 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Verifies the checksum of the whole log at its end, if the log seems intact.
     ///
-    /// Messages outside chunks have no other checksum. Logs with chunks are not checked, because the `mcap` crate's
-    /// writer computes this checksum wrongly when chunk checksums are disabled.
+    /// Messages outside chunks have only this checksum. Logs with chunks are not checked, because the `mcap` crate's
+    /// writer computes it wrongly when chunk checksums are disabled.
     fn finish(&mut self) -> Result<(), LogError> {
         if self.finished {
             return Ok(());
