@@ -4,7 +4,7 @@ use bevy_ecs::schedule::SystemSet;
 
 /// A stage of a world. Its systems see all results of the world's earlier stages.
 ///
-/// A stage doesn't run in a tick without input for it.
+/// In a tick without input for a stage, the stage doesn't run.
 pub trait Stage: SystemSet + Copy + PartialEq {
     /// All stages of the world, in the order in which they run.
     const ALL: &'static [Self];

@@ -123,7 +123,7 @@ impl Log {
         self.info.vehicle_toml.as_deref()
     }
 
-    /// The other attachments, by name.
+    /// Attachments other than the vehicle file, by name.
     #[getter]
     fn attachments(&self, py: Python<'_>) -> BTreeMap<String, Py<PyBytes>> {
         let content = |(name, bytes): &(String, Vec<u8>)| (name.clone(), PyBytes::new(py, bytes).unbind());

@@ -26,7 +26,7 @@ pub(super) enum Rig {
     Vita1,
     /// Two heads, one behind the other.
     Vita2InLine,
-    /// Three or four heads, pairs of them 0.3 m apart.
+    /// Three or four heads, each 0.15 m to the left or right of the vehicle's centre.
     Vita2Pairs,
 }
 

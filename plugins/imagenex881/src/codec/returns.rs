@@ -196,7 +196,7 @@ impl Header {
 
     /// Size of a profile range count, mm.
     ///
-    /// Source: Imagenex 881A serial interface, profile range; for the 852 its own specification.
+    /// Source: Imagenex 881A serial interface, profile range. For the 852, the specification of the 852.
     pub const fn count_mm(&self, model: Model) -> u32 {
         match model {
             Model::Head881 if self.range_m < COARSE_FROM_M => 2,
