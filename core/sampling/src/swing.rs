@@ -33,7 +33,7 @@ pub struct Swing<'a> {
     /// Largest rotation between the passes of two heads that are apart along the hull, divided by the time between
     /// them, rad/s.
     ///
-    /// This time is the time until the rearmost head reaches the position of the foremost head.
+    /// The passes are as far apart in time as the rearmost head needs to reach the position of the foremost head.
     pub apart_rate_radps: f64,
     /// History of the vehicle's directions from which the swing was computed, if known.
     pub history: Option<&'a Looks>,

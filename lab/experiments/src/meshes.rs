@@ -13,7 +13,7 @@ use crate::{ExperimentError, Progress};
 
 /// Length of each simulated run, m, as in the paper.
 pub(crate) const LENGTH_M: f64 = 130.0;
-/// Chainages between which the surface is compared with the wall, away from its ends.
+/// Chainages between which the surface is compared with the wall. They are away from the ends of the run.
 const INNER: Stretch = Stretch { from_m: 20.0, to_m: 120.0, step_m: 0.1 };
 /// Scene line for the range noise of the paper's simulator.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n";

@@ -107,7 +107,7 @@ pub struct Spacing {
 impl Planner {
     /// Returns the answers for all modes, or for the mode `only`.
     ///
-    /// A target that a mode can't meet is an answer, not an error.
+    /// If a mode can't meet the target, its answer says so. This isn't an error.
     ///
     /// Errors: no target, speed or time; a value that isn't above zero.
     pub fn answers(&self, question: &Question, only: Option<&str>) -> Result<Vec<Answer>, SamplingError> {

@@ -192,7 +192,7 @@ fn error_about_an_impossible_plan_names_the_cause() {
     for bad in [0.0, -1.0, f64::NAN] {
         assert!(planner.answers(&speed(bad), None).is_err() && planner.t_max_m(0, bad).is_err());
     }
-    // A target that a mode cannot meet is an answer, not an error.
+    // If a mode can't meet the target, its answer says so. This isn't an error.
     let answers = planner.answers(&speed(0.1), None).unwrap();
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
