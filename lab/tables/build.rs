@@ -1,5 +1,5 @@
-//! Computes the program's version for caches from the package's version and a digest of the sources that decide a
-//! dive's results.
+//! Computes the program's version for caches. The version consists of the package's version and a digest of the sources
+//! that decide a dive's results.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
-//! The adviser: the world that computes the speed advice at each update.
+//! The adviser: the ECS world that computes the speed advice at each update.
 //!
-//! Advice depends on the situations alone, not on the verdicts.
+//! Advice depends only on the situation of the vehicle and its heads, not on the verdicts.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -22,20 +22,20 @@ use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
-/// Lowest speed for which the delay between two heads at different places along the hull is computed, m/s. At a
-/// standstill the delay would be infinite.
+/// Lowest speed for which the delay between two heads at different places along the hull is computed, m/s. It is
+/// assumed for slower vehicles, because the delay grows without bound as the speed falls.
 const SLOWEST_MPS: f64 = 0.05;
 
 /// Part of the loop that computes the advice.
 pub struct Adviser {
     part: Part<AdviseStage>,
-    /// Empty placer results. The adviser holds them between two ticks, in place of the results of a tick.
+    /// Empty placer results. The adviser holds them between two ticks, so that it holds no results of a past tick.
     nothing: Arc<Placed>,
 }
 
 /// Advice computed in one tick.
 ///
-/// The list is reused from tick to tick. In a default value the list grows as needed.
+/// The list is reused from tick to tick. The list of a default value grows as needed.
 #[derive(Debug, Default)]
 pub struct Advised {
     /// Advice at each update, in order.
@@ -123,7 +123,8 @@ impl Adviser {
         self.report(into);
     }
 
-    /// Creates the advice result that readers see before the first tick, with room for a tick of any size.
+    /// Creates the advice result that readers see before the first tick, with room for the advice of a tick of any
+    /// size.
     /// Allocates: all memory of the list.
     pub(super) fn advised_with_room(&self) -> Advised {
         let mut advised = Advised { entries: Vec::with_capacity(MAX_TICK_PACKETS), ..Advised::default() };
@@ -183,7 +184,7 @@ impl Advisor {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
-    /// Advice to show at an update. `begun` is the receive time of the first packet.
+    /// Returns the advice to show at an update. `begun` is the receive time of the first packet.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
@@ -299,8 +300,8 @@ mod tests {
         assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
     }
 
-    /// The vehicle yaws by 0.01 rad/s. Two heads at opposite angles turn in 8 s, so one of them passes every 4 s.
-    /// At 0.1 m/s, the rear one of two heads 0.8 m apart reaches a place 8 s after the front one.
+    /// The vehicle yaws by 0.01 rad/s. Two heads at opposite angles turn in 8 s, so one of them passes any place every
+    /// 4 s. At 0.1 m/s, the rear one of two heads 0.8 m apart reaches a place 8 s after the front one.
     #[test]
     fn swing_covers_the_time_between_passes_and_the_delay_between_heads() {
         let swung = |apart_m: f64, speed_mps: f64| {
@@ -323,13 +324,13 @@ mod tests {
         }
         let side_by_side = swung(0.0, 0.1);
         assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
-        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the second head arrives 16 s after the
-        // first. Only the rotation within the most recent 30 s counts.
+        // For a stationary vehicle a speed of 0.05 m/s is assumed, so the second head arrives 16 s after the first
+        // head. Only the rotation within the most recent 30 s counts.
         let at_rest = swung(0.8, 0.0);
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }
 
-    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
+    /// The types listed in this test are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_adviser() {
         let (_, adviser) = armed().split().unwrap();

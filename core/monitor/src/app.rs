@@ -13,7 +13,7 @@ use headrace_sensor::device::{Device, SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_vehicle::{CONSOLE_ID, Mission};
 
-/// A plugin: an addition to the loop, such as an outlet or a system.
+/// A plugin, which adds something to the loop, such as an outlet or a system.
 pub trait Plugin {
     /// Registers sources and outlets, and resources and systems of the loop's worlds.
     ///
@@ -116,7 +116,7 @@ impl App {
         self.outlets.push(Box::new(outlet));
     }
 
-    /// Keeps the contents of the result streams of every tick, for recording or comparison.
+    /// Makes the result streams keep the contents of every tick, for recording or comparison.
     pub fn keep_results(&mut self) {
         self.keeps_results = true;
     }

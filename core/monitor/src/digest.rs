@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh64::xxh64;
 
-/// Hashes numbers by their bits, little-endian. The hash so far seeds each step.
+/// Hashes numbers by their bits, little-endian. The hash of all earlier numbers is the seed for the next one.
 ///
 /// The digest is not cryptographic. It detects a dive that was computed differently, not a forged dive.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -56,10 +56,10 @@ impl Stateful for Navigator {
     }
 }
 
-/// Fix of the vehicle at the last advice update, and its standard deviations.
+/// Fix of the vehicle at the latest advice update, and its standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Component, Serialize, Deserialize)]
 pub struct VehicleState {
-    /// Time of the last advice update; `None` before the first one.
+    /// Time of the latest advice update; `None` before the first one.
     pub at: Option<MonoNs>,
     /// Pose and speed of the vehicle, or the reason for which there is no fix.
     pub fix: Result<Fix, NoFix>,
@@ -133,7 +133,7 @@ impl SensorHealth {
     }
 }
 
-/// The time span between two packets, extended to include time `at`.
+/// Extends the time span between two packets to include time `at`.
 pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, MonoNs) {
     span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
 }
@@ -152,7 +152,7 @@ pub struct HeadSpecification {
     /// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's modes at that
     /// setting.
     ///
-    /// The setting is the head's present one or a longer one. `None` if no setting is long enough.
+    /// The setting is the head's present setting or a longer one. `None` if no setting is long enough.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 
@@ -171,10 +171,10 @@ impl HiddenAngles {
 #[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
 pub struct HeadClassifier(pub(super) HeadWall);
 
-/// Sweep state of a head: its last sample and the returns that wait for classification.
+/// Sweep state of a head: its latest sample, and the returns that wait for classification.
 #[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
 pub struct HeadSweep {
-    /// Last valid sample in the present sweep of the head.
+    /// Latest valid sample in the present sweep of the head.
     pub(super) last: Option<LastSample>,
     /// Sonar returns that are classified only after the head's next returns.
     pub(super) waiting: WaitingReturns,
@@ -212,7 +212,7 @@ impl WaitingReturns {
     }
 }
 
-/// Last valid sample of a head in its present sweep.
+/// Latest valid sample of a head in its present sweep.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct LastSample {
     pub(super) point: Point3<Tunnel>,
@@ -222,8 +222,8 @@ pub(super) struct LastSample {
     pub(super) unbroken: bool,
 }
 
-/// Reach of a head: the chainages where its samples land now, and have landed so far; `None` before its first
-/// ping with a fix.
+/// Reach of a head: the chainages where its samples land now, and all chainages where they have landed so far. `None`
+/// before its first ping with a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadFrontier(pub Option<HeadReach>);
 

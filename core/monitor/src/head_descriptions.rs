@@ -4,7 +4,7 @@ use bevy_ecs::prelude::Resource;
 use headrace_sampling::advice::ModeName;
 use headrace_sampling::head::HeadSet;
 
-/// Names of the heads and their alternative settings, as the vehicle file has them.
+/// Names of the heads, and their alternative settings, for the texts to the pilot.
 #[derive(Debug, Clone, Default, PartialEq, Resource)]
 pub struct HeadDescriptions {
     /// Source ids of the heads, by number of the head.
@@ -78,7 +78,7 @@ impl HeadDescriptions {
 pub(crate) mod tests {
     use super::*;
 
-    /// Two heads whose finer mode is FAST, and whose range setting of 20 m reaches all wall.
+    /// Two heads whose finer mode is FAST. With a range setting of 20 m they reach all wall.
     pub(crate) fn two() -> HeadDescriptions {
         HeadDescriptions {
             names: vec!["bow".to_owned(), "stern".to_owned()],

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math::{self, TAU};
 
-/// Angle without a return after which a head counts as detecting no wall, radians: a whole turn.
+/// A head counts as detecting no wall after it has turned by this angle without a return, radians: a whole turn.
 ///
 /// Absorbing walls and side tunnels suppress returns over less than a turn.
 const DEAF_RAD: f64 = TAU;
@@ -21,9 +21,9 @@ const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 /// Health of a head; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeadHealth {
-    /// Angle of the last ping, radians.
+    /// Angle of the latest ping, radians.
     last_rad: f64,
-    /// Angle turned since the last return, radians.
+    /// Angle turned since the latest return, radians.
     unheard_rad: f64,
     /// Angle turned while returns came, radians; at most a turn.
     heard_rad: f64,
@@ -37,9 +37,9 @@ pub struct HeadHealth {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct SameRange {
     range_m: f64,
-    /// Angle that the head turned during these returns, radians.
+    /// Angle that the head turned during the returns with the same range, radians.
     turned_rad: f64,
-    /// Smallest and largest deviation from the design wall during these returns, m.
+    /// Smallest and largest deviation from the design wall during the returns with the same range, m.
     off_m: [f64; 2],
 }
 
@@ -62,7 +62,7 @@ impl SameRange {
     }
 }
 
-/// A return of a head, compared with the design.
+/// A return of a head, compared with the design profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heard {
     /// Range that the head reports, m.
@@ -85,7 +85,7 @@ impl HeadHealth {
             return;
         };
         if self.hears_nothing() {
-            // When the head gets returns again, all averages start anew.
+            // The head gets returns again after a whole turn without any, so all averages start anew.
             *self = Self { last_rad: angle_rad, ..Self::default() };
         }
         self.unheard_rad = 0.0;
@@ -102,10 +102,10 @@ impl HeadHealth {
 
     /// Whether the head is deaf, which means that it detects no wall.
     ///
-    /// A head is deaf in three cases. A whole turn gave no return. All returns of half a turn have the same
-    /// range although the wall's distance varies. Nearly all returns are off the design while another head
-    /// detects the wall: `others` has the other heads' [`HeadHealth::elsewhere`]. If the returns of all heads
-    /// are off the design, the position or the design is wrong, and no head counts as deaf.
+    /// A head is deaf in three cases. A whole turn gave no return. All returns of half a turn have the same range
+    /// although the wall's distance varies. Nearly all returns are off the design while another head detects the wall;
+    /// `others` has the [`HeadHealth::elsewhere`] of the other heads. If the returns of all heads are off the design,
+    /// the position or the design is wrong, and no head counts as deaf.
     pub fn is_deaf(&self, mut others: impl Iterator<Item = f64>) -> bool {
         let [most, least] = ELSEWHERE;
         self.hears_nothing()
@@ -128,8 +128,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// Health of a head after this many pings, each of which detects the wall, something other than the wall,
-    /// or nothing.
+    /// Health of a head after this many pings. Each ping detects the wall, something other than the wall, or nothing.
     fn hearing(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> HeadHealth {
         let mut hearing = HeadHealth::default();
         for ping in 0..pings {
@@ -145,7 +144,7 @@ mod tests {
         let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
-        // A single return is enough: the head counts as detecting the wall again.
+        // After a single return, the head counts as detecting the wall again.
         let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
         // Three quarters of each turn give no return, as beside a side tunnel or an absorbing wall.
@@ -183,8 +182,8 @@ mod tests {
             hearing.is_deaf(std::iter::empty())
         };
         assert!(stuck(202, 0.4) && !stuck(199, 0.4));
-        // The wall's distance varies by less than the limit if the head is in the centre of a round pipe, or
-        // near it.
+        // In the centre of a round pipe or near it, the wall's distance varies by less than the limit, so a constant
+        // range isn't suspicious.
         assert!(!stuck(4000, 0.0) && !stuck(4000, 0.2));
     }
 }

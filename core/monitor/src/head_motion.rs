@@ -9,8 +9,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Angles that differ by at most this much count as equal, radians. The finest step of any head, 0.3 degrees,
 /// is much larger.
 const SAME_ANGLE_RAD: f64 = 1e-6;
-/// Minimum angle over which the turn rate is measured, radians. Until the head has turned that far, the whole
-/// angle so far is used.
+/// Minimum angle over which the turn rate is measured, radians. Until the head has turned by this angle, the turn rate
+/// is measured over all of the head's motion so far.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
 /// A step longer than this multiple of the usual angular step counts as several steps, because pings were skipped.
 const LONG_STEP: f64 = 1.5;
@@ -32,7 +32,7 @@ pub struct Turned {
     pub single_step: bool,
     /// Whether a new sweep begins: the head has reversed, or its motion is unknown.
     pub new_sweep: bool,
-    /// Whether the head is stalled: at the same angle for longer than any normal ping interval.
+    /// Whether the head is stalled, which means at the same angle for longer than any normal ping interval.
     pub standing: bool,
 }
 
@@ -42,9 +42,9 @@ pub struct MeasuredMotion {
     last: Option<(MonoNs, f64)>,
     /// Signed angle of the head's most recent step, radians.
     last_step_rad: f64,
-    /// Unsigned angle turned through since the last turning point or start, radians.
+    /// Unsigned angle turned through since the latest turning point or start, radians.
     since_turning_rad: f64,
-    /// Size of the last complete sweep between two turning points, radians.
+    /// Size of the latest complete sweep between two turning points, radians.
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,
@@ -130,7 +130,7 @@ impl MeasuredMotion {
 
     /// Whether the head may have restarted at a distant angle.
     ///
-    /// A head that resumes after a stall moves a normal step.
+    /// A head that resumes after a stall is not elsewhere, because its first step is of normal size.
     fn is_elsewhere(&self, silence: DurNs, size_rad: f64) -> bool {
         let by_far = self.step_rad.zip(self.rate_radps()).is_some_and(|(step_rad, rate_radps)| {
             let turned_rad = (rate_radps * silence.as_secs_f64()).abs();
@@ -218,8 +218,8 @@ mod tests {
         assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
     }
 
-    /// After a restart, or after somebody has turned the head by hand, earlier pings are no longer used. The
-    /// angle between the old and the new position doesn't count as turned.
+    /// After a restart, or after somebody has turned the head by hand, earlier pings are no longer used. The angle
+    /// between the old and the new position doesn't count as turned by the head.
     #[test]
     fn head_restart_at_a_distant_angle_does_not_count_as_turning() {
         for gap_ms in [20, 60, 1500, 60_000] {

@@ -12,7 +12,7 @@ const BINS: usize = 2048;
 const WORDS: usize = BINS / 64;
 /// Number of pings at which the counts are halved, so that old pings lose weight.
 const WINDOW: u32 = 4096;
-/// Minimum divisor, in pings, of a loss share. With fewer pings, a single loss would count too much.
+/// Minimum divisor, in pings, of a loss share, so that a single loss among few pings doesn't count too much.
 const LEAST: u32 = 100;
 /// Weight of the overall loss share, in pings, in the estimate of the loss share after a lost ping. This weight matters
 /// while few pings are lost.
@@ -21,7 +21,7 @@ const USUAL: f64 = 50.0;
 /// successive turns.
 const NEARLY_ALL: f64 = 0.75;
 
-/// Number of pings, and number of pings among them that gave no return.
+/// Number of pings, and number of these pings that gave no return.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Count {
     all: u32,
@@ -61,22 +61,22 @@ impl Angles {
 
 /// Sonar returns that one head loses by chance; part of the loop's state.
 ///
-/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side
-/// tunnel, or wall at a grazing angle, gives no return in turn after turn. Such missing returns
-/// are not lost by chance, and none of them is counted.
+/// A ping is counted if the head detected the wall at the same angle a turn before and a turn after. A side tunnel, or
+/// wall at a grazing angle, gives no return in turn after turn. Such missing returns aren't losses by chance, so they
+/// are not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
-    /// Whether the wall was detected at each angle in the last turn, and in the turn before that.
+    /// Whether the wall was detected at each angle in the latest turn, and in the turn before that.
     heard: Angles,
     heard_before: Angles,
-    /// For each angle: whether the ping just before the last ping at that angle was lost.
+    /// For each angle: whether the ping just before the latest ping at that angle was lost.
     followed_lost: Angles,
-    /// Three counts: all pings at wall within range; the pings that count for losses by chance; and those of the latter
-    /// that followed a lost ping.
+    /// Three counts: all pings at wall within range; the pings that count for losses by chance; and, among the second
+    /// count, the pings that followed a lost ping.
     any: Count,
     by_chance: Count,
     after_lost: Count,
-    /// Whether the last ping was lost.
+    /// Whether the latest ping was lost.
     was_lost: bool,
     /// Health of the head.
     hearing: HeadHealth,
@@ -91,8 +91,8 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping a turn ago counts, because the head detected the wall at this angle a turn before that ping and
-            // a turn after it.
+            // The ping a turn ago is counted, because the head detected the wall at this angle a turn before that ping
+            // and a turn after it.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {
@@ -112,7 +112,8 @@ impl LossCount {
         let was_deaf = self.hearing.hears_nothing();
         self.hearing.add(angle_rad, heard);
         if was_deaf && heard.is_some() {
-            // Losses while the head detected nothing say nothing about the losses from now on.
+            // While the head detected nothing, all its returns were missing. These losses don't predict the losses from
+            // now on.
             *self = Self { hearing: self.hearing, ..Self::default() };
         }
     }
@@ -122,7 +123,8 @@ impl LossCount {
         &self.hearing
     }
 
-    /// Upper bound of the rate of random losses. Until enough pings are counted, all lost pings count.
+    /// Upper bound of the rate at which returns are lost by chance. Until enough pings are counted, all lost pings
+    /// count.
     pub fn at_most(&self) -> LossRate {
         if self.by_chance.all >= LEAST {
             self.rate()
@@ -169,9 +171,9 @@ mod tests {
         assert!(!count.hearing().hears_nothing() && count.rate() == LossRate::default());
     }
 
-    /// Whether a ping is lost at random, `in_hundred` times in a hundred.
+    /// Whether a ping is lost at random, with a probability of `in_hundred` per cent.
     ///
-    /// Splitmix64 makes the losses uncorrelated with turns of 400 pings.
+    /// The hash Splitmix64 makes the losses uncorrelated with turns of 400 pings.
     fn chance(ping: u32, in_hundred: u64) -> bool {
         let mut z = u64::from(ping).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -202,7 +204,7 @@ mod tests {
             }
             count.at_most()
         };
-        // In each turn, 280 of the 400 pings detect the wall. An angle counts from its third detection on.
+        // In each turn, 280 of the 400 pings detect the wall. An angle's pings count from its third detection on.
         let early = at_most(0..1000);
         assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
         assert_eq!(at_most(1000..1100), LossRate::default());

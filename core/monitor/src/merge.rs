@@ -70,7 +70,7 @@ impl Inbox {
         self.packets.clear();
         self.bytes.clear();
         self.heads.clear();
-        // A ring is looked at again only once its first packet has been taken.
+        // A ring's next packet is looked at only after its first packet has been taken.
         self.heads.extend(readers.iter().map(PortReader::peek));
         let limit = allowance_bytes.min(MAX_TICK_BYTES);
         while self.packets.len() < MAX_TICK_PACKETS {

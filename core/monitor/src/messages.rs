@@ -40,7 +40,7 @@ pub struct Doubts {
     pub cable: Option<CableDoubt>,
     /// Vehicle file setting that is likely wrong.
     pub setting: Option<SettingDoubt>,
-    /// Whether the heads' pitch and yaw on their mounts are not verified yet.
+    /// Whether the pitch and yaw of the heads on their mounts are not verified yet.
     pub unverified_mounts: bool,
     /// Time for which the vehicle should stay stationary to find the gyros' bias, s.
     pub stand_s: u32,
@@ -58,9 +58,10 @@ pub enum Outcome {
         /// Arc length of the end point, m.
         arc_m: f64,
     },
-    /// No sample, for this reason. The aim is the point at which the beam meets the design profile; `None` if unknown.
+    /// No sample, for the given reason. The aim is the point at which the beam meets the design profile; `None` if
+    /// unknown.
     Lost(Loss, Option<WallPoint>),
-    /// A return that can't be placed, with the reason for the missing fix.
+    /// A return that can't be placed because there is no fix, with the reason for that.
     Unplaced(NoFix),
 }
 
@@ -137,7 +138,7 @@ pub enum Placement {
 /// A georeferenced ping or an advice update, and its position among the tick's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedItem {
-    /// Index of the ping's reading. For an advice update: index of the first reading after it.
+    /// Index of the ping's reading. For an advice update, it is the index of the first reading after the update.
     pub event: usize,
     /// The ping or update.
     pub placement: Placement,
@@ -150,7 +151,7 @@ pub struct Standing {
     pub metres: Metres,
     /// Chainage at which the first missed stretch begins, m; `None` if no stretch is missed.
     pub missed_from_m: Option<f64>,
-    /// Last judged stretch without a verdict.
+    /// Most recently judged stretch that neither passes nor fails.
     pub unsure: Option<Stretch>,
     /// Whether every part of the wall visible to the heads here has the verdict pass.
     pub passed: bool,

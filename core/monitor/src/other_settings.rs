@@ -1,6 +1,6 @@
 //! Predicted effect of alternative head settings: a finer angular step or a longer range.
 //!
-//! With either setting, a turn takes longer. The prediction of a section's hole allows for the longer turn.
+//! Both settings make a turn take longer. The predicted hole of a section allows for the longer turn.
 
 use bevy_ecs::prelude::World;
 
@@ -32,8 +32,8 @@ impl HeadSpecification {
     pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
         let [_, own_m] = self.spec.range_m;
         let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
-        // The live advice uses the same number of rays. The mode in the advice and the mode found here appear on the
-        // same screen, so they must agree.
+        // The live advice uses the same number of rays. The mode in the advice and this mode appear on the same screen,
+        // so they must agree.
         let rays = Looks::default().ring;
         let ring = self.ring_in_the_middle(profile, rays).unwrap_or_default();
         let finer = self.finer(target_m, |step_rad| ring.largest_step_m(Ring::stride(step_rad, rays)));
@@ -73,7 +73,7 @@ impl HeadSpecification {
 /// Shortest range setting that reaches all wall from the tunnel's centre, m, and the head's scan modes at
 /// that setting.
 ///
-/// The setting is the head's own or a longer one. `None` if no setting reaches all wall.
+/// The setting is the head's own setting or a longer one. `None` if no setting reaches all wall.
 fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(f64, Vec<HeadMode>)> {
     let profile = &mission.profile;
     let wall_m = profile.farthest_m(profile.reference());
@@ -86,8 +86,8 @@ fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(
     longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
-/// Effect of the alternative settings: ratios of a head's new angular step and turn period to the present ones.
-/// The head with the largest ratio decides for the vehicle.
+/// Effect of the alternative settings: ratio of a head's new angular step to the present one, and ratio of the turn
+/// periods. The head with the largest ratio decides for the vehicle.
 pub(super) fn of_heads(world: &mut World, profile: &Profile, target_m: f64) -> OtherSettings {
     let mut heads = world.query::<&HeadSpecification>();
     let farthest_m = profile.farthest_m(profile.reference());
@@ -107,8 +107,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    // The step along the wall assumes a perpendicular beam here. Coverage tests with the section's samples whether
-    // the mode is also fine enough in corners.
+    // A perpendicular beam is assumed for the step along the wall. The section's samples later show whether the mode is
+    // also fine enough in corners.
     let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),
@@ -153,7 +153,7 @@ mod tests {
         assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
         let close = at(0.1);
         assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
-        // No mode meets the target, so the mode with the finest step is chosen.
+        // No mode meets the target, so the search returns the mode with the finest step.
         assert_eq!(at(0.01), close);
         let finest = of_head(&head(0.6, None), 6.0, 0.2);
         assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));

@@ -1,4 +1,4 @@
-//! Verdicts that the samples of a dive would have for other targets and section lengths.
+//! Verdicts of a dive's sections for other targets and section lengths.
 
 use headrace_coverage::Verdict;
 use serde::Serialize;
@@ -12,20 +12,20 @@ pub struct OtherTargetReport {
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Length of the sections that would pass.
+    /// Length of the sections that pass for this target, m.
     pub pass_m: f64,
-    /// Length of the sections that would fail.
+    /// Length of the sections that fail for this target, m.
     pub fail_m: f64,
-    /// Length of the sections that would neither pass nor fail, although no more samples will land.
+    /// Length of the sections that neither pass nor fail for this target, although no more samples will land, m.
     pub cannot_say_m: f64,
-    /// Length of the sections that would still be open.
+    /// Length of the sections that are still open for this target, m.
     pub open_m: f64,
-    /// Length of the sections where some heads would not have been.
+    /// Length of the sections of this length where some heads have not been, m.
     pub not_inspected_m: f64,
 }
 
 impl Loop {
-    /// Verdicts that the sections would have at present for another target, as section index and verdict.
+    /// Returns the sections' present verdicts for another target, as section index and verdict.
     ///
     /// Only sections whose hole has been measured are included.
     pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {

@@ -1,6 +1,6 @@
-//! The placer: the world that converts packets to readings, fixes and georeferenced pings.
+//! The placer: the ECS world that converts packets to readings, fixes and georeferenced pings.
 //!
-//! Its entities are the vehicle and its sensors. It uses no results of the loop's other parts.
+//! Its entities are the vehicle and its sensors. It uses no results of the adviser or the surveyor.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -45,7 +45,7 @@ pub struct Placer {
 
 /// Results of the placer for a tick. The other parts of the loop read no other data of the placer.
 ///
-/// The lists are reused from tick to tick. In a default value they grow as needed.
+/// The lists are reused from tick to tick. The lists of a default value grow as needed.
 #[derive(Debug, Default)]
 pub struct Placed {
     /// Packets of the tick, in the order of consumption.
@@ -58,7 +58,7 @@ pub struct Placed {
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
     pub(super) commands: Commands,
-    /// Fix of the vehicle at the last advice update.
+    /// Fix of the vehicle at the latest advice update.
     pub vehicle: VehicleState,
     /// Traffic of each sensor so far, in the order of sources.
     pub health: Vec<SensorHealth>,
@@ -104,7 +104,7 @@ impl Placed {
         self.commands.0.clear();
     }
 
-    /// Returns the placer's results for an empty tick that follows this tick.
+    /// Returns the placer's results for an empty tick after this one.
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut poses = self.poses.clone();
         poses.next_tick();
@@ -139,7 +139,7 @@ impl Placer {
             poses.0.keep();
         }
         part.insert_state("poses", poses);
-        // During a tick, these lists are swapped with those of `Placed`.
+        // During a tick, these lists are swapped with the lists of `Placed`.
         part.insert_resource(Inbox::default());
         part.insert_resource(Events::default());
         part.insert_resource(UnreadPackets::default());
@@ -301,7 +301,7 @@ mod tests {
     use crate::fixtures::armed;
     use crate::resources::{Plan, TunnelDesign};
 
-    /// The types listed here are constant after arming, or are set anew in each tick, so snapshots omit them.
+    /// The types listed in this test are constant after arming, or are set anew in each tick, so snapshots omit them.
     #[test]
     fn snapshots_contain_all_state_of_the_placer() {
         let (placer, _) = armed().split().unwrap();

@@ -12,8 +12,8 @@ const HEADER_BYTES: usize = 20;
 /// Maximum packet length, bytes.
 pub const MAX_PACKET_BYTES: usize = 4096;
 
-/// Value of `order` in live packets. In replayed packets `order` is the order of consumption recorded in the
-/// log.
+/// Value of `order` in live packets. In a replayed packet, `order` is the packet's place in the recorded order of
+/// consumption.
 pub const NO_ORDER: u64 = u64::MAX;
 
 /// Reason for which a packet was not written.
@@ -90,13 +90,13 @@ impl<R: ByteProducer> Port<R> {
         time.copy_from_slice(&received.0.to_le_bytes());
         place.copy_from_slice(&order.to_le_bytes());
         length.copy_from_slice(&len.to_le_bytes());
-        // The reader waits until the whole packet is present, so the two writes need no synchronisation.
+        // The reader waits until the whole packet is present, so header and bytes may be written separately.
         self.ring.push(&header);
         self.ring.push(bytes);
         Ok(())
     }
 
-    /// Whether a packet of `len` bytes would fit into the ring now.
+    /// Whether a packet of `len` bytes fits into the ring now.
     pub fn has_room(&self, len: usize) -> bool {
         self.ring.vacant() >= HEADER_BYTES + len
     }
@@ -170,7 +170,7 @@ mod model_tests {
     use super::*;
     use crate::byte_ring::model::{Hasty, ModelConsumer, explore, packets_by};
 
-    /// Lengths of two test packets, bytes. The ring holds one packet and the header of the other.
+    /// Lengths of two test packets, bytes. The ring has room for one packet and the header of the other.
     const LENGTHS: [usize; 2] = [3, 5];
     const CAPACITY: usize = 2 * HEADER_BYTES + 5;
 
@@ -195,8 +195,8 @@ mod model_tests {
         })
     }
 
-    /// In every interleaving the reader reads packets whole and in order. A packet is either read or was
-    /// refused by the ring.
+    /// In every interleaving the reader gets packets whole and in order. A packet is either read or was refused by the
+    /// ring.
     #[test]
     fn packets_are_read_whole_or_refused() {
         let executions = explored("header then body in the loop's ring", |consumer| consumer);

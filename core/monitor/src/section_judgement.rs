@@ -11,7 +11,7 @@ use headrace_sampling::head::HeadSet;
 pub struct SectionJudgement {
     /// Time of the judgement.
     pub at: MonoNs,
-    /// Chainage of the section's start, as a multiple of the section length.
+    /// Number of the section: the chainage of its start divided by the section length.
     pub index: i64,
     /// Change of the section's state by the judgement, such as a raised flag.
     pub change: Judgement,
@@ -57,7 +57,7 @@ impl SectionJudgement {
     /// Reads a judgement from the words of its record; `None` if the words are too few, or name an unknown change or
     /// verdict.
     ///
-    /// Records of earlier program versions, with fewer figures about the cause, are accepted.
+    /// Also accepts records of earlier program versions, which have fewer figures about the cause.
     pub fn read(words: &[u64]) -> Option<Self> {
         let ([at, index, change, verdict, hole, hole_sd, cause, hole_x, hole_arc], figures) =
             words.split_first_chunk()?;

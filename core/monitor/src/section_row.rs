@@ -11,7 +11,7 @@ use headrace_geometry::tunnel::Profile;
 #[expect(clippy::struct_excessive_bools, reason = "the flags are independent of one another")]
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SectionRow {
-    /// Chainage of the section's start, as a multiple of the section length.
+    /// Number of the section: the chainage of its start divided by the section length.
     #[serde(skip)]
     pub index: i64,
     /// Beginning of the section, m.
@@ -24,7 +24,7 @@ pub struct SectionRow {
     pub hole_least_m: Option<f64>,
     /// Upper bound of the hole's diameter, m; `None` if unbounded.
     pub hole_most_m: Option<f64>,
-    /// Whether there are samples around the hole. If not, the diameter is at least `hole_m`.
+    /// Whether there are samples around the hole. Without them, the diameter is at least `hole_m`.
     pub hole_bounded: bool,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
@@ -52,15 +52,14 @@ pub struct SectionRow {
     /// Verdict: `pass`, `fail`, `cannot_say` or `open`.
     #[serde(serialize_with = "verdict_word")]
     pub verdict: Verdict,
-    /// Whether no further sample on the present course can change the verdict, or the hole of a fail.
+    /// Whether no further sample on the present course can change the verdict or, for a fail, the hole.
     #[serde(skip)]
     pub settled: bool,
-    /// Whether the section is open although driving on won't change it.
+    /// Whether the section is open although driving on does not change it.
     ///
-    /// The vehicle began or turned back there, so some heads have not been in the section.
+    /// In such a section some heads have not been, because the vehicle began or turned back there.
     pub not_inspected: bool,
-    /// Reason for `cannot_say`. For a section with `not_inspected`, the reason is `NotInspected`, which the
-    /// report omits.
+    /// Reason for `cannot_say`. A section with `not_inspected` has the reason `NotInspected`, which the report omits.
     #[serde(serialize_with = "reason_word")]
     pub cannot_say: Option<Unsure>,
     /// Evidence for the cause of a fail; `None` unless the verdict is `fail`.
@@ -88,7 +87,7 @@ pub struct DeviationReport {
     pub outmost_m: f64,
     /// Ratio of the cross-section area to the design's; `None` without sweeps.
     pub area_ratio: Option<f64>,
-    /// Whether most samples deviate from the design profile by more than the contradiction limit, and no other head
+    /// Whether most samples deviate from the design profile by more than the contradiction limit, while no other head
     /// measured the wall at the same place.
     pub contradicts: bool,
 }

@@ -4,7 +4,7 @@ use bevy_ecs::schedule::SystemSet;
 
 /// A stage of a world. Its systems see all results of the world's earlier stages.
 ///
-/// A stage doesn't run in a tick without input for it.
+/// In a tick without input for a stage, the stage doesn't run.
 pub trait Stage: SystemSet + Copy + PartialEq {
     /// All stages of the world, in the order in which they run.
     const ALL: &'static [Self];
@@ -27,9 +27,9 @@ impl Stage for PlaceStage {
 
 /// Stages of the surveyor: from georeferenced pings to verdicts.
 ///
-/// Verdicts decide which sections are due for judging next. The stages from [`Self::Walk`] to
-/// [`Self::Report`] therefore run once per stop. A stop is a ping that makes sections due, or an advice
-/// update. [`Self::Classify`] runs once per tick with pings or updates, [`Self::Surveyed`] once per tick.
+/// Verdicts decide which sections are due for judging next. The surveyor therefore stops at each ping that makes
+/// sections due, and at each advice update. The stages from [`Self::Walk`] to [`Self::Report`] run once per stop.
+/// [`Self::Classify`] runs once per tick with pings or updates, [`Self::Surveyed`] once per tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum SurveyStage {
     /// Decides which returns are wall.

@@ -31,11 +31,11 @@ pub use hysteresis::Hysteresis;
 pub use ring_cache::Looks;
 pub use search::SPEED_MARGIN;
 
-/// Number of advice updates after which the alternatives are recomputed.
+/// Number of advice updates after which the largest speeds in other modes are recomputed.
 const ALTERNATIVES_EVERY: u32 = 25;
 /// Number of iterations that solve for the speed and the position margin, which depend on each other.
 const FALLS: u32 = 3;
-/// At speeds below this, the direction of travel is unclear and the previous direction is used, m/s.
+/// Speed below which the direction of travel is unclear, m/s. The previous direction is then used.
 const UNDER_WAY_MPS: f64 = 0.02;
 /// Maximum number of stored stretches of wall outside a head's range limits.
 const OUT_OF_REACH: usize = 16;
@@ -54,9 +54,9 @@ struct Fastest {
 struct Chosen {
     /// Advised speed, m/s; `None` if no speed meets the target.
     advised_mps: Option<f64>,
-    /// Lower end of the interval of speeds that ends at the advised speed, m/s.
+    /// Lower end of the interval of suitable speeds whose upper end is the advised speed, m/s.
     from_mps: f64,
-    /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
+    /// Speed that meets the target and is nearest to the present speed, m/s.
     nearest_mps: Option<f64>,
     /// Whether the advised speed meets the target only if passes from several swings of the vehicle are taken together.
     by_several_swings: bool,
@@ -73,12 +73,12 @@ pub struct Task {
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
-    /// Number of the rays that find the wall for the advice, and the vehicle's movement after which they are cast
+    /// Number of rays with which the advice finds the wall, and the vehicle's movement after which the rays are cast
     /// again.
     pub looks: Looks,
 }
 
-/// Computes speed advice; caches the rings of the heads until the vehicle moves.
+/// Computes speed advice. Caches the rays from the heads to the wall until the vehicle moves.
 #[derive(Debug, Clone)]
 pub struct Advisor {
     profile: Profile,
@@ -89,14 +89,14 @@ pub struct Advisor {
     /// modes.
     now: Strips,
     modes: Strips,
-    /// Largest distance between neighbouring samples of a turn, in each mode, at the tunnel's centre, m.
+    /// Largest distance between neighbouring samples of a turn, in each mode, for a vehicle at the tunnel's centre, m.
     centred_m: Vec<f64>,
     parallax_rad: f64,
     /// Number of rays of the ring per angular step, for each head that turns.
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring of rays is checked first at the next update.
     next: usize,
-    /// Number of advice updates until the alternatives are recomputed. `alternatives` are the current ones.
+    /// Number of advice updates until the alternative modes are recomputed. `alternatives` holds the latest result.
     until_alternatives: u32,
     alternatives: [Option<Alternative>; MAX_MODES],
     anew: Option<Anew>,
@@ -104,9 +104,9 @@ pub struct Advisor {
     astern: bool,
     /// Largest speed that met the target in the previous update.
     last_mps: Option<f64>,
-    /// Distance that the vehicle may move before the heads' rings are recast, m.
+    /// Distance that the vehicle may move before the heads' rays are cast again, m.
     still_m: f64,
-    /// Speed at which passes of several swings together meet the target, m/s; zero if there is none.
+    /// Speed at which passes from several swings of the vehicle together meet the target, m/s; zero if there is none.
     swung_mps: f64,
 }
 
@@ -166,7 +166,8 @@ impl Advisor {
         advisor
     }
 
-    /// Casts all rings from the centre, so that later casts don't allocate, and marks the rings as outdated.
+    /// Casts the rings of rays once from the tunnel's centre, so that later casts don't allocate. Marks the rings as
+    /// outdated.
     fn look_from_the_middle(&mut self) {
         let [y, z] = self.profile.reference();
         let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -200,9 +201,9 @@ impl Advisor {
 
     /// Returns the largest speed at which the predicted T_max stays within the target.
     ///
-    /// The function inverts Eq. 16 with measured values: the turn period, step, number and phases of the heads, the
-    /// wall hidden by the vehicle or outside the range limits, position, attitude and swing. The phases are propagated
-    /// to each tested speed. `left_s` is the remaining time, if known.
+    /// The function inverts Eq. 16 of Jorge et al. 2021 with measured values: the turn period, step, number and phases
+    /// of the heads, the wall hidden by the vehicle or outside the range limits, position, attitude and swing. The
+    /// phases are propagated to each tested speed. `left_s` is the remaining time, if known.
     ///
     /// Heads that are apart along the hull keep their phases only in some intervals of speed. The result is the upper
     /// end of the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
@@ -226,7 +227,7 @@ impl Advisor {
         advice
     }
 
-    /// Returns the advice for a vehicle at `pose`, from which the heads' rings have been cast.
+    /// Returns the advice for a vehicle at `pose`, from which the heads' rings of rays have been cast.
     fn advise_at(
         &mut self,
         pose: &Pose,
@@ -255,8 +256,8 @@ impl Advisor {
         self.still_m = self.still_m_for(&fastest, &going);
         let mut predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         if chosen.by_several_swings {
-            // Passes of later swings fill the gaps of this turn until the target is met. At a higher speed, the gaps
-            // that stay are larger in proportion.
+            // Passes of later swings fill the gaps of this turn until the target is met. At a higher speed, the
+            // remaining gaps are larger in proportion.
             let over = (situation.speed_mps.abs() / self.swung_mps).max(1.0);
             predicted_t_m = predicted_t_m.min(sure_m * over);
         }
@@ -353,7 +354,7 @@ impl Advisor {
         speed_mps * (1.0 - SPEED_MARGIN)
     }
 
-    /// Returns the motion of the vehicle and its beams for the prediction of spacing.
+    /// Returns the motion of the vehicle and its beams, from which the spacing is predicted.
     fn going(&self, pose: &Pose, situation: &Situation, phasing: &Phasing, swing: Swing<'_>) -> Going {
         let periods_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
         let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
@@ -367,10 +368,10 @@ impl Advisor {
         }
     }
 
-    /// Updates the heads' rings for the vehicle's pose; returns `false` if no turning head has a ring.
+    /// Updates the heads' rings of rays for the vehicle's pose; returns `false` if no turning head has a ring.
     ///
-    /// A head's ring is outdated once the vehicle has moved. If several rings are outdated, each call recasts only one,
-    /// because the vehicle moves little between calls.
+    /// A head's ring of rays is outdated once the vehicle has moved. If several rings are outdated, each call recasts
+    /// only one, because the vehicle moves little between calls.
     fn look(&mut self, situation: &Situation, pose: &Pose) -> bool {
         let count = self.heads.len().max(1);
         let present = |number: usize| situation.heads.get(number).is_some_and(Option::is_some);
@@ -409,7 +410,7 @@ impl Advisor {
         }
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
-        // The distances between soundings are kept with the ring, because most rings are unchanged since the previous
+        // The distances between samples are kept with the ring, because most rings are unchanged since the previous
         // advice.
         for (head, stride) in self.heads.iter_mut().zip(self.strides) {
             if let Some(stride) = stride {
@@ -420,7 +421,7 @@ impl Advisor {
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }
 
-    /// Returns the inputs of the decision whether a speed meets a target with the present phases.
+    /// Returns the inputs for deciding whether a speed meets a target with the present phases of the heads.
     fn driving<'a>(
         &'a self,
         phasing: &'a Phasing,
@@ -457,8 +458,8 @@ impl Advisor {
         let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
-            // At another speed, the heads have other phases and less swing between their passes, so this error need not
-            // hold there.
+            // This error may not apply at another speed, where the heads have other phases and less swing between their
+            // passes.
             Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
             Err(why) => return Err(*why),
         };
@@ -470,16 +471,16 @@ impl Advisor {
         Ok(Fastest { speed_mps, advised_mps: driving.kept_back_mps(speed_mps), t_y_m })
     }
 
-    /// Returns the distance that the vehicle may move before the heads' rings are recast, m.
+    /// Returns the distance that the vehicle may move before the heads' rays are cast again, m.
     fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
         if let Some(anew_m) = self.task.looks.anew_m {
             return anew_m;
         }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // A vehicle that swings too much for any speed also does so at a slightly different position.
+            // If the vehicle swings too much at any speed, a slightly different position does not help.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
-            // The distance between samples that limits the speed is unknown.
+            // The distance between samples that limits the speed is unknown, so the target stands in for it.
             Err(_) => (self.task.target.max_hole_m, 0.0),
         };
         ring_cache::still_m(
@@ -538,9 +539,9 @@ impl Advisor {
             && (passes.turn_s() - period_s).abs() < SAME * period_s
     }
 
-    /// Returns the largest speed without margins, with the first margin, with the first two, and so on.
+    /// Returns the largest speed without margins, then with one margin, with two margins, and so on.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
-        /// Number of speeds in the margins that do not allow for swing.
+        /// Number of speeds, at the front of the list, that do not allow for swing.
         const BEFORE_SWING: usize = 3;
         let target_m = self.task.target.max_hole_m;
         let known = RemainingTarget { pass_error_m: 0.0, ..sure };
@@ -560,7 +561,7 @@ impl Advisor {
             fastest(lossy, going, sure),
         ];
         let mut advised = speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN));
-        // Like the advised speed, the speeds that allow for swing may need the passes of several swings together.
+        // The speeds that allow for swing may need the passes of several swings together, like the advised speed.
         for speed_mps in advised.iter_mut().skip(BEFORE_SWING) {
             *speed_mps = speed_mps.max(self.swung_mps);
         }
@@ -638,8 +639,8 @@ impl Advisor {
 
     /// Returns the first remedy that makes the target possible without further remedies.
     ///
-    /// The order is: a steady heading, then the tunnel's centre if samples of a turn are close enough there, then the
-    /// fastest mode.
+    /// The remedies are tried in this order: a steady heading, then the tunnel's centre if samples of a turn are close
+    /// enough there, then the fastest mode.
     fn remedy(
         &self,
         situation: &Situation,

@@ -119,7 +119,7 @@ pub enum SamplingError {
 impl SamplingError {
     /// Returns the error with the configured target, m.
     ///
-    /// The error may name a smaller target, which left a margin for position errors.
+    /// The error may name the target minus a margin for position errors.
     #[must_use]
     pub(crate) fn of_target(mut self, asked_m: f64) -> Self {
         if let Self::UnseenStrip { target_m, .. }

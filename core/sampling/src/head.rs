@@ -8,7 +8,7 @@ use headrace_geometry::time::DurNs;
 
 /// Duration without a return after which a head counts as silent.
 ///
-/// Headrace does not wait for a silent head, and leaves it out of the advice.
+/// Headrace stops waiting for the returns of a silent head, and leaves the head out of the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
 /// Tolerance, in steps, with which a turn must be a whole number of steps. It is needed because steps are given in
@@ -53,7 +53,7 @@ impl Turn {
         self.period_s
     }
 
-    /// n: pings per turn. Source: Eq. 3.
+    /// n: pings per turn. Source: Jorge et al. 2021, Eq. 3.
     pub fn steps(&self) -> u32 {
         self.steps
     }
@@ -63,7 +63,7 @@ impl Turn {
         self.period_s / f64::from(self.steps)
     }
 
-    /// omega: angle turned per second, rad/s. Source: Eq. 4.
+    /// omega: angle turned per second, rad/s. Source: Jorge et al. 2021, Eq. 4.
     pub fn rate_radps(&self) -> f64 {
         TAU / self.period_s
     }

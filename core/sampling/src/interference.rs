@@ -24,8 +24,8 @@ pub struct Exposure {
 
 /// Returns, for each pair of scheduled heads, the time for which they can receive each other's pings at `pose`.
 ///
-/// Pairs that never receive each other's pings are omitted. Heads at the same position are an idealisation and count as
-/// such a pair.
+/// Pairs that never receive each other's pings are omitted. So are pairs at the same position, which is an
+/// idealisation.
 /// Errors: a head outside the profile, or a beam along the tunnel.
 pub fn exposures(
     heads: &[HeadSpec],

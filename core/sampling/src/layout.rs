@@ -254,7 +254,7 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     let least_rad = if sector.reversed { math::wrap(TAU - least_rad - size_rad, TAU) } else { least_rad };
     let begin = InSector { angle_rad: 0.0, growing: true };
     let start = in_step(begin, sector, turn_s, speed_mps)?;
-    // The angle was wrapped to a turn, so the start and the least angle may differ by an extra whole turn.
+    // The angle was wrapped to one turn, so it may differ from the sector's start by an extra whole turn.
     let along_rad = math::wrap(start.angle_rad - least_rad + ROUNDING_RAD, TAU) - ROUNDING_RAD;
     Ok(HeadProgram {
         start_rad: least_rad + along_rad,
@@ -303,7 +303,7 @@ pub fn hull_rule(apart_m: f64, heads: usize, speed_mps: f64, turn_s: f64) -> Res
 ///
 /// The distances are measured along the tunnel. `pitch_m` is T_x of one continuously rotating head (v T), `heads` the
 /// number s, `share` the position in the sector from 0 to 1. The sum of the distances is 2 T_x / s everywhere. In the
-/// middle of the sector, the two are equal; at its ends, one of them is zero.
+/// middle of the sector, the two distances are equal; at its ends, one of them is zero.
 /// Errors: fewer than two heads, a pitch below zero, a share outside 0 to 1.
 /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
 pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2], SamplingError> {
@@ -326,8 +326,8 @@ pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Speed, distance and turn period each meet the rule x = q v T / s together with the two others as given. q is the
-    /// nearest whole number.
+    /// The rule is x = q v T / s, with q rounded to a whole number. Each of speed, distance and turn period meets the
+    /// rule if the two others are as given.
     #[test]
     fn each_hull_rule_figure_satisfies_the_rule_with_the_other_inputs() {
         for (apart_m, heads, speed_mps, turn_s, q) in

@@ -1,9 +1,9 @@
 //! Random loss of sonar returns, and the number of passes over a place that makes up for it.
 //!
-//! The model: along a turn, a head loses the returns of several successive pings at a time. After Gilbert (1960), the
-//! model has two parameters: the share of pings that are lost, and the probability that the ping after a lost ping is
-//! lost too. Passes lose pings independently of each other. A run of lost pings widens the largest circle without
-//! samples between two passes. If a run is as wide as the target, the pass counts as missing at that place.
+//! The model assumes that a head loses the returns of several successive pings of a turn at a time. After Gilbert
+//! (1960), the model has two parameters: the share of pings that are lost, and the probability that the ping after a
+//! lost ping is lost too. Passes lose pings independently of each other. A run of lost pings widens the largest circle
+//! without samples between two passes. If a run is as wide as the target, the pass counts as missing at that place.
 //!
 //! A return that is lost at the same angle in every turn is not lost by chance, and a slower speed does not restore
 //! it. The caller excludes such losses.
@@ -17,13 +17,14 @@ use headrace_geometry::math;
 ///
 /// At most the share [`MAY_FAIL`] of all stretches may miss the target because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches of wall that may miss the target because of lost returns. The other 95 in 100 stretches meet it.
+/// Share of stretches of wall that may miss the target because of lost returns. The other 95 % of the stretches meet
+/// it.
 const MAY_FAIL: f64 = 0.05;
 /// Maximum number of passes required over a place.
 ///
-/// More passes would take too long in practice. Instead, the heads must lose fewer returns.
+/// More passes take too long in practice. Instead, the heads must lose fewer returns.
 pub const MOST_PASSES: f64 = 10.0;
-/// If chance makes a hole with a lower probability than this, the hole does not count as caused by chance.
+/// A hole that chance makes with a lower probability than this does not count as caused by chance.
 const HARDLY: f64 = 1e-3;
 /// Share of a hole's diameter, along and around the tunnel, that lost passes and pings must cover.
 const INNER: f64 = 0.7;
@@ -113,8 +114,8 @@ impl Sampled {
         heads.sort_unstable_by(|a, b| b.chance_of_run(pings).total_cmp(&a.chance_of_run(pings)));
         let along_m = math::sqrt(lattice_m2);
         let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
-        // With more passes, there are more places at which passes may fail together. So a second estimate uses the
-        // first number of passes.
+        // With more passes, there are more places at which passes may fail together. The number is therefore estimated
+        // a second time, with the places of the first estimate.
         let once = self.passes_for(places, along_m, heads);
         let passes = self.passes_for(places * once, along_m, heads);
         debug_assert!(

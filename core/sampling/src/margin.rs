@@ -12,16 +12,16 @@ use serde::{Deserialize, Serialize};
 const NOTHING_M: f64 = 0.002;
 /// The margin for position errors leaves at least this share of the allowed distance between passes.
 ///
-/// A larger margin would not help, because no speed compensates for a lost position.
+/// A larger margin does not help, because no speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
 /// Maximum share of the target that the margin for position errors takes.
 const MOST_SHARE: f64 = 0.2;
 /// Share of the travel time from the foremost to the rearmost head that counts towards the time between passes.
 ///
-/// The share is below 1, because only some neighbouring passes are by these two heads, and holes between their passes
-/// grow by less than the heads' separation. With this share, 93 % of the errors of a hole's size D are within two
-/// standard deviations, in the dives of `tests/tests/navigation/fusion.rs` with four heads. In similar dives, these are
-/// 80 % of the errors with a share of 0, and 99 % with a share of 1.
+/// The share is below 1 for two reasons. Only some neighbouring passes are by the foremost and the rearmost head, and
+/// holes between their passes grow by less than the heads' separation. With this share, 93 % of the errors of a hole's
+/// size D are within two standard deviations, in the dives of `tests/tests/navigation/fusion.rs` with four heads. In
+/// similar dives, it is 80 % of the errors with a share of 0, and 99 % with a share of 1.
 pub const APART_SHARE: f64 = 0.4;
 /// Speed below which a vehicle counts as at rest, m/s.
 const SLOW_MPS: f64 = 0.01;
@@ -43,7 +43,7 @@ pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share
 /// The margin is the confidence times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
 /// distance between neighbouring samples of one turn. The margin is continuous in all inputs, and at most a fifth of
 /// the target. With the margin, the allowed distance between passes is at least three fifths of the distance allowed
-/// without margin. A larger margin would slow the vehicle by more than it is worth.
+/// without margin. A larger margin costs more speed than it is worth.
 pub fn position_margin_m(target: Target, pass_error_m: f64, t_y_m: f64) -> f64 {
     let target_m = target.max_hole_m;
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
@@ -163,7 +163,7 @@ impl Margin {
     }
 }
 
-/// Largest speeds without margins, with the first margin, with the first two, and so on, m/s; they never increase.
+/// Largest speeds without margins, with one margin, with two margins, and so on, m/s; they never increase.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
     /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
@@ -240,7 +240,7 @@ mod tests {
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
         assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
-        // If the distance between samples of one turn nearly equals the target, the margin reduces the allowed
+        // Here the distance between samples of one turn nearly equals the target. The margin then reduces the allowed
         // distance between passes to three fifths of the distance without margin.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);

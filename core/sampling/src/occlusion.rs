@@ -49,7 +49,8 @@ impl AngleRange {
         self.from_rad + self.size_rad / 2.0
     }
 
-    /// Returns this range as angles in the body frame, as a head mounted straight would measure them, for pictures.
+    /// Returns this range as angles in the body frame, for pictures. A head that is mounted straight measures these
+    /// angles.
     ///
     /// 0 is down, and angles grow to the vehicle's left. The angles of a head that faces aft grow in the opposite
     /// sense.
@@ -84,7 +85,7 @@ impl Obstacle {
 
     /// Whether a point is inside a box.
     ///
-    /// Always false for cylinders, since these represent heads, and heads may share a position.
+    /// Always false for cylinders, because these represent heads, and heads may share a position.
     pub fn holds(&self, place: Vec3<Body>) -> bool {
         match self {
             Self::Box { least, most } => {

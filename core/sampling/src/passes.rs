@@ -65,7 +65,7 @@ pub struct Passes {
     /// Turn period of each head, seconds.
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
-    /// Largest error of pass times, seconds, because side-by-side heads see a place at different angles.
+    /// Largest error of pass times, seconds. It arises because side-by-side heads see a place at different angles.
     parallax_s: f64,
     /// Whether the vehicle is so slow that phases along the tunnel have no meaning.
     at_rest: bool,
@@ -83,7 +83,7 @@ enum Pattern {
     Sectors {
         /// The longest period of a sweep there and back, seconds.
         sweep_s: f64,
-        /// Unevenness of two heads' passes where their sectors meet, as in [`Passes::uneven_ends`].
+        /// Unevenness of two heads' passes at the end that their sectors share, as in [`Passes::uneven_ends`].
         uneven: f64,
     },
     /// Heads turn in opposite senses or at different rates.
@@ -233,7 +233,7 @@ impl Phasing {
 
     /// Returns the first pass of each head from now on.
     ///
-    /// Empty if the heads don't all turn continuously, in one sense and at one rate.
+    /// Empty unless all heads turn continuously, in one sense and at one rate.
     pub fn first_passes(&self) -> impl Iterator<Item = HeadPasses> {
         let phases = if let Pattern::Turning(phases) = &self.pattern { Some(phases) } else { None };
         phases.into_iter().flat_map(|phases| {
@@ -378,7 +378,7 @@ impl Passes {
 
     /// Creates passes of continuously rotating heads, evenly phased in order of their numbers.
     ///
-    /// Heads with equal turn periods have these passes after a start by a schedule for the present speed. Heads with
+    /// Heads with equal turn periods pass like this if a schedule has started them for the present speed. Heads with
     /// unequal turn periods run out of step, and have no reliable phases. `turn_s` returns the turn period of a head,
     /// seconds.
     /// Errors: no head.
@@ -396,7 +396,7 @@ impl Passes {
         Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Creates passes of heads in sectors, started by a schedule for the present speed.
+    /// Creates the passes of heads that sweep sectors, as if started by a schedule for the present speed.
     ///
     /// `sweep_s` is the period of a sweep there and back, s.
     ///
@@ -455,8 +455,8 @@ impl Passes {
         self.turns_s.into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns these passes as they would be with evenly phased heads and without parallax. Heads that are not phased
-    /// with each other stay unchanged.
+    /// Returns these passes with evenly phased heads and without parallax. Heads that are not phased with each other
+    /// stay unchanged.
     #[must_use]
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
@@ -467,7 +467,7 @@ impl Passes {
         even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
     }
 
-    /// Returns the longest time between passes of all heads if their phases were even, seconds; zero without a head.
+    /// Returns the longest time between passes of all heads with even phases, seconds; zero without a head.
     pub fn even_gap_s(&self) -> f64 {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
@@ -479,7 +479,7 @@ impl Passes {
     /// Returns the phase error of each head relative to the first head that turns, radians.
     ///
     /// The error is an angle of the head's turn, in [-pi, pi). If it is positive, the head passes the wall later, and
-    /// farther ahead, than it should by the schedule for `scheduled` heads. `None` for an absent head, for heads that
+    /// farther ahead, than the schedule for `scheduled` heads requires. `None` for an absent head, for heads that
     /// aren't phased with each other, and at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {

@@ -1,6 +1,6 @@
 //! Points where a head's beams meet the wall, by ray casting for any profile and pose.
 //!
-//! The vehicle is at rest: the distance that it travels between pings is neglected.
+//! The distance that the vehicle travels between two pings is neglected.
 
 use serde::{Deserialize, Serialize};
 
@@ -67,7 +67,7 @@ impl<'a> Standing<'a> {
         self.sounding_along(angle_rad, head_direction(angle_rad))
     }
 
-    /// Returns the same as [`Standing::sounding`] for a beam whose direction is already known.
+    /// Returns the same as [`Standing::sounding`], for a beam whose direction is already known.
     fn sounding_along(&self, angle_rad: f64, beam: Vec3<Sensor>) -> Result<Sounding, SamplingError> {
         let direction = self.turn * beam;
         let hit = self.hit(direction);
@@ -116,7 +116,7 @@ impl Sounding {
 
     /// Distance to another sounding of the same head on the unrolled wall, m.
     ///
-    /// The distance follows the shorter way around the perimeter, as the sizes of holidays do.
+    /// The distance follows the shorter way around the perimeter, like the diameter of a hole.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)

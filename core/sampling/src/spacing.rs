@@ -17,7 +17,7 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
 ///
 /// `None` if `t_y_m` alone reaches the target, or if the times aren't positive. `pass_gap_s` is the time between passes
 /// (T_rev / s for s evenly interleaved heads), `ping_period_s` the time between pings (T_s).
-/// Source: Eq. 16 solved for v (docs/decisions/0005-advice-and-plan.md).
+/// Source: Jorge et al. 2021, Eq. 16, solved for v (docs/decisions/0005-advice-and-plan.md).
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
     let time_s = pass_gap_s + ping_period_s;
     along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
@@ -59,27 +59,27 @@ impl Spiral {
         self.speed_mps * self.turn.ping_period_s()
     }
 
-    /// T_x of one head, m: the distance travelled in a turn. Source: Eq. 12.
+    /// T_x of one head, m: the distance travelled in a turn. Source: Jorge et al. 2021, Eq. 12.
     pub fn pitch_m(&self) -> f64 {
         self.speed_mps * self.turn.period_s()
     }
 
     /// Distance along the tunnel between passes over a place, m, for s heads: T_x / s in phase shift, at most 2 T_x / s
     /// in sectors.
-    /// Source: §5.1 and §5.2.
+    /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn t_x_m(&self) -> f64 {
         self.pitch_m() / self.passes_per_turn
     }
 
     /// T_ymax, m: largest distance between samples of a turn, computed from `t_y2_m`, the largest distance for a head
     /// at rest.
-    /// Source: Eq. 13.
+    /// Source: Jorge et al. 2021, Eq. 13.
     pub fn t_y_max_m(&self, t_y2_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_y2_m)
     }
 
     /// T_ymin, m: smallest distance between samples of a turn, computed from the smallest distance for a head at rest
-    /// (T_y1 or T_c). Source: Eq. 14.
+    /// (T_y1 or T_c). Source: Jorge et al. 2021, Eq. 14.
     pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
         math::hypot(self.advance_m(), smallest_step_m)
     }
@@ -89,7 +89,7 @@ impl Spiral {
     ///
     /// The term (n d)^2 under the root of Eq. 15 combines a whole turn's advance with the distance of a single step.
     /// [`Spiral::t_y_mean_m`] uses the advance between two pings instead.
-    /// Source: Eq. 15.
+    /// Source: Jorge et al. 2021, Eq. 15.
     pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }
@@ -101,20 +101,20 @@ impl Spiral {
     }
 
     /// T_max: largest spacing of samples, m, from `t_y2_m`, the largest distance between samples of a turn for a head
-    /// at rest. Source: Eq. 16.
+    /// at rest. Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, t_y2_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y2_m)
     }
 
     /// T_mean: mean spacing of samples, m, from the mean distance between samples of a turn, which includes the advance
-    /// between pings. Source: Eq. 17.
+    /// between pings. Source: Jorge et al. 2021, Eq. 17.
     pub fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_mean_m)
     }
 
     /// T_min: smallest spacing of samples, m, from the smallest distance between samples of a turn, which includes the
     /// advance between pings.
-    /// Source: Eq. 18.
+    /// Source: Jorge et al. 2021, Eq. 18.
     pub fn t_min_m(&self, t_y_min_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_min_m)
     }

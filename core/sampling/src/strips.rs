@@ -30,7 +30,7 @@ pub struct Strip {
     pub arc: Arc,
     /// The heads that see the strip.
     pub seen_by: HeadSet,
-    /// Whether any part of the strip is hidden from a head whose beam would otherwise sweep it.
+    /// Whether any part of the strip is hidden from a head whose beam sweeps over it.
     ///
     /// If true, the head's pings stop up to one angular step before the strip's edge. If the strip is only outside the
     /// head's sector, pings stop exactly at its edge.
@@ -42,7 +42,7 @@ pub struct Strip {
 }
 
 impl Strip {
-    /// Whether this strip and another one differ only in their places on the wall.
+    /// Whether this strip and the strip `other` differ only in their places on the wall.
     fn is_like(&self, other: &Self) -> bool {
         let same_wait = (self.wait - other.wait).abs() <= 0.0;
         self.seen_by == other.seen_by && self.hidden == other.hidden && same_wait
@@ -258,7 +258,7 @@ impl Strips {
     /// Returns T_max predicted at a speed, m: the largest spacing T on any strip.
     ///
     /// The result is infinite if no head sees some wide strip. Passes are farther apart on a strip that some heads do
-    /// not see. On such a strip, if it is narrow, the samples on its two sides limit T as well.
+    /// not see. If such a strip is narrow, the samples on its two sides limit T as well.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
@@ -290,7 +290,7 @@ impl Strips {
         })
     }
 
-    /// Returns the speed that would be the largest for a target if every head saw all of the wall, m/s.
+    /// Returns the largest speed for a target, m/s, on the assumption that every head sees all of the wall.
     ///
     /// `None` if no speed meets the target.
     pub fn bound_if_all_seen_mps(

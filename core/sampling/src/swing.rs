@@ -33,7 +33,7 @@ pub struct Swing<'a> {
     /// Largest rotation between the passes of two heads that are apart along the hull, divided by the time between
     /// them, rad/s.
     ///
-    /// This time is the time until the rearmost head reaches the position of the foremost head.
+    /// The passes are as far apart in time as the rearmost head needs to reach the position of the foremost head.
     pub apart_rate_radps: f64,
     /// History of the vehicle's directions from which the swing was computed, if known.
     pub history: Option<&'a Looks>,
@@ -90,8 +90,8 @@ impl Looks {
     /// Returns the largest swing in the half minute before `now`.
     ///
     /// The result stays about constant while the vehicle swings to and fro. `gap_s` is the time between passes, and
-    /// `apart_s` the time in which all heads pass a place. Rotation that navigation errors explain is excluded, without
-    /// a step at the limit.
+    /// `apart_s` the time in which all heads pass a place. Rotation so small that navigation errors explain it is
+    /// excluded. The result is continuous where the exclusion ends.
     /// Allocates: never.
     pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing<'_> {
         let rate = |over_s: f64| {

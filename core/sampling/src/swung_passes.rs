@@ -17,7 +17,7 @@ const STRETCH: f64 = 3.0;
 /// `SLOWER_BY` is the ratio of each tried speed to the speed tried before it, and `TRIED` the number of tried speeds.
 const SLOWER_BY: f64 = 0.93;
 const TRIED: u32 = 40;
-/// Multiples of a speed that must also meet the target. A single speed may meet the target by chance.
+/// Multiples of a tried speed that must also meet the target, because a single speed may meet it by chance.
 const ALSO: [f64; 6] = [1.0, 1.1, 1.2, 0.9, 0.8, 0.7];
 
 /// A place on the wall's perimeter, and the heads that see it.
@@ -55,7 +55,7 @@ pub(crate) fn highest_mps(
 
 /// Largest distance along the tunnel between neighbouring passes over a place, m.
 ///
-/// Infinite if more than [`MOST_PASSES`] passes would have to be simulated.
+/// Infinite if the place needs more than [`MOST_PASSES`] simulated passes.
 fn largest_gap_m(
     speed_mps: f64,
     (swing, phasing): (&RecentSwing<'_>, &Phasing),
@@ -67,8 +67,8 @@ fn largest_gap_m(
     let ahead =
         |of: fn(f64, f64) -> f64, start: f64| of_heads().fold(start, |so_far, head| of(so_far, head.ahead_m));
     let [least_m, most_m] = swing.displacements_m(place.from_vehicle_m);
-    // Gaps are checked only in this stretch, because outside it some passes come before the present or after the
-    // simulation's end.
+    // Gaps are checked only in this stretch. Outside it, some passes come before the present or after the simulation's
+    // end.
     let from_m = ahead(f64::max, f64::MIN) + most_m;
     let until_m = from_m + STRETCH * target_m;
     let takes_s = (until_m - ahead(f64::min, f64::MAX) - least_m) / speed_mps;

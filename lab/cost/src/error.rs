@@ -21,7 +21,7 @@ pub enum CostError {
     /// A dive can't be compared with its truth.
     #[error(transparent)]
     Truth(#[from] TruthError),
-    /// A file isn't among those built into the program.
+    /// The program has no built-in file of the requested name.
     #[error("reading {name:?}: the program contains no such file; expected one of {known}")]
     NoFile {
         /// Name of the requested file.

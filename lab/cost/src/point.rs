@@ -22,9 +22,9 @@ impl Interval {
 
     /// Median with its 95 % interval by the sign test; `None` without values.
     ///
-    /// The bounds are two values equally far from the least and the largest rank. They are the innermost pair that
-    /// covers the true median with a probability of at least 95 %. For fewer than six values, the bounds are the least
-    /// and the largest value, which cover the median with a smaller probability.
+    /// The rank of the lower bound is as far from the first as the rank of the upper bound is from the last. The bounds
+    /// are the innermost pair that covers the true median with a probability of at least 95 %. For fewer than six
+    /// values, the bounds are the least and the largest value, which cover the median with a smaller probability.
     pub fn median(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -85,7 +85,7 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let rank = share.clamp(0.0, 1.0) * (sorted.len().checked_sub(1)? as f64);
     let below = usize::try_from(math::floor_to_i64(rank)).ok()?;
     let (from, part) = (*sorted.get(below)?, rank - below as f64);
-    // Equal or infinite neighbours are returned without interpolation, since infinity minus infinity is NaN.
+    // Equal or infinite neighbours are returned without interpolation, because infinity minus infinity is NaN.
     match sorted.get(below + 1) {
         Some(to) if part > 0.0 && *to > from => Some(from + part * (to - from)),
         _ => Some(from),
@@ -116,7 +116,7 @@ pub struct Error {
 /// A measured setting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Method: the line in the chart that the marker belongs to.
+    /// Method of the setting. The chart draws the points of a method as one line.
     pub method: String,
     /// Name of the varied parameter.
     pub knob: String,
@@ -220,7 +220,7 @@ impl Trade {
         self.error_axis.rsplit(", ").next().unwrap_or_default()
     }
 
-    /// Difference of two errors up to which they count as equal, in the unit of the error.
+    /// Largest difference of two errors that count as equal, in the unit of the error.
     ///
     /// This is a tenth of `decides`, and at least the reference's own error.
     pub fn resolution(&self) -> f64 {
@@ -267,7 +267,8 @@ pub struct Given {
 ///
 /// A point beats another point if its error and cost are no worse and one of them is clearly better. An error is
 /// clearly better if it is smaller by more than `resolution`. A cost is clearly better if its upper bound is below the
-/// other's lower bound. Noise in the costs of equal settings therefore removes no point from the front.
+/// lower bound of the other point's cost. Noise in the costs of equal settings therefore removes no point from the
+/// front.
 pub fn front(points: &mut [Point], resolution: f64) {
     let is_better = |one: &Point, other: &Point| {
         let (error, others) = (one.error(), other.error());
@@ -385,8 +386,9 @@ mod tests {
         assert_eq!(quantile(&[], 0.5), None);
     }
 
-    /// Ranks of the sign test at 5 %, from tables (Conover, "Practical nonparametric statistics", A3): the first and
-    /// the last of 6 to 8 values, the second of 9 to 11, the third of 12 to 14, the sixth of 20.
+    /// Ranks of the sign test at 5 %. For 6 to 8 values, they are the first and the last; for 9 to 11 values, the
+    /// second; for 12 to 14, the third; for 20, the sixth. Source: Conover, "Practical nonparametric statistics", table
+    /// A3.
     #[test]
     fn median_intervals_match_published_tables() {
         for (count, rank) in [(1, 1), (5, 1), (6, 1), (8, 1), (9, 2), (11, 2), (12, 3), (14, 3), (20, 6)] {

@@ -7,8 +7,8 @@ use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
 /// Length that is left out at each end of a dive, in addition to a length equal to the target, m.
 ///
-/// Sections near the ends have neighbours on one side only. The length is that of the hull plus the distance to the
-/// next pass.
+/// Sections near the ends have neighbours on one side only. The length is the sum of the hull's length and the distance
+/// to the next pass.
 pub const END_M: f64 = 2.0;
 
 /// A section as judged by a method, with its true hole.

@@ -39,7 +39,7 @@ fn whole(trade: &Trade, point: &Point) -> String {
     )
 }
 
-/// For a scene: the default, the knee, and the price of the next step from the default to less error.
+/// For a scene: the default, the knee of the front, and the price of the next step from the default to less error.
 pub(crate) fn steps(trade: &Trade, scene: &str) -> Vec<String> {
     let points = || trade.points.iter().filter(|point| point.scene == scene);
     let Some(default) = points().find(|point| point.is_default) else {

@@ -68,7 +68,7 @@ fn cost_page_in_docs_matches_its_data() {
             ""
         };
         let content = format!("{content}{end}");
-        // Renews the layout only; the measured times stay.
+        // Renews the layout of the files only. The measured times stay as they are.
         if std::env::var_os("HEADRACE_RENEW_COST").is_some() {
             std::fs::write(folder.join(name), &content).unwrap();
         }

@@ -51,7 +51,7 @@ fn filter_is_more_accurate_than_the_cable_alone() {
     assert!(within("slack cable", "filter, sonar returns") < 60.0, "undeclared slack must show");
     let slack = |scene: &str| of(scene, "cable only", "displacement between passes");
     assert!(slack("VITA 1, slack") > 2.0 * slack("VITA 1, field"), "a slack three times as large");
-    // A setting that has no effect would give exactly the same result as the default.
+    // If a setting has no effect, its result is exactly that of the default.
     let field = |method: &str, value: &str| {
         figure(&trade, ["VITA 1, field", method, value], "position across").to_bits()
     };
@@ -117,8 +117,8 @@ fn omitting_an_effect_changes_the_result() {
     );
 }
 
-/// At a confidence of k standard deviations (sigma), the plan aims at a smaller hole, T - k (sigma - 2 mm): the plan
-/// ignores the first 2 mm of sigma.
+/// At a confidence of k standard deviations (sigma), the plan aims at a smaller hole: T - k (sigma - 2 mm). It ignores
+/// the first 2 mm of sigma.
 #[test]
 fn survey_hours_at_confidence_k_equal_the_hours_for_a_smaller_target() {
     let trade = measured(sureness::measure);

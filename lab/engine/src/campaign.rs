@@ -155,8 +155,8 @@ impl Campaign {
 
     /// Makes the processes of a session replay the dives that are missing from the cache; returns all dives by log.
     ///
-    /// A process that ends early loses its answers, but its finished dives are in the cache. The other dives are sent
-    /// again, as long as their number decreases.
+    /// If a process ends early, its answers are lost, but its finished dives are in the cache. The other dives are sent
+    /// again, as long as fewer are missing each time.
     async fn made_by(&self, session: &SessionContext) -> Result<BTreeMap<String, Made>, Error> {
         let (mut made, mut wanted) = self.looked_for(self.dives.clone()).await?;
         self.maker.counts().add(wanted.len(), made.len());
@@ -181,7 +181,7 @@ impl Campaign {
         Ok(made)
     }
 
-    /// Separates dives that are in the cache, returned by log, from dives that are not.
+    /// Divides dives into those in the cache, returned by log, and those that must be replayed.
     async fn looked_for(&self, dives: Vec<DiveLog>) -> Result<(BTreeMap<String, Made>, Vec<DiveLog>), Error> {
         let looking = dives.into_iter().map(|dive| async move {
             let kept = self.maker.kept(&self.place, &dive, &self.parameters).await?;
@@ -328,7 +328,8 @@ impl Campaign {
         register_listed(session, name, rows.schema(), std::iter::once(path))
     }
 
-    /// The program version with the most dives in the cache for these parameters, apart from this version.
+    /// The program version with the most dives in the cache for the campaign's parameters, apart from this program's
+    /// version.
     fn other_version(&self) -> Option<String> {
         let versions = std::fs::read_dir(self.maker.cache().folder()).ok()?.filter_map(Result::ok);
         let counted = versions.filter_map(|entry| {

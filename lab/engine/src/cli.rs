@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8, Error> {
     let threads = arguments.threads.map_or(cores, usize::from);
     let mut runtime = tokio::runtime::Builder::new_multi_thread();
     runtime.worker_threads(threads).enable_all();
-    // The stack is large, since the scheduler traverses plans recursively.
+    // The stack is large, because the scheduler traverses plans recursively.
     #[cfg(feature = "cluster")]
     let runtime = runtime.thread_stack_size(32 << 20);
     let runtime = runtime.build();
@@ -181,7 +181,7 @@ async fn answer(
     let frame = session.sql(sql).await?;
     let schema = Arc::new(frame.schema().as_arrow().clone());
     let batches = frame.collect().await?;
-    // The batches' own schema is preferred, since it has string views and states which columns may be null.
+    // The batches' own schema is preferred, because it has string views and states which columns may be null.
     let schema = batches.first().map_or(schema, datafusion::arrow::array::RecordBatch::schema);
     if let Some(path) = &arguments.picture {
         let svg = picture::draw(sql, &schema, &batches)?;

@@ -1,7 +1,7 @@
 //! Runs replays and queries on many machines, with Ballista's scheduler, executors and client.
 //!
-//! Scheduler, executors and client each have a codec for [`ReplayTable`] and [`ReplayExec`]. Ballista does the
-//! distribution, retries and collection.
+//! Scheduler, executors and client each have a codec for [`ReplayTable`] and [`ReplayExec`]. Ballista distributes the
+//! work, repeats failed tasks and collects the results.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::maker::Maker;
 use crate::provider::{Asked, ReplayExec, ReplayTable, Replayed};
 
-/// Prefix that tells encoded plan nodes of this program from Ballista's own nodes.
+/// Prefix that distinguishes encoded plan nodes of this program from Ballista's own nodes.
 const OURS: &[u8] = b"headrace ";
 /// Time without a heartbeat after which an executor counts as lost, s. A busy executor sends a heartbeat every 5 s.
 const LOST_AFTER_S: u64 = 15;
@@ -85,7 +85,7 @@ pub async fn execute(
         port: address.port(),
         scheduler_host: host.to_owned(),
         scheduler_port: port,
-        // Any value except 0 makes the executor wait for the scheduler.
+        // Any value except 0 makes the executor wait until the scheduler is available.
         scheduler_connect_timeout_seconds: 60,
         vcores: threads,
         task_scheduling_policy: TaskSchedulingPolicy::PullStaged,
@@ -104,7 +104,7 @@ pub async fn execute(
 /// Errors: only those of the engine itself. If the scheduler is missing, the first query returns an error.
 pub fn session(scheduler: &str, maker: Arc<Maker>) -> Result<SessionContext, Error> {
     let config = SessionConfig::new_with_ballista()
-        // Each task has one dive, since a task with several dives ends only when its longest replay ends.
+        // Each task has one dive, because a task with several dives ends only when its longest replay ends.
         .set_usize(BALLISTA_SCHEDULER_MAX_PARTITIONS_PER_TASK, 1)
         .with_ballista_grpc_client_max_message_size(MESSAGE_BYTES as usize)
         .with_ballista_logical_extension_codec(Arc::new(Codec::new(maker)));

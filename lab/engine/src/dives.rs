@@ -1,5 +1,5 @@
-//! The table `dives` of a campaign. Each row is the row in a dive's own tables, plus the log's path in the campaign's
-//! folder or bucket and facts from outside the log (plant, pilot, day).
+//! The table `dives` of a campaign. Each row is the row in a dive's own tables. The log's path in the campaign's folder
+//! or bucket is added, and facts from outside the log (plant, pilot, day).
 
 use std::sync::Arc;
 
@@ -34,8 +34,8 @@ pub fn dives_schema() -> SchemaRef {
     Arc::new(Schema::new(all))
 }
 
-/// Makes the table `dives`. Each row is the row in a dive's own tables, plus the log's path in the campaign's folder or
-/// bucket and facts from outside the log (plant, pilot, day).
+/// Makes the table `dives`. Each row is the row in a dive's own tables. The log's path in the campaign's folder or
+/// bucket is added, and facts from outside the log (plant, pilot, day).
 pub(crate) async fn dives_table(dives: &[(DiveLog, Made)], about: &Abouts) -> Result<RecordBatch, Error> {
     let Some(own) = schema("dives") else {
         return Err(DataFusionError::Internal("no dives".to_owned()).into());

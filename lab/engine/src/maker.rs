@@ -35,7 +35,7 @@ impl Counts {
         self.replayed.load(Ordering::Relaxed)
     }
 
-    /// Adds dives that another process replayed, and dives that were in the cache.
+    /// Adds the numbers of dives that another process replayed or found in the cache.
     pub fn add(&self, replayed: usize, cached: usize) {
         self.replayed.fetch_add(replayed as u64, Ordering::Relaxed);
         self.cached.fetch_add(cached as u64, Ordering::Relaxed);
@@ -62,7 +62,7 @@ pub enum Made {
         /// Folder of the Parquet files.
         folder: PathBuf,
     },
-    /// There are no tables, since the log can't be read or replayed. The row of `dives` gives the reason.
+    /// There are no tables, because the log can't be read or replayed. The row of `dives` gives the reason.
     Unread(Arc<Tables>),
 }
 
@@ -140,7 +140,7 @@ impl Maker {
     /// Finds a dive's tables in the cache; `None` if the log's digest is unknown or the dive is missing from the
     /// cache.
     ///
-    /// Waits for a free thread. The dive isn't counted.
+    /// Waits for a free thread. The dive isn't added to the counts of replayed or cached dives.
     ///
     /// Errors: a broken dive in the cache can't be removed.
     pub async fn kept(

@@ -1,4 +1,4 @@
-//! Writes the answer of a query to the terminal, or to a file in the format of its extension.
+//! Writes the answer of a query to the terminal, or to a file whose extension determines the format.
 
 use std::fs::File;
 use std::io::Write as _;

@@ -150,7 +150,7 @@ impl Place {
         let mut files = Vec::new();
         for (number, part) in dive.parts.iter().enumerate() {
             let failed = |source| Error::Store { what: format!("{}{}", self.url, part.path), source };
-            // The copies have other names, since a path in the store may not be valid on this machine.
+            // The copies have other names, because a path in the store may not be valid on this machine.
             let path = copy.path().join(format!("{number:03}.mcap"));
             let mut file = std::fs::File::create(&path).map_err(of_file("writing", &path))?;
             let location = self.location(&part.path).map_err(failed)?;
@@ -172,7 +172,7 @@ impl Place {
     }
 }
 
-/// Decodes a path to readable text, since stores encode some characters.
+/// Decodes a path to readable text, because stores encode some characters.
 fn plain(path: &str) -> String {
     percent_decode_str(path).decode_utf8_lossy().into_owned()
 }

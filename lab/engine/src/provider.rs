@@ -118,7 +118,7 @@ impl TableProvider for ReplayTable {
 /// The request that applies to each dive of an input plan. It can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Asked {
-    /// Table and parameters. The list of dives is empty, since the dives come from the input plan.
+    /// Table and parameters. The list of dives is empty, because the dives come from the input plan.
     pub replayed: Replayed,
     /// The requested columns of the table; `None` means all columns.
     pub projection: Option<Vec<usize>>,
@@ -126,7 +126,7 @@ pub struct Asked {
 
 /// Replays the dives listed by its input plan, partition by partition.
 ///
-/// The node has an input instead of being a leaf, because a distributing engine can divide a list but knows nothing of
+/// The node gets its list of dives from an input plan. A distributing engine can divide a list, but knows nothing of
 /// replays.
 #[derive(Debug)]
 pub struct ReplayExec {
@@ -186,7 +186,7 @@ impl ExecutionPlan for ReplayExec {
         vec![&self.listed]
     }
 
-    /// The list of dives is already divided into the required partitions.
+    /// Returns false, because the list of dives is already divided into the required partitions.
     fn benefits_from_input_partitioning(&self) -> Vec<bool> {
         vec![false]
     }

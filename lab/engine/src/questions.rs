@@ -1,6 +1,6 @@
 //! Predefined SQL questions about dives.
 
-/// A question: a name and a SQL query, whose first comments describe the question.
+/// A question: a name and an SQL query. The first comments in the SQL describe the question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Question {
     /// Name of the question.

@@ -105,7 +105,7 @@ fn threads_shards_and_repeated_runs_give_the_same_tables() {
         }
     }
     assert!(union == all, "all shards together differ from one run");
-    // The folders of all shards, merged into one folder, form a cache.
+    // If the folders of all shards are merged into one folder, this folder is a cache.
     let moved = cache("1-2").join(headrace_tables::program_version());
     let copied = Command::new("cp").arg("-r").arg(&moved).arg(cache("2-2")).status().unwrap();
     assert!(copied.success());
@@ -184,7 +184,7 @@ fn unreadable_log_becomes_a_row() {
     let sql = "SELECT log, exit_code, losses, error FROM dives ORDER BY log";
     let (rows, last) = ask(folder.path(), cache.path(), sql, &[]);
     assert_eq!(rows.len(), 7);
-    // A log that can't be replayed is tried again.
+    // Each run tries again to replay a log that can't be replayed.
     assert!(last.starts_with("7 dives: 1 replayed, 7 from the cache; 1 unreadable, 1 with"), "{last}");
     let of = |log: &str| rows.iter().find(|row| row["log"] == log).unwrap();
     assert_eq!(of("no-log.mcap")["exit_code"], 2);
@@ -192,7 +192,7 @@ fn unreadable_log_becomes_a_row() {
     assert_eq!(of("rosone/cut.mcap")["exit_code"], 3);
     assert!(of("rosone/cut.mcap")["losses"].as_i64().unwrap() > 0);
     assert_eq!(of("rosone/stalls.mcap")["exit_code"], 0);
-    // The table function also returns the path of a copy.
+    // The table function also returns the path of a log that is a copy.
     let (logs, _) =
         ask(folder.path(), cache.path(), "SELECT DISTINCT log FROM replay('*', '', 'dives')", &[]);
     assert_eq!(logs.len(), 8);
@@ -259,7 +259,7 @@ fn every_question_has_an_answer_and_a_picture() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let about = "log,plant,pilot,day\nceran/murk.mcap,Ceran,Ada,2020-05-01\nrosone/stalls.mcap,Ceran,Ben,2024-06-02\n";
     std::fs::write(folder.path().join("dives.csv"), about).unwrap();
-    // Imitates an earlier program version that replayed the same dives with the same results.
+    // Makes the cache look as if an earlier program version had replayed the same dives with the same results.
     run(folder.path(), cache.path(), &[]);
     let now = cache.path().join(headrace_tables::program_version());
     let before = cache.path().join("0.0.1+earlier");

@@ -1,4 +1,4 @@
-//! Tables 3 to 5: simulated runs compared with the paper's runs, and the Wilcoxon tests of §8.1.
+//! Tables 3 to 5 of Jorge et al. 2021: simulated runs compared with the paper's runs, and the Wilcoxon tests of §8.1.
 
 use crate::paper::{Measured, PaperError, Printed, Spacings, Tables, measured, tables};
 use headrace_sampling::layout::HeadLayout;
@@ -30,11 +30,11 @@ pub struct RunRow {
     pub sectors: bool,
     /// Distance T_x between passes, m.
     pub t_x: Pair,
-    /// Distance T_y between pings: mean, standard deviation, least, largest, m.
+    /// Distance T_y between pings, m: mean, standard deviation, least, largest.
     pub t_y: [Pair; 4],
-    /// Combined distance T: mean, least, largest, m; `None` for one head, which Table 5 leaves out.
+    /// Combined distance T, m: mean, least, largest; `None` for one head, which Table 5 leaves out.
     pub t: Option<[Pair; 3]>,
-    /// The speed at which the paper's distance T_x between passes was obtained, m/s.
+    /// The speed that gives the paper's distance T_x between passes, m/s.
     pub paper_speed_mps: f64,
     /// The quantities that miss their targets (distances T_x, mean T_y, mean T), with reasons.
     pub misses: Vec<String>,
@@ -74,7 +74,7 @@ pub struct SignedRankRow {
     /// Two-sided p value of the test of the predictions against the paper's experiments; `None` if all differences are
     /// zero.
     pub p_paper: Option<f64>,
-    /// Two-sided p value of the test of the predictions against our simulated experiments.
+    /// Two-sided p value of the test of the predictions against the experiments simulated here.
     pub p_ours: Option<f64>,
 }
 
@@ -168,7 +168,8 @@ fn misses(row: &RunRow, seconds: f64) -> Vec<String> {
     misses
 }
 
-/// The paper's tests of §8.1: predicted values against experiments, over all modes and two to four heads.
+/// The Wilcoxon tests of Jorge et al. 2021, §8.1: predictions against experiments, over all modes and two to four
+/// heads.
 ///
 /// Errors: none with the built-in numbers.
 pub(crate) fn signed_ranks(rows: &[RunRow]) -> Result<Vec<SignedRankRow>, PaperError> {

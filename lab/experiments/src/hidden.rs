@@ -1,4 +1,4 @@
-//! §8.3: occlusion between adjacent heads.
+//! Occlusion between adjacent heads (Jorge et al. 2021, §8.3).
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::layout::HeadLayout;
@@ -35,8 +35,8 @@ pub struct HiddenRow {
 /// The layouts: three heads; four heads with neighbours a quarter turn apart, in two arrangements; four heads with
 /// neighbours half a turn apart.
 ///
-/// In the first arrangement of quarter turns, the occluded forward and aft heads follow each other on either wall after
-/// half a turn. In the second arrangement, the same heads follow each other after a quarter turn.
+/// In the first arrangement with quarter turns, the occluded forward and aft heads follow each other on either wall
+/// after half a turn. In the second arrangement, the same heads follow each other after a quarter turn.
 const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"), (4, "[0, 90, 90, 0]")];
 
 /// Simulates all layouts in MEDIUM, as in Figure 13.
@@ -96,8 +96,8 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     for sample in samples {
         if sample.of_wall {
             if let (Some(from), Some(before)) = (began, last) {
-                // The edge of the occluded range falls between two pings, so half of the step at each edge counts as
-                // occluded.
+                // The edge of the occluded range falls between two pings. On average it is half a step away, so half a
+                // step at each edge counts as occluded.
                 let turned = math::wrap_signed(before.angle_rad - from.angle_rad, TAU).abs() + dive.step_rad;
                 angle_rad = angle_rad.max(turned);
                 let around = math::wrap_signed(before.arc_m - from.arc_m, dive.profile.perimeter_m());

@@ -1,4 +1,4 @@
-//! Recomputes the paper's tables (`paper`), and repeats the paper's experiments of §8 and §9.
+//! Recomputes the tables of Jorge et al. 2021 (`paper`), and repeats the experiments of its §8 and §9.
 //!
 //! Experiments are simulated dives. They give the spacings of Tables 3 to 5 and the occlusion between heads. Further
 //! analyses are surfaces through samples and their distance from the wall (§8.2, 8.3), the perimeter as seen by a wide

@@ -1,4 +1,4 @@
-//! §8.2 and §8.3: surfaces through the samples, and their distance from the wall.
+//! Surfaces through the samples, and their distance from the wall (Jorge et al. 2021, §8.2 and §8.3).
 
 use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::{ExperimentError, Progress};
 
 /// Length of each simulated run, m, as in the paper.
 pub(crate) const LENGTH_M: f64 = 130.0;
-/// Chainages between which the surface is compared with the wall, away from its ends.
+/// Chainages between which the surface is compared with the wall. They are away from the ends of the run.
 const INNER: Stretch = Stretch { from_m: 20.0, to_m: 120.0, step_m: 0.1 };
 /// Scene line for the range noise of the paper's simulator.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n";
@@ -31,7 +31,7 @@ pub struct MeshRow {
     pub sectors: bool,
     /// Whether the heads' phases are aligned.
     pub aligned: bool,
-    /// Mean and standard deviation of the distance in the paper, m; `None` if the paper has none.
+    /// Mean and standard deviation of the distance in the paper, m; `None` if the paper doesn't state them.
     pub paper_m: Option<[f64; 2]>,
     /// Distance from the wall to the screened Poisson surface of depth 8: mean and standard deviation, averaged over
     /// the seeds, m.
@@ -46,7 +46,7 @@ pub struct MeshRow {
 /// mean and standard deviation.
 type Configuration = (u8, &'static str, bool, bool, Option<[f64; 2]>);
 
-/// The paper's configurations, with its distances.
+/// The configurations of Jorge et al. 2021, with the distances that the paper states.
 ///
 /// Source: errata, row "§8.2": the paper's text names one of the unaligned pairs twice.
 const PAPER: [Configuration; 10] = [

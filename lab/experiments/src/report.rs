@@ -1,4 +1,4 @@
-//! All of the paper's experiments, and whether its findings are confirmed.
+//! All experiments of Jorge et al. 2021, and whether the simulated runs confirm the paper's findings.
 
 use serde::Serialize;
 

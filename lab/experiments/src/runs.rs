@@ -1,5 +1,5 @@
-//! Simulated dives for the experiments: the paper's vehicle, a straight stretch, and the effects of the paper's
-//! simulation.
+//! Simulated dives for the experiments of Jorge et al. 2021: the paper's vehicle, a straight stretch, and the effects
+//! of the paper's simulation.
 
 use headrace_config::Document;
 use headrace_devices::KINDS;
@@ -9,7 +9,7 @@ use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::device::Sense;
 use headrace_simulator::{Scene, SceneError, Simulation};
 
-/// The speed that the paper states, m/s (§7.2).
+/// The speed of the runs, m/s, which Jorge et al. 2021 state in §7.2.
 pub(crate) const SPEED_MPS: f64 = 0.197;
 
 /// Settings of a simulated dive.

@@ -1,4 +1,5 @@
-//! The paper's spacings, measured on simulated samples: T_y from ping to ping, T_x from pass to pass, T combined.
+//! Sample spacings of Jorge et al. 2021, measured on simulated samples: T_y from ping to ping, T_x from pass to pass, T
+//! combined.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::layout::HeadLayout;
@@ -56,7 +57,8 @@ fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
 /// The chainages at which heads passed each line along the wall, ascending.
 pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
     let perimeter_m = dive.profile.perimeter_m();
-    // Only the stretch that all heads have passed is used, since passes of fewer heads are farther apart.
+    // Only the stretch that all heads have passed is used. Elsewhere fewer heads have passed, so passes are farther
+    // apart.
     let ends = |pick: fn(&[Sample]) -> Option<&Sample>| {
         dive.heads.iter().filter_map(move |samples| pick(samples)).map(|s| s.at.x())
     };

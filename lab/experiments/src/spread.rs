@@ -23,7 +23,7 @@ impl Spread {
     pub(crate) fn of(lengths_m: impl IntoIterator<Item = f64>) -> Self {
         let (mut mean, mut squares) = (0.0, 0.0);
         let mut spread = Self { min_m: f64::INFINITY, ..Self::default() };
-        // Welford's update is used, since a sum of squares would lose the spread of nearly equal lengths.
+        // Welford's update is used, because a sum of squares loses the spread of nearly equal lengths.
         for length in lengths_m.into_iter().map(f64::abs).filter(|length| length.is_finite()) {
             spread.count += 1;
             let step = length - mean;

@@ -1,4 +1,5 @@
-//! §9.2: the perimeter of the cross-section from a turn of a stationary vehicle, measured with a beam of finite width.
+//! Perimeter of the cross-section from a turn of a stationary vehicle, with a beam of finite width (Jorge et al. 2021,
+//! §9.2).
 
 use headrace_geometry::math::{self, PI, TAU};
 use headrace_geometry::tunnel::shapes;

@@ -16,7 +16,7 @@ use crate::table::Table;
 const CELL_M: f64 = 0.25;
 /// Length of the stretch whose points are put into one sample store, m.
 ///
-/// Together with the search radius on either side, the stretch is so short that the store packs no sample.
+/// The stretch, with the search radius on either side, is so short that the store packs no sample.
 const STRETCH_M: f64 = 32.0;
 /// Maximum number of sections per call.
 const MAX_SECTIONS: f64 = 4e6;

@@ -123,7 +123,7 @@ impl Log {
         self.info.vehicle_toml.as_deref()
     }
 
-    /// The other attachments, by name.
+    /// Attachments other than the vehicle file, by name.
     #[getter]
     fn attachments(&self, py: Python<'_>) -> BTreeMap<String, Py<PyBytes>> {
         let content = |(name, bytes): &(String, Vec<u8>)| (name.clone(), PyBytes::new(py, bytes).unbind());
@@ -139,7 +139,7 @@ impl Log {
         Ok(Profile::of(vehicle.tunnel.profile))
     }
 
-    /// Sources of the log, in order of their numbers. Reads the log to its end, once, since a log may define channels
+    /// Sources of the log, in order of their numbers. Reads the log to its end, once, because a log may define channels
     /// late.
     ///
     /// Raises LogError on an I/O error.

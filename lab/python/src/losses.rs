@@ -13,9 +13,9 @@ pub(crate) struct Loss {
     offset: u64,
     /// Length of the loss in its file, bytes; 0 if the loss has no place in a file.
     bytes: u64,
-    /// The last time in the log before the loss, ns of the log's clock; None if there is none.
+    /// Latest log time before the loss, ns of the log's clock; None if there is none.
     from_ns: Option<u64>,
-    /// The first time in the log after the loss, ns of the log's clock; None if there is none.
+    /// Earliest log time after the loss, ns of the log's clock; None if there is none.
     to_ns: Option<u64>,
 }
 

@@ -11,7 +11,7 @@ use pyo3::{Py, PyRef, Python, pyclass, pymethods};
 use crate::errors::Failure;
 
 /// Maximum number of messages that are read ahead without the interpreter's lock. `AHEAD_BYTES` is the maximum number
-/// of their bytes.
+/// of bytes of these messages.
 const AHEAD: usize = 512;
 const AHEAD_BYTES: usize = 1 << 20;
 
@@ -50,7 +50,7 @@ impl Message {
 /// lock.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Messages {
-    /// A lock allows threads to share an iterator.
+    /// The lock allows several threads to share one iterator.
     reading: Mutex<Reading>,
 }
 
@@ -133,7 +133,7 @@ impl Reading {
         Ok(())
     }
 
-    /// Checks that the log has the requested source. The check is at the log's end, since only then all sources are
+    /// Checks that the log has the requested source. The check is at the log's end, because only then all sources are
     /// known.
     fn check_source(&self) -> Result<(), Failure> {
         let sources = &self.log.header().sources;

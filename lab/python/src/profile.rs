@@ -64,13 +64,13 @@ impl Profile {
         Ok(Self::of(shapes::trimmed_circle(radius_m, base_m)?))
     }
 
-    /// The paper's tunnel with its stated dimensions: perimeter 35.90 m.
+    /// The tunnel of Jorge et al. 2021 with its stated dimensions: perimeter 35.90 m.
     #[staticmethod]
     fn ceran() -> Result<Self, Failure> {
         Ok(Self::of(shapes::ceran()?))
     }
 
-    /// The paper's tunnel scaled to the perimeter of its blueprint, 34.17 m.
+    /// The tunnel of Jorge et al. 2021, scaled to the perimeter of its blueprint, 34.17 m.
     #[staticmethod]
     fn ceran_blueprint() -> Result<Self, Failure> {
         Ok(Self::of(shapes::ceran_blueprint()?))

@@ -116,7 +116,7 @@ pub(crate) fn replay(
                 Ok(replay_until(&files, &parameters, &stop).map_err(Failure::from)?)
             };
             threads.spawn(move || {
-                // A send error is ignored: after an interrupt, nobody waits for the result.
+                // Sending fails if nobody waits for the result any more, as after an interrupt. The error is ignored.
                 done.send(work()).ok();
             });
             loop {

@@ -1,4 +1,4 @@
-//! The paper's equations: turns, the spiral of samples, and the closed forms for flat and circular walls.
+//! The equations of Jorge et al. 2021: turns, the spiral of samples, and the closed forms for flat and circular walls.
 
 use headrace_sampling::{head, section, spacing};
 use pyo3::{pyclass, pyfunction, pymethods};
@@ -108,7 +108,7 @@ impl Spiral {
         self.spiral.t_y_min_m(smallest_step_m)
     }
 
-    /// Mean step, m, from the mean step of a head at rest and the advance during one step.
+    /// Mean step along the wall, m. It combines the mean step of a head at rest with the advance during one step.
     fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         self.spiral.t_y_mean_m(t_yp_m)
     }

@@ -100,8 +100,8 @@ pub fn dive_key(log_sha256: &str) -> &str {
 
 /// Replays a dive and makes its tables.
 ///
-/// `log` has the files of one dive: a log, or the parts of a recording in order. The replay takes one thread, and about
-/// as long as `headrace replay`.
+/// `log` has the files of one dive: a log, or the parts of a recording in order. The replay uses one thread, and takes
+/// about as long as `headrace replay`.
 ///
 /// Errors: see [`Error`]. Lost data isn't an error: `dives.losses` counts the losses, `dives.lost` names them and
 /// `dives.exit_code` is 3.

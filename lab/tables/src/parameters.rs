@@ -18,7 +18,7 @@ const SOUND_SPEED_MPS: RangeInclusive<f64> = 1300.0..=1700.0;
 
 /// Parameters of a replay. Each one defaults to the setting of the vehicle file attached to the log.
 ///
-/// The length of a tick isn't a parameter, since no result depends on it.
+/// The length of a tick isn't a parameter, because no result depends on it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Parameters {

@@ -83,7 +83,7 @@ pub(crate) fn run(
     Ok(Dive { report, vehicle: vehicle.name, about: about(&player) })
 }
 
-/// The vehicle: from the parameters' vehicle file, or else from the log's.
+/// Reads the vehicle from the parameters' vehicle file or, if they have none, from the log's.
 fn vehicle(log: &Path, player: &Player, parameters: &Parameters) -> Result<VehicleConfig, Error> {
     let info = player.info();
     let load = |name: &str| {

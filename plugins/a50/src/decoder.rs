@@ -1,8 +1,8 @@
 //! Decodes velocity reports into readings of velocity over ground.
 //!
-//! Device axes are x forward, y right, z down; headrace's are x forward, y left, z up, so y and z change sign. In air
-//! and close to surfaces, the device is known to send wrong velocities as valid and to repeat reports. The decoder
-//! withholds such reports and counts them by reason.
+//! Device axes are x forward, y right, z down. headrace's axes are x forward, y left, z up, so y and z change sign. In
+//! air and close to surfaces, the device sends wrong velocities as valid, and repeats reports. The decoder withholds
+//! such reports and counts them by reason.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::device::Decoder;
@@ -15,11 +15,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// Longest usual gap between the bytes of one text line. The gap allows for a TCP retransmission, whose timer is at
-/// least 200 ms.
+/// Longest usual gap between the bytes of one text line. It allows for a TCP retransmission, whose timer is at least
+/// 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
-/// Minimum number of valid beams for a velocity, which has three components.
+/// Minimum number of valid beams for a velocity, because a velocity has three components.
 const LEAST_BEAMS: u8 = 3;
 /// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
@@ -171,7 +171,7 @@ impl State {
     }
 }
 
-/// Reason for withholding a report that was sent this long after its measurement.
+/// Returns the reason for withholding a report that was sent `delay_us` after its measurement.
 fn late(delay_us: i64) -> WithheldReason {
     let seconds = |us: i64| DurNs(us.saturating_mul(1000)).as_secs_f64();
     WithheldReason::Late { age_s: seconds(delay_us), at_most_s: seconds(MOST_DELAY_US) }

@@ -13,7 +13,7 @@ pub const CARRIERS: [Carrier; 2] = [Carrier::Tcp, Carrier::Udp];
 const SILENCE: DurNs = DurNs::from_millis(200);
 /// Number of consecutive lines without a velocity after which the device's format counts as unknown.
 ///
-/// The device reports several times a second.
+/// The device reports several times a second, so the count is reached within a few seconds.
 const NOT_UNDERSTOOD_FROM: u32 = 20;
 
 /// Driver of an A50.
@@ -55,7 +55,7 @@ impl Driver for A50Driver {
                 *velocities += 1;
                 *others = 0;
             } else if let Some(named) = format_of(piece.bytes) {
-                // A report with a missing field is no frame, but its format name is still readable.
+                // A report with a missing field can't be decoded, but the name of its format can still be read.
                 *others = others.saturating_add(1);
                 *format = Some(named);
             } else if piece.is_frame {

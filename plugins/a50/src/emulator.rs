@@ -8,7 +8,7 @@ use crate::report::{Against, Velocity};
 
 /// Delay from the reflection of sound to sending the report. In the maker's example it is 189 ms.
 const DELAY_US: i64 = 100_000;
-/// Device clock at power-on, microseconds since 1970.
+/// Reading of the device's clock at power-on, microseconds since 1970.
 const BEGINS_US: i64 = 1_638_191_471_000_000;
 /// Reported altitude, m. It is constant, because the emulator has no model of the surface that the beams
 /// meet.

@@ -127,7 +127,7 @@ impl Found {
         Ok(())
     }
 
-    /// The report, if no field is missing.
+    /// Returns the report; `None` if a field is missing.
     fn whole(self) -> Option<Velocity> {
         let [x, y, z] = self.velocity_mps;
         let [validity, transmission] = self.times_us;
@@ -375,7 +375,7 @@ pub(crate) mod tests {
         assert_eq!((got.len(), codec.counts().skipped_bytes), (1, endless.len() as u64));
     }
 
-    /// Whether the parser accepts a line with this JSON value under an unknown key.
+    /// Whether the parser accepts a line in which an unknown key has this JSON value.
     fn is_good(value: &str) -> bool {
         line(format!("{{\"a\":{value}}}\n").as_bytes()).is_some()
     }

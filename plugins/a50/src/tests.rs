@@ -188,7 +188,7 @@ impl Wire for Nowhere {
 
 #[test]
 fn unknown_format_is_reported_until_a_velocity_arrives() {
-    // Reports of older firmware have no type. A later format might rename its fields.
+    // Reports of older firmware have no type. Reports of a later format might have other field names.
     let older = EXAMPLE.replace("json_v3.2", "json_v1").replace("\"type\": \"velocity\", ", "");
     let renamed = EXAMPLE.replace("json_v3.2", "json_v9").replace("\"vx\"", "\"v_x\"");
     for (line, format) in [(older, "json_v1"), (renamed, "json_v9")] {

@@ -74,9 +74,9 @@ pub enum CalibrationError {
 }
 
 impl PressureMode {
-    /// Converts the two mode bits of memory cell 0x12.
+    /// Converts the two mode bits of memory cell 0x12 to a pressure mode.
     ///
-    /// Errors: a mode of 3 or more, since a wrong mode would shift the depth by ten metres.
+    /// Errors: a mode of 3 or more. It must not be guessed, because a wrong mode shifts the depth by ten metres.
     pub fn from_wire(mode: u8) -> Result<Self, CalibrationError> {
         match mode {
             0 => Ok(Self::Vented),
@@ -177,7 +177,8 @@ impl Calibration {
     }
 }
 
-/// Values of the vehicle file that override the sensor's memory. They are needed for logs that begin during a dive.
+/// Values of the vehicle file that override the sensor's memory. A log that begins during a dive lacks the memory's
+/// content.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Overrides {
     /// Lower limit of the pressure range, bar.
@@ -212,7 +213,7 @@ impl CalibrationCells {
         *cell = Some(word.word);
     }
 
-    /// The calibration; `None` until every part is known. `overrides` take precedence over the memory.
+    /// The calibration; `None` until every part of it is known. `overrides` take precedence over the memory.
     ///
     /// Errors: an undefined mode, or impossible limits.
     pub fn calibration(&self, overrides: &Overrides) -> Result<Option<Calibration>, CalibrationError> {

@@ -1,4 +1,4 @@
-//! I2C transactions with the sensor. A message has the bytes written, followed by the bytes read.
+//! I2C transactions with the sensor. Each message holds the bytes written to the sensor, then the bytes read from it.
 //!
 //! ```text
 //!   measure      AC | status  pressure (2)  temperature (2)      6 bytes
@@ -12,8 +12,8 @@ use headrace_sensor::codec::{Framed, Framing, Verdict};
 /// Command that starts a conversion of pressure and temperature.
 pub const MEASURE: u8 = 0xAC;
 
-/// Smallest command byte. Smaller first bytes are addresses of memory cells. So the first byte gives a transaction's
-/// length.
+/// Smallest command byte. Smaller first bytes are addresses of memory cells. The first byte therefore determines a
+/// transaction's length.
 const FIRST_COMMAND: u8 = 0x80;
 
 /// Length of a measurement transaction.
@@ -30,11 +30,11 @@ pub struct Status(u8);
 pub struct Measurement {
     /// Status byte of the sensor.
     pub status: Status,
-    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0: a sensor returns 0 before the
-    /// conversion is done.
+    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper limit. Never 0, because a sensor returns 0
+    /// before the conversion is done.
     pub pressure_counts: u16,
-    /// Temperature in counts. One count is 0.05 degrees Celsius / 16. Never 0: a sensor returns 0 before the conversion
-    /// is done.
+    /// Temperature in counts. One count is 0.05 degrees Celsius / 16. Never 0, because a sensor returns 0 before the
+    /// conversion is done.
     pub temperature_counts: u16,
 }
 
@@ -103,7 +103,7 @@ impl Status {
     /// Status of a sensor that is ready, in normal mode, and has sound memory.
     pub const IDLE: Self = Self(0x40);
 
-    /// Checks a status byte. Busy is accepted, since this sensor nearly always reports busy.
+    /// Checks a status byte. Busy is accepted, because this sensor nearly always reports busy.
     ///
     /// Errors: not ready, bus high, or wrong constant, mode or memory bits.
     /// Source: status checks of Blue Robotics' `KellerLD` library.
@@ -152,7 +152,7 @@ impl MemoryWord {
 }
 
 impl Transaction {
-    /// Length in bytes of the transaction that begins with `first`; `None` if unknown.
+    /// Length, in bytes, of the transaction that begins with `first`; `None` if unknown.
     pub fn length(first: u8) -> Option<usize> {
         match first {
             MEASURE => Some(MEASURE_BYTES),
@@ -188,7 +188,7 @@ impl Transaction {
     }
 }
 
-/// Separates transactions: each message is one transaction. A transaction with a bad status counts as a bad frame.
+/// Separates transactions. Each message is one transaction, and one with a bad status counts as a bad frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Transactions;
 

@@ -9,16 +9,16 @@ use crate::codec::{MEASURE, MEASURE_BYTES, MEMORY_BYTES, Transaction, Transactio
 /// Carriers over which a Bar100 can be connected.
 pub const CARRIERS: [Carrier; 2] = [Carrier::I2c, Carrier::Udp];
 
-/// Delay from requesting a memory cell to reading it. Source: Keller's protocol, at least 0.6 ms.
+/// Delay from requesting a memory cell to reading it. Source: Keller's protocol, which requires at least 0.6 ms.
 const MEMORY_SETTLES: DurNs = DurNs(1_000_000);
-/// Delay from starting a conversion to reading its result. Source: Keller's protocol, at most 8 ms; other drivers wait
-/// 9 or 10 ms.
+/// Delay from starting a conversion to reading its result. Source: Keller's protocol, where a conversion takes at most
+/// 8 ms; other drivers wait 9 or 10 ms.
 const CONVERSION: DurNs = DurNs(10_000_000);
 /// Delay from reading the calibration to the first measurement. Source: `ArduPilot`'s driver.
 const AFTER_CALIBRATION: DurNs = DurNs::from_millis(150);
 /// Interval between attempts to read the calibration.
 const RETRY: DurNs = DurNs::from_millis(500);
-/// Number of consecutive bad answers after which the calibration is read again, since the sensor may have been
+/// Number of consecutive bad answers after which the calibration is read again, because the sensor may have been
 /// replaced.
 const READ_AGAIN_AFTER: u32 = 20;
 
@@ -126,8 +126,8 @@ mod tests {
         fn deliver(&mut self, _: MonoNs, _: &[u8]) {}
     }
 
-    /// After a late answer, the driver has requested the first cell twice. The second answer must not count for the
-    /// next cell, whose request is lost and repeated.
+    /// The answer for the first cell is late, so the driver requests this cell twice. The second answer must not count
+    /// for the next cell. The request for the next cell is lost, so it is repeated.
     #[test]
     fn late_answer_is_not_taken_for_the_next_memory_cell() {
         let (mut driver, mut bus) = (Bar100Driver::new(10.0), Bus::default());

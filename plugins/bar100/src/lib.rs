@@ -1,8 +1,8 @@
 //! Blue Robotics Bar100 depth sensor (Keller 7LD) on I2C: converts transactions to absolute pressure and back.
 //!
-//! [`codec`] decodes transactions, [`calibration`] converts counts to pressure, [`decoder`] joins the two for the loop,
-//! [`driver`] is the host side of the bus, [`emulator`] the device side for simulations and rehearsals, and [`plugin`]
-//! reads the vehicle file.
+//! [`codec`] decodes transactions, [`calibration`] converts counts to pressure, and [`decoder`] joins the two for the
+//! loop. [`driver`] is the host side of the bus. [`emulator`] is the device side for simulations and rehearsals.
+//! [`plugin`] reads the vehicle file.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

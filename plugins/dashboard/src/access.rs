@@ -95,12 +95,12 @@ impl Access {
     /// Returns the role of a token; `None` for a wrong token.
     pub(crate) fn role_of(&self, token: &str) -> Option<Role> {
         let tokens = self.tokens.as_ref()?;
-        // The text is always compared with both roles' tokens, so that the response time does not reveal a match.
+        // The text is always compared with both tokens, so that the response time does not reveal a match.
         let (operates, sees) = (tokens.operator.is(token), tokens.viewer.is(token));
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }
 
-    /// Whether a token is the token of this role. The token isn't compared with those of other roles.
+    /// Whether a token is the token of this role. The token isn't compared with the tokens of other roles.
     pub(crate) fn is_token_of(&self, role: Role, token: &str) -> bool {
         self.tokens.as_ref().is_some_and(|tokens| match role {
             Role::Viewer => tokens.viewer.is(token),

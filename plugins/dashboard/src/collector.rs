@@ -32,18 +32,19 @@ pub(crate) const WAITING: usize = 64;
 const MOST_SAMPLES: usize = 20_000;
 /// Maximum length of wall whose samples are read from the loop's store for one message, m.
 const MENDED_AT_ONCE_M: f64 = 10.0;
-/// Shortest piece of wall for which samples are read from the loop's store, m. If so short a piece still has too many
-/// samples, some of them are left out.
+/// Shortest piece of wall for which samples are read from the loop's store, m. If even this piece has too many samples,
+/// some of them are left out.
 const SHORTEST_MENDED_M: f64 = 0.01;
 /// Maximum number of events, such as live messages, kept while the queue is full.
 const MOST_TOLD: usize = 256;
 /// Maximum number of sections in one message.
 const SECTIONS_AT_ONCE: usize = 4096;
-/// Longest interval between two live states sent to the page. After it a state is sent even without an update.
+/// Longest interval between two live states sent to the page. When it has passed, a state is sent even without an
+/// update.
 const EVERY: DurNs = DurNs(200_000_000);
 /// Averaging window for the sensors' rates of readings.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
-/// Minimum change in the length of the way back after which the way is sent again, m.
+/// Minimum change in the length of the way back after which the list of missed stretches is sent again, m.
 const WAY_STEP_M: f64 = 0.5;
 /// Minimum interval between two lists of missed stretches to go back to.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
@@ -150,13 +151,13 @@ impl Collector {
         }
     }
 
-    /// Makes the collector send verdicts for a second target, m, too.
+    /// Makes the collector also send verdicts for a second target, `target_m`, if there is one.
     pub(crate) fn compared_with(self, target_m: Option<f64>) -> Self {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call this method before the one
-    /// that handles the notice, tick or end.
+    /// Collects the live messages that a notice, a tick or the end of the dive causes. Call this method before the
+    /// method that handles the notice, the tick or the end.
     pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let mut value =
@@ -206,7 +207,8 @@ impl Collector {
         self.skips = false;
     }
 
-    /// Handles a state of the dive that was rebuilt from the log. The wall of the dive so far is sent in pieces.
+    /// Handles a state of the dive that was rebuilt from the log. The wall that the dive has covered so far is sent in
+    /// pieces.
     pub fn rebuilt(&mut self, dive: &Loop) {
         self.begun = dive.view().span().map(|(first, _)| first);
         self.lacking_m = dive.view().coverage().frontier.way().map(|way| [way.from_m, way.to_m]);
@@ -227,7 +229,7 @@ impl Collector {
     }
 
     /// Sets the displayed text about the recordings, and whether it is an alarm; `None` if recording works.
-    /// `read_again_pct` is not `None` while an interrupted dive's log is read again.
+    /// `read_again_pct` has a value only while an interrupted dive's log is read again.
     pub fn recorded(&mut self, shown: Option<(String, bool)>, read_again_pct: Option<u8>) {
         self.recording.read_again_pct = read_again_pct;
         let (words, fails) = shown.unzip();
@@ -270,7 +272,7 @@ impl Collector {
         }
         self.back_due = true;
         self.back_told = None;
-        // At the end of the dive, a live dive also waits for room in the queue.
+        // From the end of the dive on, even a live dive waits for room in the queue.
         self.waits = true;
         while !self.changed.is_empty() && self.send(dive) {}
     }
@@ -411,7 +413,7 @@ impl Collector {
     /// Passes a message to the queue. A replay waits for room; in a live dive a full queue drops the message.
     fn hand(&self, message: Fed) {
         if self.waits {
-            // Sending fails once the page has ended, which needs no action.
+            // Sending fails once the page has ended. This needs no action.
             let _gone = self.to.blocking_send(message);
         } else if let Err(TrySendError::Full(_)) = self.to.try_send(message) {
             tracing::debug!("the page is behind");

@@ -22,7 +22,7 @@ pub struct ComparedJson {
     pub fail_m: f64,
     /// Length of the sections with the verdict "can't say", m.
     pub cannot_say_m: f64,
-    /// Length of the sections with the verdict "open", without those not inspected, m.
+    /// Length of the sections with the verdict "open", except sections that are not inspected, m.
     pub open_m: f64,
     /// Length of the sections with the verdict "open" that are not inspected, m.
     pub not_inspected_m: f64,

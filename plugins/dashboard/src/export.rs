@@ -1,4 +1,4 @@
-//! Exports a dive as one file: the page together with all data that a server would send.
+//! Exports a dive as one file: the page together with all data that a server sends during a dive.
 
 use std::io::{self, Write as _};
 use std::thread::JoinHandle;
@@ -27,8 +27,8 @@ const MOST_SAMPLES: usize = 500_000;
 const MOST_STATES: usize = 7200;
 /// Attribute that marks the embedded dive in an exported page.
 pub const MARK: &str = "id=\"dive\"";
-/// Fields of a live state that an exported file omits. The file stores them once elsewhere, or they have no meaning in
-/// a file.
+/// Fields of a live state that an exported file omits. They are stored once elsewhere in the file, or have no meaning
+/// in a file.
 const LEFT_OUT: [&str; 8] =
     ["type", "seq", "alert_list", "playback", "ended", "page_dropped", "rates", "recording"];
 
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn exported_page_allows_only_its_own_script_and_no_network() {
-        // The hash in this test is that of an empty text: `printf '' | openssl dgst -sha256 -binary | base64`.
+        // The hash in this test is the hash of an empty text: `printf '' | openssl dgst -sha256 -binary | base64`.
         let page = with_policy("<html><head><title>t</title></head><script type=\"module\"></script></html>")
             .unwrap();
         let (before, after) = page.split_once("<title>").unwrap();

@@ -14,7 +14,7 @@ use crate::wire::{SampleRecord, SectionRecord};
 pub enum Fed {
     /// New data since the previous message.
     News(Box<News>),
-    /// Playback has jumped to this time, and later messages refer to the time after the jump.
+    /// Playback has jumped to this time. All later messages refer to the time after the jump.
     Jump(MonoNs),
     /// State of playback.
     Playback(PlaybackState),
@@ -27,13 +27,14 @@ pub enum Fed {
 pub struct News {
     /// End time of the latest tick.
     pub now: MonoNs,
-    /// Whether a seek skips this tick. Only the samples of a skipped tick are used; the state follows with the jump.
+    /// Whether a seek skips this tick. Only the samples of a skipped tick are used, because the state is sent after the
+    /// jump.
     pub is_skipped: bool,
     /// Time at which the dive began; `None` while unknown.
     pub begun: Option<MonoNs>,
     /// The live state at the end of the tick.
     pub state: Box<LiveStateJson>,
-    /// Displayed data besides the live state.
+    /// Displayed data that isn't in the live state.
     pub beside: Beside,
     /// Samples since the previous message.
     pub samples: Vec<SampleRecord>,
@@ -47,7 +48,7 @@ pub struct News {
     pub notes: Option<Vec<NoteJson>>,
     /// Missed stretches to go back to; `None` if the list hasn't changed.
     pub back: Option<Value>,
-    /// Counts of data dropped so far.
+    /// Counts of samples and events dropped so far.
     pub dropped: Dropped,
 }
 
@@ -117,17 +118,17 @@ pub struct RateJson {
 pub struct RecordingJson {
     /// Whether the dive is recorded.
     pub on: bool,
-    /// Whether data is being lost, or would be lost in a power cut.
+    /// Whether data is being lost now, or will be lost if the power fails.
     pub fails: bool,
     /// Text about the recording, the same on all screens; `None` if recording works.
     pub words: Option<String>,
-    /// How much of an interrupted dive's log has been read again, percent; `None` if the dive's state is complete.
+    /// Share of an interrupted dive's log that has been read again, percent; `None` if the dive's state is complete.
     pub read_again_pct: Option<u8>,
     /// Path of the recording.
     pub path: Option<String>,
 }
 
-/// Numbers of data dropped because the queue was full.
+/// Counts of samples and events that were dropped because the queue to the page's thread was full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Dropped {
     /// Number of dropped samples. Wall samples among these are sent again from the loop's store.

@@ -25,13 +25,12 @@ const MOST_TOLD: usize = 256;
 const MOST_AT_ONCE: usize = 1000;
 /// Maximum number of samples sent to a viewer that connects or reconnects.
 const MOST_BACK: usize = 10_000;
-/// Number of latest messages for which the model remembers how many samples were sent up to each: five minutes of
-/// messages.
+/// Number of latest messages for which the model remembers how many samples had been sent. They cover five minutes.
 const MOST_PLACES: usize = 1500;
 /// Maximum number of samples in the answer to a request for a range of chainage.
 pub const MOST_IN_RANGE: usize = 200_000;
 
-/// Kind of a message to viewers, so that a viewer can get only some kinds.
+/// Kind of a message to viewers. A viewer can request some kinds only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sort {
     /// A live state, which replaces the previous one.
@@ -321,8 +320,8 @@ impl Model {
     /// Call [`Model::flush`] first.
     pub fn catch_up(&self, since: Option<u64>, may: May, tokens_needed: bool) -> Vec<Message> {
         let since = since.filter(|since| *since <= self.seq);
-        // These messages carry the number `since`. A viewer that disconnects before it has all of them resumes from
-        // `since`.
+        // These messages carry the number `since`, so that a viewer that disconnects before it has all of them resumes
+        // from `since`.
         let low = since.unwrap_or(0);
         let text = |value: &Value| {
             let body = Body::Text(numbered(value, low).to_string().into());
@@ -456,8 +455,7 @@ impl Model {
         section_frame(self.seq, &all)
     }
 
-    /// Returns alerts, notes, history and the missed stretches to go back to as messages, for an exported
-    /// file.
+    /// Returns messages for an exported file: alerts, notes, history, and the missed stretches to go back to.
     pub fn closing(&self) -> Vec<Value> {
         let mut all = self.lists();
         all.push(self.history.message(self.seq));

@@ -4,8 +4,8 @@ use crate::wire::SampleRecord;
 
 /// Number of samples in a chunk, which then takes 1.25 MiB.
 const CHUNK: usize = 1 << 16;
-/// Maximum number of samples kept: 160 MB. Four heads need less for ten hours over 7 km. Further samples are only
-/// counted.
+/// Maximum number of samples kept, which take 160 MB. Four heads give fewer in ten hours over 7 km. Further samples are
+/// only counted.
 pub const MOST_SAMPLES: usize = 8_000_000;
 
 /// A chunk of samples and its range of chainage.
@@ -22,7 +22,7 @@ pub struct Samples {
     chunks: Vec<Chunk>,
     kept: usize,
     visible: usize,
-    /// End time of each tick, ms, with the number of samples up to that time. Kept for seeks.
+    /// End time of each tick, ms, with the number of samples up to that time. Seeks need these marks.
     marks: Vec<(u32, u32)>,
     not_kept: u64,
 }
@@ -45,8 +45,8 @@ impl Samples {
 
     /// Adds the samples of a tick that ended `at_ms` after the dive began.
     ///
-    /// After a seek back, the stored samples of a tick become visible again. `marked` is true for dives that support
-    /// seeks.
+    /// If playback has jumped back, the tick's samples are already stored and become visible again. `marked` is true
+    /// for dives that support seeks.
     pub fn take(&mut self, at_ms: u32, new: &[SampleRecord], marked: bool) {
         if marked && self.marks.last().is_some_and(|(last, _)| at_ms <= *last) {
             self.visible = self.visible.max(self.count_at(at_ms));

@@ -1,6 +1,6 @@
 //! Encodes the feed's binary frames, little-endian: a header of 16 bytes, then records of fixed size.
 //!
-//! `docs/reference/page-feed.md` defines them.
+//! `docs/reference/page-feed.md` defines the frames.
 
 use headrace_coverage::{Cause, Unsure, Verdict};
 use headrace_monitor::section_row::SectionRow;
@@ -9,7 +9,7 @@ use headrace_monitor::section_row::SectionRow;
 pub const SECTIONS: u8 = 1;
 /// Kind byte of a frame of samples.
 pub const SAMPLES: u8 = 2;
-/// Version byte of both kinds of frames.
+/// Version byte of frames of sections and of frames of samples.
 const VERSION: u8 = 1;
 /// Length of a frame's header, bytes.
 const HEAD_BYTES: usize = 16;

@@ -1,10 +1,10 @@
-//! Driver of a head. It keeps one command in flight, and keeps the head on its scan program: the planned
+//! Driver of a head. It keeps one command in flight. It also keeps the head on its scan program, which is the planned
 //! sequence of pings.
 //!
 //! The driver first locates the head. It then homes the head, the short way, to the program's current position, and
-//! requests each ping of the program when due. After a late or lost answer the head lags. The driver then polls it as
-//! soon as it has answered, until it has caught up. A head far off its program (power-cycled, or turned by hand) is
-//! homed again.
+//! requests each ping of the program when due. After a late or lost answer the head lags. Until it has caught up, the
+//! driver polls it as soon as it has answered. A head far off its program (power-cycled, or turned by hand) is homed
+//! again.
 
 use std::collections::VecDeque;
 
@@ -22,7 +22,7 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Tcp, Carrier::Serial, Carrier::Udp]
 
 /// Longest usual gap between the bytes of a return.
 const SILENCE: DurNs = DurNs::from_millis(100);
-/// Allowance for the head's own processing in the answer timeout.
+/// Part of the answer timeout that allows for the head's own processing.
 const LEISURE: DurNs = DurNs::from_millis(60);
 /// Slowest sound (m/s) and slowest line (bit/s) for which the answer timeout is long enough.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
@@ -31,8 +31,8 @@ const LINE_BAUD: f64 = 115_200.0;
 /// Source: LSTS DUNE, which retries after a second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// Limits beyond which a head is homed. The largest lag is the scan program's period divided by the first value. The
-/// largest lead is the second value. Before the head has joined its program, the limit of the lag is one ping.
+/// Limits beyond which a head is homed. The largest lag is the scan program's period divided by `BEHIND_SHARE`. The
+/// largest lead is `AHEAD_PINGS`. Before the head has joined its program, the largest lag is one ping.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
 /// A head that answers is reported as too slow for its settings if it lags by more than the scan program's period
@@ -136,7 +136,7 @@ impl HeadDriver {
         self.foreign_id = None;
         self.refused = !header.status.accepted() || header.status.overrun();
         let position = u16::try_from(i32::from(header.position) % COUNTS_PER_TURN).unwrap_or(0);
-        // A duplicate or late answer doesn't belong to any command in flight.
+        // Without a command in flight, this is a duplicate or late answer.
         let Some((aim, _)) = self.asked else { return };
         if let Aim::Ping(number) = aim {
             let planned = self.timetable.ping(number).map(|ping| ping.position);
@@ -306,8 +306,8 @@ impl Driver for HeadDriver {
 
 /// Time limit for the head's answer to a command.
 ///
-/// The timeout is twice the sum of three durations: the two-way travel time at the range setting, the transmission of
-/// the command and the longest return on a serial line, and the processing allowance.
+/// The timeout is twice the sum of three durations. These are the two-way travel time at the range setting, the
+/// transmission of the command and of the longest return on a serial line, and the processing allowance.
 fn answer_time(command: &Command) -> DurNs {
     let sound_s = 2.0 * f64::from(command.range_m) / SLOWEST_SOUND_MPS;
     let line_s = (COMMAND_BYTES + MAX_RETURN_BYTES) as f64 * 10.0 / LINE_BAUD;

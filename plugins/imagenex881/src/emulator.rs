@@ -146,8 +146,7 @@ impl Emulator<Sounding> for HeadEmulator {
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        // Imported soundings come without a call of `begin`, so the emulated host's command is requested
-        // here.
+        // Imported soundings arrive without a call of `begin`, so the command of the emulated host is requested here.
         let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else {
             return;
         };

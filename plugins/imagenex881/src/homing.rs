@@ -6,7 +6,7 @@ use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
 /// Range setting while homing, m: the shortest one. It must differ from the configured setting, so that returns of
-/// homing can be told from samples.
+/// homing can be distinguished from samples.
 const RANGE_M: u8 = 1;
 
 /// Position and stepping direction of a head.
@@ -21,9 +21,9 @@ pub struct Standing {
 /// Commands that move a head the short way to the start of its scan program and leave it stepping in the program's
 /// direction.
 ///
-/// A head pings with every command. The range setting while homing differs from the configured one, so that these
-/// returns don't count as samples. If the stepping direction is wrong at the end, a final command reverses it without a
-/// step.
+/// A head pings with every command. While homing, the range setting differs from the configured one, so that the
+/// returns of these pings don't count as samples. If the stepping direction is wrong at the end, a final command
+/// reverses it without a step.
 pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Vec<Command> {
     let normal = settings.angle_sign > 0.0;
     let half = COUNTS_PER_TURN / 2;

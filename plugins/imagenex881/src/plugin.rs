@@ -181,7 +181,7 @@ struct Reader {
 stateful!(Reader { state: rejected, reason; fixed: settings, latency; });
 
 impl HeadDecoder {
-    /// Creates a decoder. A position past +180 degrees makes a frame bad, whatever the head id.
+    /// Creates a decoder. A frame with a position past +180 degrees is bad, whatever its head id.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
         let reader = Reader { settings, latency, rejected: Rejected::default(), reason: None };
         let codec = ReturnCodec::new(Returns { model: Some(Model::Head881) });

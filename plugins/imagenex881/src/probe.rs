@@ -77,7 +77,7 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
-    /// Answers, to all probe requests in order, of a head configured with these keys.
+    /// Returns the answers of a head configured with these keys to all probe requests, in order.
     fn answers(keys: &str) -> Vec<Vec<u8>> {
         let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: false };
         let mut head = HeadEmulator::new(settings(keys).unwrap(), DurNs(0), &setup);

@@ -48,7 +48,7 @@ const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m:
 pub struct Settings {
     /// Command that requests a ping in mid-turn.
     pub command: Command,
-    /// Step in counts of 0.3 degrees, one of those supported by the command.
+    /// Step in counts of 0.3 degrees. It is one of the steps that the command supports.
     pub step_counts: u8,
     /// Time between two successive pings.
     pub ping_period: DurNs,
@@ -178,7 +178,7 @@ fn pings_a_turn(mode: Mode) -> i32 {
 ///
 /// Known periods are the maker's table and the periods measured in this mode. At a known range, the period is the known
 /// value. Between two known ranges, the period is interpolated linearly. Beyond the known ranges, it is extrapolated by
-/// the two-way travel time per ping, since the rest of the ping period (stepping, line) doesn't depend on range.
+/// the two-way travel time per ping, because the rest of the ping period (stepping, line) doesn't depend on range.
 fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Basis) {
     let table = MeasuredTurn {
         step_counts: mode.step_counts,
@@ -273,7 +273,7 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
         [("profile", (true, Points::P250)), ("imx", (false, Points::P250)), ("igx", (false, Points::P500))];
     let (profile, points) = own.choice("returns", &returns)?.unwrap_or((true, Points::P250));
     let command = Command {
-        // The largest head id is 252, since the byte 253 terminates a command.
+        // The largest head id is 252, because the byte 253 terminates a command.
         head_id: byte("head_id", 0..=252, 0x10)?,
         range_m,
         reverse: false,

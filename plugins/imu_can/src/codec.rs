@@ -59,8 +59,8 @@ impl MessageSet {
 
 /// Decodes bytes into messages of one maker's set.
 ///
-/// Other devices' frames, remote frames and error frames are good frames without a message. A frame of the set with a
-/// wrong length is bad. A message that holds no classic frame is bad, too.
+/// Other devices' frames, remote frames and error frames are good frames without a message. A frame of the message set
+/// with a wrong length is bad. Bytes that hold no classic CAN frame are bad, too.
 pub type ImuCodec = Framed<MessageSet, FRAME_BYTES>;
 
 impl Framing for MessageSet {

@@ -189,7 +189,8 @@ impl State {
             }
             M::RateOfTurn(raw) => return self.rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
             M::Acceleration(raw) => return self.force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
-            // High-rate messages are ignored, because sources disagree about which code is which.
+            // High-rate messages are ignored, because sources disagree about which code means rate and which means
+            // force.
             _ => (),
         }
         None
@@ -242,8 +243,8 @@ impl State {
 
     /// Handles a message of a Bosch unit; returns the acceleration once all three components have arrived.
     ///
-    /// Turn rates are not reported, since the unit has none about its pitch axis.
-    fn take_bosch(&mut self, message: bosch::Message) -> DelayedReading {
+    /// Turn rates are not reported, because the unit has none about its pitch axis.
+    fn take_bosch(&mut self, message: bosch::Message) -> Told {
         let [x, y, z] = &mut self.acceleration_mps2;
         match message {
             bosch::Message::Roll(_, acceleration) => *x = Some(acceleration.mps2()),
@@ -257,7 +258,7 @@ impl State {
 
     /// Handles a timestamp of an SBG unit. Only the kind of timestamp that arrived first is used.
     ///
-    /// The unit stamps samples and filter solutions with one clock but at different times.
+    /// The unit stamps samples and filter solutions with the same clock, but at different times.
     fn sbg_stamp(&mut self, time_us: u32, of_filter: bool) {
         if *self.stamped_by_filter.get_or_insert(of_filter) == of_filter {
             self.stamp(time_us, MICROSECOND);

@@ -128,7 +128,7 @@ fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
-/// Value of a device's 32-bit clock after this time.
+/// Returns the reading of a 32-bit clock, which wraps, after this many ticks.
 fn wrapped(ticks: i64) -> u32 {
     u32::try_from(ticks.rem_euclid(1 << 32)).unwrap_or_default()
 }

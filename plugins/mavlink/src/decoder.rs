@@ -105,8 +105,7 @@ struct BootClock {
 }
 
 impl BootClock {
-    /// Processes a timestamp of the clock. A small backward step is no wrap, since messages may be sent out
-    /// of order.
+    /// Processes a timestamp of the clock. A small backward step is no wrap, because messages may be sent out of order.
     fn note(&mut self, time_ms: u32) {
         self.since_boot_ms = match self.last_ms {
             None => i64::from(time_ms),

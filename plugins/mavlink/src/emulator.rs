@@ -14,7 +14,7 @@ use mavlink::dialects::ardupilotmega::{
     ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
 };
 
-/// Least and greatest distance of an emulated distance sensor, cm: about those of a Ping1D.
+/// Least and greatest distance of an emulated distance sensor, cm: about the limits of a Ping1D.
 const LEAST_CM: u16 = 30;
 const MOST_CM: u16 = 5000;
 /// Qualities of distances with and without an echo, per cent.
@@ -46,8 +46,7 @@ impl AutopilotEmulator {
             Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
             _ => 1.0,
         };
-        // Without a real host there are no heartbeats, since a sensor's driver records only that sensor's
-        // messages.
+        // Without a real host there are no heartbeats, because a sensor's driver records only that sensor's messages.
         let heartbeat_at = (!setup.polled).then_some(setup.start);
         Self { meaning, rate_hz, start: setup.start, device_per_site, begun: 0, sequence: 0, heartbeat_at }
     }

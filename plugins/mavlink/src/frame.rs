@@ -330,7 +330,7 @@ mod tests {
         assert_eq!(decode_all(&mut MavlinkCodec::default(), &encoded(&frame)), []);
     }
 
-    /// The frames have no signatures, since a truncated signature can't be distinguished from the following frame.
+    /// The frames have no signatures, because a truncated signature can't be distinguished from the following frame.
     fn any_frame() -> impl Strategy<Value = Frame> {
         let ids = proptest::sample::select(vec![0_u32, 26, 27, 29, 30, 116, 132, 137, 143, 253, 11_032]);
         let payload = proptest::collection::vec(any::<u8>(), 255);

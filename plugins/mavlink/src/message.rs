@@ -217,8 +217,8 @@ pressure_messages! {
 const TYPE_AT: usize = 10;
 const ORIENTATION_AT: usize = 12;
 
-/// The crate rejects types and orientations that aren't in its definitions. Here neither is parsed as an enumeration:
-/// the sensor type isn't used, and the orientation is a plain number in the vehicle file.
+/// The mavlink crate rejects types and orientations that aren't in its definitions. Here they aren't parsed as
+/// enumerations: the sensor type isn't used, and the orientation is a plain number in the vehicle file.
 impl MessageData for Distance {
     type Message = MavMessage;
 
@@ -239,8 +239,8 @@ impl MessageData for Distance {
             signal_quality: self.quality_percent,
             ..DISTANCE_SENSOR_DATA::DEFAULT
         };
-        // The field after the orientation is the variance. Its value for "unknown" isn't zero, so the orientation is
-        // never truncated.
+        // The field after the orientation is the variance. Its value for "unknown" isn't zero. The orientation, even if
+        // zero, is therefore never truncated.
         let len = data.ser(version, payload);
         if let Some(orientation) = payload.get_mut(ORIENTATION_AT) {
             *orientation = self.orientation;

@@ -1,8 +1,8 @@
 //! The program's own MAVLink messages: heartbeats, values and texts. The program sends them as an onboard computer
 //! beside the autopilot.
 //!
-//! DISTANCE_SENSOR and OBSTACLE_DISTANCE are never sent. Ground stations would attribute them to the autopilot, and an
-//! autopilot would try to avoid the obstacles.
+//! DISTANCE_SENSOR and OBSTACLE_DISTANCE are never sent. Ground stations attribute them to the autopilot, and an
+//! autopilot tries to avoid the obstacles.
 
 use mavlink::MavHeader;
 use mavlink::types::CharArray;

@@ -1,4 +1,4 @@
-//! Table in the vehicle file of a sensor reported over MAVLink, and the sensor's registration with the loop.
+//! The table in a vehicle file for a sensor that is reported over MAVLink, and the sensor's registration with the loop.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};

@@ -313,7 +313,7 @@ fn wrong_keys_of_the_vehicle_file_are_named() {
 
 #[test]
 fn anonymising_removes_positions_and_ids_but_keeps_readings() {
-    // The removed messages are GLOBAL_POSITION_INT in both versions; the one in version 2 is signed.
+    // The removed messages are GLOBAL_POSITION_INT in versions 1 and 2. The message in version 2 is signed.
     let first = [&[0xFE, 28, 0, 1, 1, 33][..], &[7; 28], &[0, 0]].concat();
     let second = [&[0xFD, 20, 1, 0, 0, 1, 1, 33, 0, 0][..], &[7; 20], &[0, 0], &[9; 13]].concat();
     let packet = [&first, RECORDED_ATTITUDE, &second, RECORDED_PRESSURE].concat();

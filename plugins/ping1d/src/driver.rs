@@ -20,9 +20,9 @@ const SILENCE: DurNs = DurNs::from_millis(50);
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
 /// Time that the device has to answer a distance request, in addition to the ping interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
-/// Maximum number of times that a setting is sent. Without an acknowledgement, the next setting then follows.
+/// Maximum number of times that a setting is sent. If no acknowledgement comes, the driver sends the next setting.
 const TRIES: u32 = 4;
-/// Interval at which the speed of sound is checked, since other clients of a bridge can change it.
+/// Interval at which the speed of sound setting is checked, because other clients of a UDP bridge can change it.
 const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
 
 const ECHOSOUNDER: u8 = 1;
@@ -121,7 +121,7 @@ impl PingDriver {
         }
     }
 
-    /// Handles a timeout. Settings are sent again, since a device that missed a setting would measure differently.
+    /// Handles a timeout. Settings are sent again, because a device that missed a setting measures differently.
     fn give_up(&mut self, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
         self.asked = None;
         let Some((bytes, tries)) = self.again.take().filter(|(_, tries)| *tries > 0) else { return };

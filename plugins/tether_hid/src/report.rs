@@ -1,4 +1,4 @@
-//! HID reports, whose layout is given in the vehicle file, since no cable counter with a published report is known.
+//! HID reports. Their layout is given in the vehicle file, because no cable counter with a published report is known.
 //!
 //! The reference layout is defined by this project, for emulated counters:
 //! ```text
@@ -126,7 +126,7 @@ impl Width {
         self.bits() as usize / 8
     }
 
-    /// `count`, wrapped to the width of the counter.
+    /// Returns `count`, wrapped to the width of the counter.
     pub fn wrapped(self, count: i64, signed: bool) -> i64 {
         let modulus = 1_i64 << self.bits();
         let above = count.rem_euclid(modulus);

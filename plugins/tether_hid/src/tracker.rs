@@ -4,7 +4,7 @@
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other. If
 //!   [`PERSIST`] consecutive reports agree, the counter has really moved, and the reports weren't corrupt.
 //!   - If the first of these reports was near zero, the device counts from zero again. The length continues from its
-//!     latest value. The restart is recorded, since the device may have been replugged.
+//!     latest value. The restart is recorded, because the device may have been replugged.
 //!   - Otherwise the counter's new value is accepted.
 //! - A step back to near zero is accepted at once only if the winch can cover it in a second. This holds after a
 //!   silence too.
@@ -79,14 +79,14 @@ struct Seen {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     from_zero: bool,
-    /// Time of the first of these rejected reports.
+    /// Time of the first of the rejected reports that agree.
     since: MonoNs,
     last: Seen,
     agreeing: u32,
 }
 
 impl CountTracker {
-    /// Creates a tracker; `max_counts_per_s` is the maximum speed of the winch or the vehicle, in counts.
+    /// Creates a tracker; `max_counts_per_s` is the maximum speed of the winch or the vehicle, in counts per second.
     pub fn new(counting: Counting, width: Width, max_counts_per_s: f64) -> Self {
         Self {
             counting,
@@ -116,7 +116,7 @@ impl CountTracker {
         let repeated = self.note_sequence(report.sequence);
         let now = Seen { count: report.count, at };
         match self.counting {
-            // A repeated change must not be added twice, while reading the same absolute count twice is harmless.
+            // A repeated change must not be added twice. Reading the same absolute count twice is harmless.
             Counting::Delta if repeated => None,
             Counting::Delta => self.take_delta(now),
             Counting::Absolute => self.take_absolute(now),

@@ -1,4 +1,5 @@
-//! Provides a loop that advises a simulated pilot. The recorded dive is later run through a loop of the same kind.
+//! Simulates dives whose pilot follows the advice of a loop. This loop runs only during the simulation. The recorded
+//! dive is later run through a loop of its own.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::work_off;
@@ -27,14 +28,14 @@ pub enum SimulationError {
 
 /// Simulates a scene, with ground truth if `noting` is true.
 ///
-/// A pilot who follows advice gets a loop of his own, armed with the scene's vehicle file.
+/// If the scene's pilot follows advice, the advice comes from a loop that is armed with the scene's vehicle file.
 ///
 /// Errors: see [`SimulationError`].
 pub fn simulation(scene: &Scene, noting: bool) -> Result<Simulation, SimulationError> {
     simulation_believing(scene, &scene.vehicle, noting)
 }
 
-/// Simulates a scene as [`simulation`] does, but arms the pilot's loop with another vehicle file, `believed`.
+/// Simulates a scene as [`simulation`] does, but computes the pilot's advice with another vehicle file, `believed`.
 ///
 /// The sensors of `believed` must send the same bytes as those of the scene's vehicle file.
 ///
@@ -53,7 +54,7 @@ pub fn simulation_believing(
 
 struct LoopAdviser {
     dive: Loop,
-    /// Ports of the loop by source; `None` if a port is in use elsewhere.
+    /// Ports of the loop, by source number; `None` if a port is in use elsewhere.
     ports: Vec<Option<Port>>,
     /// End of the current tick of the loop.
     until: MonoNs,

@@ -85,7 +85,7 @@ impl AtomicFile {
         }
         let folder = folder_of(place).to_owned();
         self.beside = None;
-        // Other systems can't open folders, and some file systems can't sync them.
+        // Systems other than Unix can't open folders. Some file systems can't sync folders, so an error is ignored.
         if cfg!(unix) {
             File::open(folder).and_then(|folder| folder.sync_all()).ok();
         }
@@ -151,7 +151,7 @@ fn open_pipe(path: &Path) -> Result<File> {
     loop {
         match open(path, OFlags::WRONLY | OFlags::NONBLOCK | OFlags::CLOEXEC, Mode::empty()) {
             Ok(pipe) => {
-                // From here on writes block, so that a slow reader gets everything.
+                // From here on, writes to the pipe block, so that a slow reader gets everything.
                 fcntl_setfl(&pipe, OFlags::empty())?;
                 return Ok(pipe.into());
             }
@@ -248,7 +248,7 @@ fn name_beside(place: &Path) -> PathBuf {
     place.with_file_name(name)
 }
 
-/// Whether an error means that the folder accepts no new file. An existing file there may still be writable.
+/// Whether an error means that no new file can be created in the folder. An existing file may still be writable.
 fn is_refused(kind: ErrorKind) -> bool {
     use ErrorKind::{InvalidFilename, PermissionDenied, ReadOnlyFilesystem};
     matches!(kind, InvalidFilename | PermissionDenied | ReadOnlyFilesystem)
@@ -281,7 +281,7 @@ mod tests {
         file.write_all(b"new").unwrap();
         file.flush().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        // A killed program leaves nothing behind if the new file is unlinked.
+        // An unlinked file doesn't appear in its folder, so a killed program leaves nothing behind.
         if nameless(&folder).is_some() {
             assert_eq!(names(&folder), ["report.json"]);
         }

@@ -1,7 +1,7 @@
 //! Handles logs whose messages have timestamps from several clocks, e.g. time since boot and UNIX time.
 //!
-//! Such timestamps have no common order. Only messages of the clock with the most messages are played. The others are
-//! dropped and reported.
+//! Such timestamps have no common order. Only messages of the clock with the most messages are played. All other
+//! messages are dropped and reported.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 
 /// Minimum offset between two clocks, far longer than any dive. Timestamps with smaller gaps come from one clock.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Maximum number of clocks that are distinguished. Messages of further clocks are assigned to no clock.
+/// Maximum number of clocks that are distinguished. Messages of further clocks count for no clock.
 const MAX_CLOCKS: usize = 100;
 
 /// A clock, described by the range of its timestamps. The ranges of two clocks are more than a year apart.
@@ -41,7 +41,7 @@ impl Clock {
 
 /// Returns the clock with the most raw messages; `None` if the log has only one clock.
 ///
-/// The messages are read only if the chunk headers span more than a year.
+/// Messages are read only if the times in the chunk headers span more than a year.
 ///
 /// Errors: the log can't be read.
 pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<Option<Clock>, LogError> {
@@ -95,7 +95,7 @@ mod tests {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);
-        // The timestamp of a clock beyond the limit doesn't extend the range of another clock.
+        // A timestamp beyond the limit on clocks doesn't extend the range of any other clock.
         assert!(!count(&mut clocks, MonoNs(YEAR_NS * 580)) && count(&mut clocks, MonoNs(8)));
         assert!(clocks.iter().all(|clock| clock.to.0 - clock.from.0 <= YEAR_NS));
     }

@@ -1,4 +1,4 @@
-//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, as the port threads would do.
+//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, like port threads.
 
 use std::time::{Duration, Instant};
 
@@ -44,7 +44,7 @@ pub trait PacketSource {
 pub struct Pace {
     /// Length of a tick in packet time; must be positive.
     pub tick: DurNs,
-    /// Seconds of packet time per second of wall time; `None` is as fast as possible.
+    /// Seconds of packet time per second of wall time; `None` means as fast as possible.
     pub speed: Option<f64>,
 }
 
@@ -131,7 +131,7 @@ impl Feed for PacedFeed<'_> {
     }
 }
 
-/// Waits briefly, so that a slow outlet can catch up.
+/// Waits briefly, so that a slow receiver of results can catch up.
 pub(crate) fn pause() {
     std::thread::sleep(Duration::from_millis(1));
 }
@@ -154,7 +154,7 @@ impl Driver {
 
     /// Returns the end of the next tick; `None` at the end of the feed.
     ///
-    /// After a gap in the feed, the tick ends just after the next packet.
+    /// If the feed has a gap, the tick ends just after the first packet that follows the gap.
     ///
     /// Errors: reading the feed fails.
     pub fn due(&self, feed: &mut dyn PacketSource) -> Result<Option<MonoNs>, DriveError> {
@@ -179,7 +179,7 @@ impl Driver {
         Ok(())
     }
 
-    /// Feeds packets received before `until`. Calls `work_off`, which runs a tick, whenever a ring is full.
+    /// Feeds packets received before `until`. Whenever a ring is full, calls `work_off`, which runs a tick to empty it.
     ///
     /// After an error, the packets fed so far have been processed.
     pub(crate) fn fill(
@@ -196,7 +196,7 @@ impl Driver {
         sent
     }
 
-    /// Sets the end of the previous tick to `until`, after both the feed and the loop have jumped there.
+    /// Sets the end of the previous tick to `until`, after the feed and the loop have jumped to this time.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }
@@ -226,7 +226,7 @@ fn send_until(
     while let Some(coming) = feed.coming()?.filter(is_due) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };
         if !port.has_room(coming.len) {
-            // A full ring ends the tick early. Results don't depend on where ticks end.
+            // The ring is full, so a tick is run now to empty it. Results don't depend on where ticks end.
             work_off(coming.at);
         }
         if let Err(error) = feed.send(port) {

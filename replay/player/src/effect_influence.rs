@@ -43,12 +43,12 @@ pub enum EffectInfluenceError {
     Seeds(usize),
 }
 
-/// Cost of some effects of a scene, and change of the results if these effects are left out.
+/// Cost of some effects of a scene, and the change of the results without these effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
     /// Names of the effects that are left out of the simulation.
     pub effects: Vec<&'static str>,
-    /// Cost of these effects, ns of processor time per sonar return.
+    /// Cost of the effects that are left out, ns of processor time per sonar return.
     pub price_ns: Mean,
     /// Mean change of the hole diameter D over the sections if the effects are left out, m.
     pub hole_m: Mean,
@@ -76,21 +76,21 @@ pub struct EffectInfluence {
 }
 
 impl LeftOut {
-    /// Whether leaving out these effects changes the hole diameter D by at most [`HOLE_LIMIT_M`], and the passed share
-    /// by at most [`PASSED_LIMIT`].
+    /// Whether the changes are negligible: at most [`HOLE_LIMIT_M`] for the hole diameter D, and at most
+    /// [`PASSED_LIMIT`] for the passed share.
     ///
     /// The whole confidence intervals must be within the limits.
     pub fn is_free(&self) -> bool {
         self.excess() <= 1.0
     }
 
-    /// Returns the largest change within the confidence intervals, as a multiple of the limit for that quantity.
+    /// Returns the largest change within the two confidence intervals, as a multiple of the limit for that quantity.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
 }
 
-/// Measures the effects of a scene. `scenes` has this scene once per seed.
+/// Measures the effects of a scene. `scenes` contains this scene once per seed.
 ///
 /// `note` is called with the number of finished dives and the maximum number of dives.
 ///
@@ -103,8 +103,8 @@ pub fn measure(
         return Err(EffectInfluenceError::Seeds(scenes.len()));
     }
     let effects = scenes.first().map(Scene::simulated).unwrap_or_default();
-    // Leaving out all negligible effects together takes one measurement. Each effect that must be restored takes one
-    // more measurement.
+    // One measurement leaves out all negligible effects together. Each effect that must be restored takes one more
+    // measurement.
     let most = scenes.len() * (2 * effects.len() + 2);
     let mut paired = Paired { with: Vec::new(), scenes, dived: 0, most, note };
     paired.with = paired.dive(&[])?;
@@ -126,7 +126,7 @@ pub fn measure(
     })
 }
 
-/// Returns the scene on which the cost is measured.
+/// Returns the first scene, on which the cost is measured.
 fn first(scenes: &mut [Scene]) -> Result<&mut Scene, EffectInfluenceError> {
     scenes.first_mut().ok_or(EffectInfluenceError::Seeds(0))
 }
@@ -228,8 +228,8 @@ impl Figures {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }
 
-    /// Returns the mean difference of the hole diameter D over the sections that both dives have, m; zero without such
-    /// sections.
+    /// Returns by how much the hole diameter D exceeds that of `other`, as a mean over the sections that both dives
+    /// have, m. Zero without such sections.
     fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();
@@ -237,7 +237,7 @@ impl Figures {
     }
 }
 
-/// Number of rounds. Each round simulates the scene once, and for a comparison once more without the effects.
+/// Number of rounds. Each round simulates the scene once. A comparison simulates it once more, without the effects.
 const ROUNDS: usize = 5;
 
 /// Returns the cost of simulating with all effects, ns of processor time per sonar return.
@@ -248,7 +248,7 @@ fn total_price_ns(scene: &Scene) -> Result<Mean, EffectInfluenceError> {
     Ok(Mean::of(&rounds?))
 }
 
-/// Returns the cost that these effects add, ns of processor time per sonar return.
+/// Returns the cost that `effects` add, ns of processor time per sonar return.
 ///
 /// Errors: see [`EffectInfluenceError`].
 fn added_price_ns(scene: &mut Scene, effects: &[&str]) -> Result<Mean, EffectInfluenceError> {

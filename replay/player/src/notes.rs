@@ -17,10 +17,10 @@ use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
 /// The notes in a log, including voice notes.
 #[derive(Debug, Default)]
 pub struct LoggedNotes {
-    /// The notes, numbered as in a replay. Their chainages come from the log's results, and are missing without
-    /// results.
+    /// The notes, numbered as in a replay. Chainages come from the log's results; without results, the notes have no
+    /// chainage.
     pub notes: Vec<NoteJson>,
-    /// Recordings of voice notes by id: seconds, container, and length in bytes.
+    /// Recordings of voice notes, by the note's id. Each has seconds, container, and length in bytes.
     pub voices: BTreeMap<u32, (u32, Container, usize)>,
     /// Decoding error of each invalid voice message.
     pub wrong: Vec<String>,

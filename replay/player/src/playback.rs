@@ -13,7 +13,7 @@ use crate::log::LogError;
 use crate::player::Player;
 use crate::snapshot_store::SnapshotStore;
 
-/// Name of a snapshot's first part, the player's position in the log. The loop's state follows it.
+/// Name of a snapshot's first part, which holds the player's position in the log. The loop's state follows.
 const PLACE_PART: &str = "place in the log";
 
 /// A command to playback. Commands are executed in order.
@@ -27,7 +27,7 @@ pub enum PlaybackCommand {
     Step(u32),
     /// Plays until a section is judged, then pauses.
     StepSection,
-    /// Sets the speed: seconds of the dive per second of wall time; `None` is as fast as possible.
+    /// Sets the speed, seconds of the dive per second of wall time; `None` means as fast as possible.
     Speed(Option<f64>),
     /// Jumps to a time on the log's clock, forward or back. Playback stays playing or paused.
     Seek(MonoNs),
@@ -57,7 +57,7 @@ pub trait PlaybackObserver {
     /// Called after each tick that is played.
     fn after_tick(&mut self, dive: &Loop);
 
-    /// Called after each tick that a jump skips. Notices of such a tick must not be displayed.
+    /// Called after each tick that a jump skips. Notices of a skipped tick must not be displayed.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
     /// Called when playback pauses, after a jump, and at the end of the log. `ended` is true only at the end of the
@@ -78,7 +78,7 @@ pub struct Playback<'a> {
     driver: Driver,
     clock: Clock,
     speed: Option<f64>,
-    /// End of the latest tick that was played.
+    /// End of the latest tick that was run, on the log's clock.
     now: MonoNs,
     /// Receive time of the log's first packet.
     begun: MonoNs,
@@ -100,8 +100,8 @@ enum Mode {
 impl<'a> Playback<'a> {
     /// Creates a playback that starts at the beginning of the log. The player must already be connected to the loop.
     ///
-    /// A snapshot is taken whenever the processing time since the previous one exceeds an interval. A jump therefore
-    /// never takes much longer than that interval.
+    /// A snapshot is taken whenever processing since the previous snapshot has taken longer than the store's interval.
+    /// A jump therefore takes hardly longer than this interval.
     ///
     /// Errors: the log can't be read, or the first snapshot can't be taken.
     pub fn new(
@@ -146,7 +146,7 @@ impl<'a> Playback<'a> {
             let due = self.driver.due(self.player)?;
             let command = match due {
                 None => {
-                    // Steps that are left over at the end are discarded, so that a later jump back doesn't run them.
+                    // At the log's end, remaining steps are discarded, so that a later jump back doesn't run them.
                     if let Mode::Stepping(_) | Mode::SteppingSection = self.mode {
                         self.mode = Mode::Paused;
                     }
@@ -180,8 +180,8 @@ impl<'a> Playback<'a> {
                 command
             }
             Mode::Stepping(_) => None,
-            // The next judged section may be far away, so commands must be able to interrupt. The check for a command
-            // doesn't wait.
+            // Only checks for a command and doesn't wait. The next judged section may be far away, so commands must be
+            // able to interrupt.
             Mode::SteppingSection => commands.try_recv().ok(),
             Mode::Playing => match self.clock.left(until) {
                 None => commands.try_recv().ok(),
@@ -281,7 +281,8 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Jumps to the last tick that ends at or before `to`. Starts from here, or from the nearest earlier snapshot.
+    /// Jumps to the last tick that ends at or before `to`. Starts from the current position, or from the nearest
+    /// earlier snapshot.
     ///
     /// Errors: see [`PlaybackError`].
     pub fn seek(&mut self, to: MonoNs, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {

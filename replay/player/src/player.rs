@@ -32,7 +32,7 @@ pub struct Player {
     clock: Option<Clock>,
     /// Messages with timestamps of another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
-    /// The farthest position from which a jump started, as a message count, and the losses up to that position.
+    /// The farthest position that playback had reached before a jump, as a message count, and the losses up to it.
     farthest: (u64, Vec<String>),
 }
 
@@ -77,7 +77,8 @@ impl Player {
         self.reader.header()
     }
 
-    /// Maps the log's sources to the loop's sources by name. The operator's input comes after the sensors.
+    /// Maps the log's sources to the loop's sources by name. The number of the operator's input follows those of the
+    /// sensors.
     ///
     /// Before this call, no message of the log has a source in the loop.
     pub fn connect(&mut self, sources: &[SourceInfo]) {
@@ -104,7 +105,7 @@ impl Player {
 
     /// Continues from a position of this player, or of another player of the same log and vehicle.
     ///
-    /// Losses are then counted as if the log had been played straight through. Losses found after the position stay in
+    /// Losses are then counted as if the log had been played straight through. Losses found beyond the position stay in
     /// the list until playback passes them again.
     ///
     /// Errors: the log can't be read at that position.
@@ -251,7 +252,8 @@ impl PacketSource for Player {
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
         let Some(coming) = self.next else { return Ok(()) };
-        // This program's own logs are in the loop's order of consumption. Logs of other writers are in time order.
+        // Only this program's own logs state the order in which the loop consumed packets. Other logs are read in time
+        // order.
         let order = if self.reader.has_ticks() { self.order } else { NO_ORDER };
         port.send_in_order(coming.at, order, &self.bytes)?;
         self.order += 1;

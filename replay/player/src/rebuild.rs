@@ -1,7 +1,8 @@
-//! Rebuilds the state of an interrupted dive from its log, on a thread of its own, while new packets are only recorded.
+//! Rebuilds the state of an interrupted dive from its log, on a thread of its own. Meanwhile, new packets are only
+//! recorded.
 //!
-//! The log is replayed into a second loop, followed by the new packets. When the second loop has caught up, its state
-//! is restored into the dive's loop.
+//! A second loop replays the log, and then processes the new packets. When it has caught up, its state is restored into
+//! the dive's loop.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,8 +22,8 @@ use crate::playback::PlaybackError;
 use crate::player::Player;
 use crate::saved_state::{Consumed, SavedState};
 
-/// Number of new packets left to the rebuilding loop at which the dive's loop waits for it. The wait takes a fraction
-/// of a second.
+/// If at most this many new packets are still unprocessed, the dive's loop waits for the rebuilding loop. The wait
+/// takes a fraction of a second.
 const NEAR_PACKETS: u64 = 100;
 
 /// A dive whose state is being rebuilt.
@@ -40,7 +41,7 @@ pub struct Rebuilt {
     pub snapshot: Vec<u8>,
     /// Number of packets in the saved state that was used; 0 if the whole log was replayed.
     pub saved_packets: u64,
-    /// All packets of the dive so far.
+    /// Number and digest of all packets of the dive so far.
     pub consumed: Consumed,
     /// Files of the log, with their numbers of messages.
     pub files: Vec<PartFile>,
@@ -106,21 +107,22 @@ impl Rebuild {
         Ok(Self { thread, packets, sent: 0, progress })
     }
 
-    /// Passes on the packets of a tick that the dive's loop only records.
+    /// Passes the packets of a tick to the rebuilding thread. The dive's loop only records these packets.
     pub fn take(&mut self, inbox: &Inbox) {
         for (source, packet) in inbox.iter() {
             let packet = Packet { received: packet.received, source, bytes: packet.bytes.to_vec() };
-            // If the thread has ended early, `finish` returns its error.
+            // A packet can't be sent if the thread has ended early. [`Rebuild::finish`] then returns the thread's
+            // error.
             self.sent += u64::from(self.packets.send(packet).is_ok());
         }
     }
 
-    /// Returns the time in the log up to which the state has been rebuilt.
+    /// Returns the time in the log up to which the state is rebuilt.
     pub fn at(&self) -> MonoNs {
         MonoNs(self.progress.at_ns.load(Ordering::Relaxed))
     }
 
-    /// Whether [`Rebuild::finish`] takes a fraction of a second only, or the thread has ended early.
+    /// Whether [`Rebuild::finish`] takes only a fraction of a second, or the thread has ended early.
     pub fn is_near(&self) -> bool {
         let behind = self.sent.saturating_sub(self.progress.taken.load(Ordering::Relaxed));
         self.thread.is_finished() || self.progress.read.load(Ordering::Relaxed) && behind <= NEAR_PACKETS
@@ -134,7 +136,7 @@ impl Rebuild {
         self.thread.join().unwrap_or(Err(PlaybackError::Log(LogError::Panicked)))
     }
 
-    /// Tells the thread to end without a result. Doesn't wait for the thread, because the thread's medium may not
+    /// Tells the thread to end without a result. Doesn't wait for the thread, because the medium that it reads may not
     /// respond.
     pub fn cancel(self) {
         self.progress.cancelled.store(true, Ordering::Relaxed);
@@ -154,10 +156,10 @@ struct Rejoined {
 }
 
 impl Rejoined {
-    /// Skips the packets that a saved state contains, and restores the state.
+    /// Skips the packets that a saved state contains, and restores the saved state.
     ///
-    /// If the packets aren't those of the log, the dive is rebuilt from its beginning. Returns the number of packets
-    /// skipped.
+    /// If the state's packets aren't those of the log, the dive is rebuilt from its beginning. Returns the number of
+    /// packets skipped.
     fn start_at(
         &mut self,
         state: &SavedState,

@@ -14,13 +14,13 @@ use crate::log::format::{HEAD_WORDS, RESULT_PREFIX, STREAMS};
 use crate::log::{RecorderPort, ResultChannel};
 use crate::view;
 
-/// Free bytes that the largest tick needs in the recorder's queue: packets, their headers, and the list of their
+/// Free bytes that the largest tick needs in the recorder's queue, for packets, their headers, and the list of their
 /// sources.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
 /// In a dive that reads ports, a tick may consume at most the free room of the queue divided by this number.
 ///
-/// Short packets, together with their results, take several times their length in the queue.
+/// The limit is strict because short packets, with their results, take several times their length in the queue.
 const SMALLER_TICK: usize = 8;
 /// Minimum limit for a tick in a dive that reads ports, bytes. The longest packet of a port has some KiB.
 const MIN_TICK_BYTES: usize = 8 * 1024;
@@ -33,7 +33,7 @@ pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
 /// Size of a recorder's queue in a dive that reads ports, bytes.
 ///
-/// It holds some minutes of a vehicle with four heads while the medium accepts no data.
+/// It holds some minutes of data of four heads, for times when the medium accepts no data.
 pub const QUEUE_OF_PORTS_BYTES: usize = 16 * LARGEST_TICK_BYTES;
 
 /// Name of the stream that has a record per echo.
@@ -74,14 +74,14 @@ pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
 /// the loop consumes nothing until there is room. Recorded input is therefore never dropped.
 ///
 /// A dive that reads ports doesn't wait, see [`RecorderOutlet::of_ports`]. If all recorders have ended, the dive
-/// continues without recording; their handles return the errors.
+/// continues without recording, and the recorders' handles return the errors.
 pub struct RecorderOutlet {
     ports: Cell<Vec<RecorderPort>>,
     is_of_ports: bool,
 }
 
 impl RecorderOutlet {
-    /// Creates the outlet from the loop's ends of recorders, whose queues must have [`QUEUE_BYTES`].
+    /// Creates the outlet from the ports of recorders, whose queues must have [`QUEUE_BYTES`].
     ///
     /// The outlet can be added to one loop only.
     pub fn new(ports: impl IntoIterator<Item = RecorderPort>) -> Self {
@@ -133,11 +133,12 @@ impl Outlet for Recording {
         let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
         let needed = bytes + RecorderPort::tick_entry_bytes(count);
         for port in ports.iter_mut().filter(|port| !port.is_closed()) {
-            // A recorder that skips ticks resumes only with ample room, and not with each small tick that would fit.
+            // A recorder that skips ticks resumes only once there is ample room, even if a small tick would fit
+            // earlier.
             let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
             if count > 0 && port.vacant_bytes() < needed {
-                // Ticks are skipped only in a dive that reads ports. In other dives the allowance has reserved the
-                // room.
+                // Ticks are skipped only in a dive that reads ports. In any other dive, the loop's allowance has
+                // reserved the room.
                 port.skip(time.now, count as u64);
                 continue;
             }
@@ -168,7 +169,7 @@ fn allowance_bytes<'a>(open: impl Iterator<Item = &'a RecorderPort>, is_of_ports
 fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &mut Vec<u16>) {
     order.clear();
     for (source, packet) in inbox.iter() {
-        // The caller has checked that all of these entries fit.
+        // The caller has checked that all entries of this tick fit.
         if port.raw(source.0, packet.received, packet.received, packet.bytes).is_ok() {
             order.push(source.0);
         }
@@ -180,7 +181,7 @@ fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &
 
 /// Records the results of a tick.
 ///
-/// Input has priority, so results that don't fit are left out. Gaps in the record numbers show such omissions.
+/// Packets have priority, so results that don't fit are left out. Gaps in the record numbers show such omissions.
 fn record_results(
     port: &mut RecorderPort,
     streams: &[(&str, &ResultStream)],

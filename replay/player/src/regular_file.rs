@@ -1,5 +1,4 @@
-//! Opens and reads regular files only. Reading a pipe without a writer would block for ever, and a device may never
-//! end.
+//! Opens and reads regular files only. Reading a pipe without a writer blocks for ever, and a device may never end.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};

@@ -1,7 +1,7 @@
 //! States of a live dive's loop, saved so that an interrupted dive can be continued quickly.
 //!
-//! A state belongs to one program and to one sequence of packets. It is a shortcut only: without it, the whole log is
-//! replayed.
+//! A state is valid only for the program that saved it and for the packets that led to it. It only saves time, because
+//! without it the whole log is replayed.
 
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use xxhash_rust::xxh64::xxh64;
 use crate::atomic_file::AtomicFile;
 use crate::log::file_digest;
 
-/// Interval between two saved states. Replaying ten minutes of a log takes some seconds.
+/// Interval between two saved states. Replaying ten minutes of a log takes only some seconds.
 const INTERVAL: DurNs = DurNs::from_millis(600_000);
 /// Bytes of a state written at a time.
 const PIECE_BYTES: usize = 1 << 20;
@@ -97,7 +97,7 @@ impl SavedState {
         self.write_for(&this_program(), path, &AtomicBool::new(false))
     }
 
-    /// Writes the state in pieces, so that the recording can reach the medium in between.
+    /// Writes the state in pieces, so that the recording can be written to the medium between two pieces.
     fn write_for(&self, program: &str, path: &Path, ended: &AtomicBool) -> std::io::Result<()> {
         let mut to = Saver::default();
         to.part("saved state");
@@ -129,7 +129,7 @@ pub struct StateKeeper {
     consumed: Consumed,
     /// Time at which the next state is to be saved.
     due: Option<MonoNs>,
-    /// A state that is written once all its packets are on the medium, and the state's time.
+    /// A state, and its time. It is written once all its packets are on the medium.
     waiting: Option<(MonoNs, SavedState)>,
     states: Sender<SavedState>,
     ended: Arc<AtomicBool>,
@@ -161,7 +161,8 @@ impl StateKeeper {
         Ok(Self { path, consumed: Consumed::default(), due: None, waiting: None, states, ended })
     }
 
-    /// Sets the packets of the dive so far, after its state has been rebuilt. The next tick saves the state.
+    /// Sets the number and digest of the dive's packets, after its state has been rebuilt. The next tick saves the
+    /// state.
     pub fn counted(&mut self, consumed: Consumed) {
         (self.consumed, self.due) = (consumed, Some(MonoNs(0)));
     }
@@ -172,7 +173,7 @@ impl StateKeeper {
     pub fn after_tick(&mut self, dive: &Loop, safe_to: MonoNs) {
         self.consumed.add_tick(&dive.view().placed().inbox);
         if let Some((_, state)) = self.waiting.take_if(|(at, _)| safe_to >= *at) {
-            // If the previous state is still being written, this one is dropped.
+            // If the thread is still writing the previous state, this state is dropped.
             drop(self.states.try_send(state));
         }
         let now = dive.now();

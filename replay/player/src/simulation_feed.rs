@@ -11,7 +11,7 @@ use crate::log::LogError;
 
 /// A simulated dive as a source of packets. Bytes sent to devices are left out.
 pub struct SimulationFeed {
-    /// The simulation that supplies the packets, at its current position.
+    /// The simulation that supplies the packets, at the position that playback has reached.
     pub simulation: Simulation,
 }
 

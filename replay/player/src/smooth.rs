@@ -1,8 +1,8 @@
 //! Smooths a dive in two replays.
 //!
-//! During the first replay the steps of the navigation filter are stored on disk. The steps are then smoothed
-//! backwards, and the second replay uses the result. The steps don't fit in memory. An unlinked file holds them, and
-//! disappears with the process.
+//! During the first replay the steps of the navigation filter are stored on disk, because they don't fit in memory. The
+//! steps are then smoothed backwards, and the second replay uses the result. The file is unlinked, so it disappears
+//! with the process.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
@@ -24,7 +24,7 @@ use headrace_vehicle::VehicleConfig;
 
 /// Capacity of the queue of filter steps.
 ///
-/// A tick spans a minute at most, with ten epochs per second and up to three steps per epoch.
+/// It must hold the steps of one tick: at most a minute, with ten epochs per second and up to three steps per epoch.
 const QUEUED: usize = 4096;
 /// Length of a stored filter step, bytes.
 const RECORD: usize = 8 * WORDS;
@@ -116,7 +116,7 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Adds to the second replay's report how much it differs from the first replay's report.
+    /// Adds to the second replay's report by how much it differs from the first replay's report.
     pub fn complete(self, first: &Report, second: &mut Report) {
         let changes = smoothing_changes::compare(first, second, self.estimates, self.pieces);
         second.smoothing = Some(changes);

@@ -1,8 +1,8 @@
 //! Drives a loop from a log on several threads, or several loops that share one navigation.
 //!
-//! The placer, which georeferences pings, runs on one thread. The adviser runs on another, and all other work on the
-//! caller's thread. Bounded queues pass batches of ticks between the threads. Each part processes all ticks in order,
-//! so the results are identical bit for bit on any number of threads.
+//! The placer, which georeferences pings, runs on one thread. The adviser, which computes the speed advice, runs on
+//! another. All remaining work runs on the caller's thread. Bounded queues pass batches of ticks between the threads.
+//! Each part processes all ticks in order, so the results are identical bit for bit on any number of threads.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 /// and one for all remaining work.
 pub const MOST_THREADS: usize = 3;
 
-/// Number of ticks in a batch. One queue operation then passes some milliseconds of work.
+/// Number of ticks in a batch. One queue operation then passes some milliseconds of work to another thread.
 const BATCH_TICKS: usize = 32;
 /// Maximum number of batches of ticks that wait in the queue between two threads.
 const MOST_WAITING: usize = 4;
@@ -74,8 +74,8 @@ impl Batch {
 
 /// Runs the loop until the source ends, as fast as possible, on up to `threads` threads including the caller's.
 ///
-/// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`], which runs
-/// instead if `threads` is one.
+/// `after_tick` is called on the caller's thread after every tick. If `threads` is one, [`drive`] runs instead. Its
+/// results are the same.
 ///
 /// Errors: see [`DriveError`]. Packets fed before the error have been processed, unless a thread has panicked.
 pub fn drive_on(
@@ -150,8 +150,8 @@ fn run_tick(dive: &mut Loop, tick: &mut Tick, after_tick: &mut dyn FnMut(&Loop))
     after_tick(dive);
 }
 
-/// Georeferences the pings of a packet source until the source ends or no receiver takes batches any more.
-/// `unused` returns batches for reuse.
+/// Georeferences the pings of a packet source until the source ends or no receiver takes batches any more. `unused`
+/// delivers used batches for reuse.
 fn place(
     placer: &mut Placer,
     mut driver: Driver,
@@ -192,10 +192,10 @@ fn place(
 
 /// Runs several loops until the source ends, with the navigation of the first loop.
 ///
-/// Packets are decoded and pings are georeferenced only once. Each loop gives the results that it would give
-/// alone. The loops must be armed with the same navigation, which can't be checked.
+/// Packets are decoded and pings are georeferenced only once. Each loop gives the results that it would give alone. The
+/// caller must arm all loops with the same navigation, because this can't be checked here.
 ///
-/// Errors: see [`DriveError`]; loops differ in more than the target, the sections and the requirements on them.
+/// Errors: see [`DriveError`]; loops differ in more than the target, the sections and the requirements on sections.
 pub fn drive_together(
     threads: usize,
     dives: &mut [Loop],
@@ -272,8 +272,8 @@ fn drive_all(
     })
 }
 
-/// Advises and judges in each loop, for all ticks in a batch of georeferenced pings. Advice is for the loop's own
-/// target.
+/// Computes advice and verdicts in each loop, for all ticks in a batch of georeferenced pings. Each loop advises for
+/// its own target.
 fn survey_all(dives: &mut [(&mut Loop, &mut Adviser)], batch: &Batch) {
     let mut own = Tick::default();
     for (dive, adviser) in dives {

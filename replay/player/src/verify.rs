@@ -11,7 +11,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 
 /// Maximum memory of one stream's live results that wait for the replay, bytes.
 ///
-/// In an intact log the live results are only one tick ahead.
+/// With an intact log, the live results are only one tick ahead of the replay.
 const MOST_WAITING: usize = 16 << 20;
 
 /// Streams of results that logs of earlier versions don't have.
@@ -129,10 +129,10 @@ impl Stream {
         }
     }
 
-    /// Adds the live results of a tick. If too many results wait, the replay evidently lacks them, and a difference is
-    /// reported.
+    /// Adds the live results of a tick. If too many of them wait, the replay doesn't have these records, and a
+    /// difference is reported.
     fn wait(&mut self, batch: Batch, name: &'static str) {
-        // After a stream's first difference nothing more of it is compared.
+        // After the first difference in a stream, the rest of the stream isn't compared.
         if self.difference.is_some() {
             return;
         }
@@ -205,9 +205,9 @@ impl Verifier {
             if let Some(tick) = left {
                 stream.part(tick, name, What::Missing);
             }
-            // Logs of earlier versions have no channel for states or alerts. A log without any results isn't the log
-            // of a live dive.
-            let is_reported = has_results && (has_channel(name) || !LATER.contains(&name));
+            // Logs of earlier program versions have no channel for states or alerts. A log without any results isn't
+            // the log of a live dive.
+            let is_told = has_results && (has_channel(name) || !LATER.contains(&name));
             verified.same += stream.same;
             verified.unrecorded += stream.unrecorded;
             verified.differences.extend(stream.difference.take().filter(|_| is_reported));
@@ -219,7 +219,7 @@ impl Verifier {
     /// Compares a record of the replay with the live record of the same number.
     fn compare(&mut self, number: usize, name: &'static str, record: Record<'_>) -> Result<(), LogError> {
         while self.streams.get(number).is_some_and(|stream| stream.waiting.is_empty()) && self.read()? {}
-        // A truncated log ends before its dive did, so missing live records are no difference.
+        // A truncated log ends before its dive did. Live records missing at the end are therefore no difference.
         let cut_off = self.reader.has_losses();
         let Some(stream) = self.streams.get_mut(number).filter(|stream| stream.difference.is_none()) else {
             return Ok(());

@@ -91,10 +91,9 @@ impl ByteConsumer for ModelConsumer {
     }
 }
 
-/// A reading end that claims that all bytes are present, so that the ring's protocol doesn't wait for the
-/// whole packet.
+/// A reading end that always claims to have all bytes, so that the ring's protocol doesn't wait for the whole packet.
 ///
-/// Models of deliberately broken protocols use it. loom must detect that they fail.
+/// Models of deliberately broken protocols use it, and loom must detect that they fail.
 pub struct Hasty(pub ModelConsumer);
 
 impl ByteConsumer for Hasty {
@@ -115,12 +114,12 @@ impl ByteConsumer for Hasty {
     }
 }
 
-/// The packet ring of the loop, built on loom's model of a byte ring.
+/// The packet ring of the loop, with loom's model of a byte ring in place of the real one.
 pub fn packets(capacity: usize) -> (Port<ModelProducer>, ModelReader) {
     packets_by(capacity, |consumer| consumer)
 }
 
-/// The packet ring of the loop, built on the model, with a substituted reading end.
+/// The packet ring of the loop on loom's model of a byte ring. `reading` replaces the reading end.
 pub fn packets_by<R: ByteConsumer>(
     capacity: usize,
     reading: impl FnOnce(ModelConsumer) -> R,

@@ -127,8 +127,7 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
 /// Margin on either side of the occluded angles, radians. Beams within this margin may also return echoes from the
 /// vehicle.
 const BESIDE_RAD: f64 = 0.09;
-/// A return at an occluded angle is from the vehicle if its range is below this share of the range to the
-/// wall.
+/// A return at an occluded angle comes from the vehicle if its range is below this share of the range to the wall.
 const VEHICLE_SHARE: f64 = 0.5;
 
 fn outcome(

@@ -19,7 +19,7 @@ use headrace_sensor::reading::Reading;
 pub(super) enum Positioned {
     /// A sonar ping. The fix is for the ping's time of validity.
     Ping { event: usize, sensor: Entity, fix: Result<Fix, NoFix> },
-    /// An advice update at a multiple of the advice period. `before` is the index of the next event.
+    /// An advice update at a multiple of the advice period. `before` is the index of the first event after the update.
     Beat { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
 }
 
@@ -53,8 +53,8 @@ pub(super) fn navigate(
     let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
-        // Time may stall or go back. Each advice update is emitted once. After a gap, only the latest update is
-        // emitted.
+        // Time may stall or go back, but each advice update is emitted only once. After a gap, only the latest update
+        // is emitted.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
@@ -83,8 +83,7 @@ pub(super) fn navigate(
 }
 
 impl Navigator {
-    /// Whether the source of an event is a stuck inertial unit or velocity log. Repeated readings are
-    /// ignored.
+    /// Whether the source of an event is a stuck inertial unit or velocity log. Its repeated readings are ignored.
     fn hangs(&mut self, event: &Event) -> bool {
         let source = event.source.index();
         let bit = 1_u64 << (source % 64);
@@ -98,7 +97,7 @@ impl Navigator {
     }
 }
 
-/// Time of the last advice update at or before `now`; `None` if this update was already emitted.
+/// Time of the latest advice update at or before `now`; `None` if this update was already emitted.
 fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     let period = ADVICE_PERIOD.0.unsigned_abs();
     let last = MonoNs(now.0 - now.0 % period);
@@ -149,7 +148,7 @@ mod tests {
             (1.199, None),
             (1.2, Some(1.2)),
             (1.21, None),
-            // Time on the packets' clock goes back, then catches up.
+            // The time of the packets goes back, then catches up.
             (0.3, None),
             (1.39, None),
             (1.43, Some(1.4)),

@@ -40,8 +40,8 @@ impl SoundSpeed {
 
     /// Updates the speed of sound from a depth sensor, and corrects sonar readings.
     ///
-    /// Later stages rescale ranges to the site's speed. The speed stated by the device is therefore multiplied by the
-    /// ratio of the site's speed to the current speed.
+    /// Later stages rescale each range to the site's speed of sound. The speed stated by the device is therefore
+    /// multiplied by the ratio of the site's speed to the current speed.
     pub(super) fn pass(&mut self, source: SourceId, decoded: &mut Decoded) {
         match &mut decoded.reading {
             Reading::Pressure(water)

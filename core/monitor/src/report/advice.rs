@@ -29,7 +29,7 @@ pub struct AdviceReport {
     pub predicted_t_m: Option<f64>,
     /// Whether the present turn of the heads will exceed the target at the present speed.
     pub will_exceed: bool,
-    /// Largest phase error of a head, as an angle of its turn, degrees.
+    /// Largest phase error of a head, as an angle of the head's turn, degrees.
     pub phase_error_deg: Option<f64>,
     /// Hours needed for the rest of the tunnel at `v_max_mps`.
     pub needed_h: Option<f64>,

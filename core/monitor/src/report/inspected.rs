@@ -6,7 +6,7 @@ use crate::resources::{Coverage, Tally};
 use crate::run::Loop;
 use headrace_fusion::NoFix;
 
-/// A dive with a larger share of pings without a position is no inspection, because its verdicts mean nothing.
+/// A dive with a larger share of pings without a position counts as no inspection, because its verdicts mean nothing.
 const MOST: f64 = 0.5;
 
 /// Coverage extent: whole sections of tunnel in which the vehicle or its heads have been, whether the heads
@@ -26,7 +26,7 @@ pub struct CoverageExtentReport {
 pub struct NotInspectedReport {
     /// Reason: `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
     pub reason: &'static str,
-    /// Requirement that was missing most often for returns without a position.
+    /// Requirement for a position that was missing most often when a return had no position.
     ///
     /// One of `no_heading`, `no_chainage` and `no_place_in_section`.
     pub missing: Option<&'static str>,

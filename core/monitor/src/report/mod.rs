@@ -71,19 +71,19 @@ pub struct Report {
     pub runs: Vec<RunReport>,
     /// Stretches that neither pass nor fail although no more samples will come, in the order of chainage.
     pub no_verdict: Vec<NoVerdictReport>,
-    /// Stretches to pass again on the way home, from the far end to the portal.
+    /// Stretches to pass again on the way home, in order from the far end to the portal.
     pub go_back: Vec<ReturnReport>,
     /// Stretches of the dive without a position, in order of time.
     pub position_gaps: Vec<PositionGapReport>,
     /// Stretches of wall off the design profile, in the order of chainage.
     pub wall_stretches: Vec<WallStretchReport>,
-    /// Undeclared openings that would explain missed stretches, in the order of the stretches' numbers.
+    /// Undeclared openings that explain missed stretches, in the order of the stretches' numbers.
     pub suggested_openings: Vec<SuggestedOpeningReport>,
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,
     /// Length of tunnel by verdict, for each additional target and section length requested.
     pub other_targets: Vec<OtherTargetReport>,
-    /// Names of the heads and their alternative settings, for the report as text.
+    /// Names of the heads and their alternative settings, for the text form of the report.
     #[serde(skip)]
     pub heads: HeadDescriptions,
     /// Declared openings of the wall, excluded from verdicts.
@@ -113,7 +113,7 @@ pub struct Report {
 pub struct LogReport {
     /// Path of the log, as given by the user.
     pub path: String,
-    /// SHA-256 of the log, hexadecimal. For a recording in parts: SHA-256 of the concatenated parts.
+    /// SHA-256 of the log, hexadecimal. For a recording in parts, of the concatenated parts.
     pub sha256: String,
     /// Number of messages from sources in the log.
     pub messages: u64,
@@ -317,7 +317,7 @@ impl SummaryReport {
     }
 }
 
-/// Alerts that the list still holds, in their state at the end of the dive.
+/// Alerts that the list still holds at the end of the dive, in their state at that time.
 fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
     let around = dive.view().surroundings();
     let now = dive.view().span().map_or(MonoNs(0), |(_, last)| last);

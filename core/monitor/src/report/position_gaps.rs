@@ -18,7 +18,7 @@ pub struct PositionGapReport {
     pub from_m: Option<f64>,
     /// Chainage at the end of the gap, m; `None` if it can't be predicted.
     pub to_m: Option<f64>,
-    /// Whether a fix has ended the gap. If not, `to_m` is predicted from the mean speed before the gap.
+    /// Whether a fix has ended the gap. Otherwise `to_m` is predicted from the mean speed before the gap.
     pub is_over: bool,
     /// Chainage to which the vehicle has to go back to scan the stretch with a position, m.
     pub back_to_m: Option<f64>,

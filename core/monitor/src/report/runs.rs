@@ -16,7 +16,7 @@ pub struct RunReport {
     pub id: u32,
     /// Main cause: the cause that applies to most sections of the stretch.
     pub cause: Cause,
-    /// All causes of the stretch's sections: the main cause first, then the others by frequency.
+    /// All causes of the stretch's sections: the main cause first, then the other causes by frequency.
     pub causes: Vec<Cause>,
     /// Figures for the causes that the text names. The figures for a cause come from a section with this cause.
     #[serde(skip)]
@@ -38,7 +38,7 @@ pub struct RunReport {
     pub hole_clock: String,
     /// Time at which the stretch was first flagged, seconds on the log's clock.
     pub raised_s: f64,
-    /// Time at which the stretch was cleared or merged into another one, seconds on the log's clock; `None` before.
+    /// Time at which the stretch was cleared or merged into another stretch, seconds on the log's clock; `None` before.
     pub cleared_s: Option<f64>,
     /// Number of the stretch into which this stretch was merged.
     pub merged_into: Option<u32>,
@@ -63,7 +63,7 @@ pub struct ReturnReport {
     pub actions: Vec<Action>,
     /// Maximum speed for passing the stretch again, m/s.
     ///
-    /// It is the planned speed if the planned speed meets the target, and zero if no speed in this mode does.
+    /// It is the planned speed if that meets the target, and zero if no speed in this mode meets it.
     pub at_most_mps: f64,
     /// Duration of passing the stretch at `at_most_mps`, seconds. It includes a second pass if the vehicle has to roll
     /// to each side.
@@ -102,7 +102,7 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
 
 /// Length of a missed stretch's sections that fail at present, m.
 ///
-/// A section may keep its flag although it no longer has a verdict. Such sections don't count.
+/// A section may keep its flag although it no longer fails. Such a section doesn't count.
 fn failed_m(sections: &Sections, run: &Run) -> f64 {
     let fails = |index: &i64| sections.get(*index).is_some_and(|section| section.verdict == Verdict::Fail);
     (run.from..run.to).filter(fails).count() as f64 * sections.section_m()
@@ -114,7 +114,7 @@ fn head_ids(dive: &Loop) -> Vec<String> {
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// Stretches to pass again according to the present verdicts: all missed stretches that are not cleared yet,
+/// Stretches to pass again according to the present verdicts. These are all missed stretches that are not cleared yet,
 /// from the far end to the portal.
 pub fn go_back(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();

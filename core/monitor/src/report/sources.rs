@@ -28,7 +28,7 @@ pub struct SourceReport {
     pub readings: u64,
     /// Number of readings decoded but not used.
     pub withheld: u64,
-    /// Number of withheld readings, with the reason, for the summary; `None` if the source gave a reading, or sent
+    /// Number of withheld readings and the reason, for the summary; `None` if the source gave a reading, or sent
     /// nothing.
     #[serde(skip)]
     pub no_reading: Option<String>,
@@ -63,7 +63,7 @@ pub struct LineReport {
 
 /// Comparison of a source's device clock with the program's clock.
 ///
-/// For information only: the receive time of a packet gives the time of its readings.
+/// This is for information only, because the receive time of a packet gives the time of its readings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceClockReport {
     /// Number of timestamps received.

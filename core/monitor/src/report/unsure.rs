@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::live_messages::UnsureStretch;
 use crate::resources::Coverage;
 
-/// Neighbouring sections that neither pass nor fail, for the same reason, although no more samples will come.
+/// Neighbouring sections that neither pass nor fail, all for the same reason, although no more samples will come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoVerdictReport {
     /// Reason for the missing verdict: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`,

@@ -50,7 +50,7 @@ impl Reason {
     }
 }
 
-/// Name of a mode, in a fixed-size form for advice that is saved and restored.
+/// Name of a mode. It has a fixed size, so that advice can be saved and restored.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModeName {
     len: u8,
@@ -80,7 +80,7 @@ impl core::fmt::Debug for ModeName {
     }
 }
 
-/// Remedy if a lower speed does not help.
+/// Change that helps if a lower speed does not help.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Remedy {
     /// Setting the heads to another mode.
@@ -122,7 +122,7 @@ impl Remedy {
 /// Alternative to the present mode: the largest speed with all heads in another mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
-    /// The mode to which all heads would be set.
+    /// The mode in which all heads are assumed to turn.
     pub mode: ModeName,
     /// The largest speed that meets the target with the heads started in phase, m/s.
     ///
@@ -170,7 +170,7 @@ pub struct Advice {
     ///
     /// At lower speeds, heads that are apart along the hull run out of phase.
     pub from_mps: f64,
-    /// Of all speeds that meet the target, the speed nearest to the present speed, m/s.
+    /// Speed that meets the target and is nearest to the present speed, m/s.
     ///
     /// `None` if the present speed meets the target, or if no speed near the present speed meets the target.
     pub nearest_mps: Option<f64>,
@@ -188,7 +188,7 @@ pub struct Advice {
     pub sure_m: f64,
     /// The longest time between two head passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
-    /// The longest time between two head passes if the passes were evenly spread, seconds.
+    /// The longest time between two head passes if passes are evenly spread, seconds.
     pub even_pass_gap_s: f64,
     /// T_y: the largest distance between neighbouring samples of one turn, m.
     pub t_y_m: f64,
@@ -210,7 +210,8 @@ pub struct Advice {
     pub alternatives: [Option<Alternative>; MAX_MODES],
     /// Restart of the heads in phase for the best speed; `None` if the heads' phases do not depend on the speed.
     pub anew: Option<Anew>,
-    /// Largest speeds with more and more margins, which show what each margin costs; updated every five seconds.
+    /// Largest speeds as more and more margins are added, which show what each margin costs; updated every five
+    /// seconds.
     pub margins: Option<Margins>,
     /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,

@@ -216,7 +216,8 @@ mod tests {
         let advised = shown(given);
         let speeds: Vec<f64> = advised.iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
-        // The low speed stays in the history for a second. After it, the higher speed must last for ten seconds.
+        // The low speed stays in the history for a second. After this second, the higher speed must last for ten
+        // seconds.
         assert_eq!(speeds[10..66], [0.1; 56]);
         let rising: Vec<Option<f64>> = advised.iter().map(|advice| advice.rising_mps).collect();
         assert_eq!(

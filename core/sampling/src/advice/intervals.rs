@@ -1,10 +1,10 @@
 //! Intervals of speed that meet a coverage target T.
 //!
-//! Heads that are apart along the hull are in phase only at some speeds, so several intervals may meet a target.
+//! Heads that are apart along the hull are in phase only at some speeds, so the target may be met in several intervals.
 //!
-//! The advised speed depends on the heads' measured motion and the vehicle's pose, not on the present speed. The
-//! advised speed is the upper end of the highest interval. If that interval vanishes while heads run out of phase, the
-//! next interval may be far lower, and the advice jumps. [`EASE`] provides hysteresis in both directions.
+//! The advised speed depends on the heads' measured motion and the vehicle's pose, not on the present speed. It is the
+//! upper end of the highest interval. If that interval vanishes while heads run out of phase, the next interval may be
+//! far lower, and the advice jumps. [`EASE`] provides hysteresis against jumps up and down.
 
 use super::search::{self, SPEED_MARGIN};
 use crate::margin::RemainingTarget;
@@ -35,11 +35,11 @@ pub(super) struct Driving<'a> {
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: RemainingTarget,
-    /// Target minus the margin for position errors, if the speed were unlimited, m. `apart_m` is the distance between
-    /// the heads along the hull, m.
+    /// Target minus the margin for position errors at unlimited speed, m. `apart_m` is the distance between the heads
+    /// along the hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
-    /// Speed above which the target is missed for any phases of the heads, m/s.
+    /// Speed above which the target is missed, whatever the heads' phases, m/s.
     pub(super) bound_mps: f64,
 }
 
@@ -51,12 +51,12 @@ impl Driving<'_> {
 
     /// Checks whether a speed meets the target when the target is enlarged by the share `more`.
     ///
-    /// On a miss, returns an equal or lower speed, m/s. No speed between the returned and the tested speed meets the
-    /// target.
+    /// If the tested speed misses the target, returns the same or a lower speed, m/s. No speed between the returned and
+    /// the tested speed meets the target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
-        // The gap between the passes of all heads is the shortest of any strip, so this simple test rejects most
+        // Where all heads see the wall, the gap between passes is the shortest. This simple test therefore rejects most
         // speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
         if speed_mps * gap_s > most_m {
@@ -144,12 +144,12 @@ impl Driving<'_> {
         (best.1 <= self.sure.at_m(best.0) * (1.0 + EASE)).then_some(best.0)
     }
 
-    /// Returns the lower end of the interval below a speed that meets the target, m/s.
+    /// Returns the lower end of the interval that ends at `speed_mps` and whose speeds all meet the target, m/s.
     ///
     /// Zero if all lower speeds meet the target.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
         const STEP: f64 = 0.99;
-        /// The search stops at this share of the upper speed, because no pilot would go more slowly.
+        /// The search stops at this share of the upper speed, because no pilot goes more slowly.
         const SLOWEST: f64 = 0.2;
         if !self.phasing.fits_some_speeds() {
             return 0.0;
@@ -165,9 +165,10 @@ impl Driving<'_> {
         0.0
     }
 
-    /// Returns the speed nearest to `speed_mps` that meets the target, m/s, within a factor of two.
+    /// Returns the speed nearest to `speed_mps` that meets the target, m/s. It is at least half and at most twice
+    /// `speed_mps`.
     ///
-    /// `None` if `speed_mps` itself meets the target, or if no speed within this factor meets it.
+    /// `None` if `speed_mps` itself meets the target, or if no speed within this range meets it.
     pub(super) fn nearest_mps(&self, speed_mps: f64) -> Option<f64> {
         const STEPS: i32 = 70;
         const STEP: f64 = 0.01;

@@ -9,9 +9,9 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
 
-/// Rings are recast if the vehicle's movement may have changed the advised speed by more than this share.
+/// Rings of rays are recast if the vehicle's movement may have changed the advised speed by more than this share.
 const SHARE: f64 = 0.002;
-/// Smallest and largest limit of the movement across the tunnel after which rings are recast, m.
+/// Smallest and largest limit of the movement across the tunnel after which rings of rays are recast, m.
 ///
 /// The smallest limit applies if the distance between neighbouring samples of a turn nearly reaches the target. The
 /// largest limit is needed because hidden strips move with the vehicle.
@@ -19,7 +19,7 @@ const STILL_M: [f64; 2] = [0.004, 0.1];
 /// Rotation limit per metre of the movement limit, as a quaternion component, which is half the angle in rad.
 const TURN_PER_M: f64 = 0.2;
 
-/// Number of the rays that find the wall for the advice, and the vehicle's movement after which they are cast again.
+/// Number of rays with which the advice finds the wall, and the vehicle's movement after which the rays are cast again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
     /// Number of rays in a head's ring, spread evenly over a turn; at least one.
@@ -39,7 +39,7 @@ impl Default for Looks {
     }
 }
 
-/// Returns the movement across the tunnel before rings are recast, m.
+/// Returns the movement across the tunnel before rings of rays are recast, m.
 ///
 /// The distance T_y = `t_y_m` between samples of a turn, on a wall `range_m` away, limits the speed v for a target T.
 /// `swing_share` is w / v, with the speed w of beams due to swing. v + w is proportional to T_x = sqrt(T^2 - T_y^2). If

@@ -31,8 +31,8 @@ struct Case {
 }
 
 impl Case {
-    /// Situation with heads at the positions `x_m` along the hull and at these angles, in FAST mode, in the centre of
-    /// `ceran`.
+    /// Creates a situation with heads at the positions `x_m` along the hull and at these angles. The heads are in FAST
+    /// mode, in the centre of the tunnel `ceran`.
     fn new(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, target_m: f64) -> Self {
         let profile = shapes::ceran().unwrap();
         let specs: Vec<HeadSpec> = x_m.iter().map(|x| spec([*x, 0.0, 0.0], 0.0)).collect();
@@ -105,7 +105,7 @@ fn largest_speed_accounts_for_the_phases_of_heads_along_the_hull() {
     let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
     assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
     assert!(t_at(1.02 * v_max) > 1.0);
-    // If the phases were even at every speed, the vehicle could move faster.
+    // With evenly spread phases, the vehicle could move faster.
     let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
     assert!(v_max < 0.99 * even, "{v_max} and {even}");
     let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
@@ -205,7 +205,7 @@ fn sector_alternatives_use_the_sweep_time_of_their_mode() {
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
     assert!((fast - advice.v_max_mps).abs() < 1e-9, "the present mode: {fast} {}", advice.v_max_mps);
     // The longest time between passes is 21.6 s plus a ping period. The samples of a turn are so close together that
-    // they hardly matter.
+    // their distance hardly matters.
     assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
 }
 
@@ -246,7 +246,7 @@ fn mutual_occlusion_lowers_the_speed() {
     // Each head hides a strip of wall from its neighbour. Over such a strip, half of the passes are missing.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
-    // On the hidden strips, neighbouring samples of a turn are close together.
+    // On the hidden strips, the samples of a turn are close together, so mainly the time between passes counts.
     let t_m = spacing::t_max_m(0.125 * (4.0 + parallax_s), 0.125 * 0.02, 0.1);
     assert!((hidden.predicted_t_m.unwrap() - t_m).abs() < 0.01, "{hidden:?}");
     assert!(hidden.v_max_mps < 0.6 * free.v_max_mps, "{} and {}", hidden.v_max_mps, free.v_max_mps);
@@ -299,7 +299,8 @@ fn hiding_each_other() -> Case {
     case
 }
 
-/// Largest relative error of the advised speed due to cached rings of rays, compared with rings recast each time.
+/// Largest relative error of the advised speed due to cached rings of rays. The reference recasts the rings at each
+/// update.
 ///
 /// The vehicle moves to and fro and in circles at 1.5 cm/s and half a degree per second. The second result is the
 /// number of rings cast in 600 updates.

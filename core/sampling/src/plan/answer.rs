@@ -29,29 +29,28 @@ pub struct Answer {
     pub mode: &'static str,
     /// theta: angle between two pings, degrees.
     pub step_deg: f64,
-    /// n: pings per turn. Eq. 3.
+    /// n: pings per turn. Source: Jorge et al. 2021, Eq. 3.
     pub steps_per_turn: u32,
     /// T: time of a turn, seconds.
     pub turn_s: f64,
     /// Origin of the turn period: `measured`, `table` or `estimated`.
     pub turn_basis: &'static str,
-    /// epsilon: overlap of neighbouring beams; below 1, beams do not overlap. Eq. 22.
+    /// epsilon: overlap of neighbouring beams; below 1, beams do not overlap. Source: Jorge et al. 2021, Eq. 22.
     pub overlap: f64,
     /// Smallest T_y (straight-line distance between neighbouring samples of a turn), at rest and at the nominal pose,
-    /// m. Eq. 5 or 7.
+    /// m. Source: Jorge et al. 2021, Eq. 5 or 7.
     pub t_y_min_rest_m: f64,
-    /// Mean straight-line T_y, at rest and at the nominal pose, m. Eq. 10.
+    /// Mean straight-line T_y, at rest and at the nominal pose, m. Source: Jorge et al. 2021, Eq. 10.
     pub t_y_mean_rest_m: f64,
-    /// Largest straight-line T_y, at rest and at the nominal pose, m. Eq. 6.
+    /// Largest straight-line T_y, at rest and at the nominal pose, m. Source: Jorge et al. 2021, Eq. 6.
     pub t_y_max_rest_m: f64,
-    /// T_yp: upper bound of the mean T_y, m. Eq. 10.
+    /// T_yp: upper bound of the mean T_y, m. Source: Jorge et al. 2021, Eq. 10.
     pub t_yp_m: f64,
     /// T_y2: the largest distance between neighbouring samples of one turn on the wall, at any tolerated pose, m.
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,
-    /// The largest speeds without margins, with the first margin, with the first two, and so on; the last is
-    /// `v_max_mps`.
+    /// The largest speeds without margins, with one margin, with two margins, and so on; the last is `v_max_mps`.
     pub margins: Option<Margins>,
     /// Time for the whole length of the tunnel at `v_max_mps`, hours.
     pub needed_h: Option<f64>,
@@ -76,27 +75,27 @@ pub struct Answer {
 /// Distances between samples at a speed, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spacing {
-    /// d: distance travelled between two pings. Eq. 11.
+    /// d: distance travelled between two pings. Source: Jorge et al. 2021, Eq. 11.
     pub advance_m: f64,
-    /// v T: distance travelled in a turn. Eq. 12.
+    /// v T: distance travelled in a turn. Source: Jorge et al. 2021, Eq. 12.
     pub pitch_m: f64,
     /// T_x: distance between passes where all heads see the wall.
     pub t_x_m: f64,
     /// T_x on the strip of wall with the longest time between passes, which is hidden from some heads.
     pub t_x_hidden_m: f64,
-    /// T_ymin, including the advance between two pings. Eq. 14.
+    /// T_ymin, including the advance between two pings. Source: Jorge et al. 2021, Eq. 14.
     pub t_y_min_m: f64,
     /// Mean T_y, including the advance between two pings.
     pub t_y_mean_m: f64,
-    /// T_ymax, including the advance between two pings. Eq. 13.
+    /// T_ymax, including the advance between two pings. Source: Jorge et al. 2021, Eq. 13.
     pub t_y_max_m: f64,
-    /// T_min: smallest spacing of samples. Eq. 18.
+    /// T_min: smallest spacing of samples. Source: Jorge et al. 2021, Eq. 18.
     pub t_min_m: f64,
-    /// T_mean: mean spacing of samples. Eq. 17.
+    /// T_mean: mean spacing of samples. Source: Jorge et al. 2021, Eq. 17.
     pub t_mean_m: f64,
-    /// Largest T_max over all tolerated poses; `None` if there is a strip that no head sees. Eq. 16.
+    /// Largest T_max over all tolerated poses; `None` if no head sees some strip. Source: Jorge et al. 2021, Eq. 16.
     ///
-    /// Hidden strips are included.
+    /// T_max includes strips that the vehicle hides from some heads.
     pub t_max_m: Option<f64>,
     /// Size of the smallest feature that is certain to get one sample.
     pub hit_once_m: Option<f64>,
@@ -108,7 +107,7 @@ pub struct Spacing {
 impl Planner {
     /// Returns the answers for all modes, or for the mode `only`.
     ///
-    /// A target that a mode can't meet is an answer, not an error.
+    /// If a mode can't meet the target, its answer says so. This isn't an error.
     ///
     /// Errors: no target, speed or time; a value that isn't above zero.
     pub fn answers(&self, question: &Question, only: Option<&str>) -> Result<Vec<Answer>, SamplingError> {

@@ -14,7 +14,7 @@ use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math::TAU;
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// Share of the planned largest speed; heads should be started for the resulting speed.
+/// Heads should be started for this share of the largest planned speed.
 ///
 /// A pilot keeps a speed within 5 %, and heads that are apart along the hull are in phase only near the planned speed.
 /// See docs/why/field.md.
@@ -72,8 +72,8 @@ pub struct PlannedMode {
     pub mode: HeadMode,
     /// Smallest, mean and largest straight-line distance between neighbouring samples of one turn, m.
     ///
-    /// The figures cover all heads, with the vehicle at its nominal pose and at rest. Source: the general case of Eq.
-    /// 5, 6 and 10.
+    /// The figures cover all heads, with the vehicle at its nominal pose and at rest. They generalise Eq. 5, 6 and 10
+    /// of Jorge et al. 2021.
     pub chords_m: [f64; 3],
     /// The largest distance between neighbouring samples of one turn on the unrolled wall, at any tolerated pose, m.
     pub t_y2_m: f64,
@@ -145,8 +145,8 @@ impl Planner {
 
     /// Returns the largest T_max over all tolerated poses, with the heads evenly phased for the speed, m.
     ///
-    /// The result includes strips that the vehicle hides from some of its heads. The result is infinite if no head sees
-    /// some strip.
+    /// The result includes strips that the vehicle hides from some of its heads. It is infinite if no head sees some
+    /// strip.
     ///
     /// Errors: a speed that isn't above zero.
     /// Source: Jorge et al. 2021, Eq. 16.
@@ -203,8 +203,7 @@ impl Planner {
         errors.pass_error_m(margin::error_time_s(passes_per_s, apart_m, speed_mps, APART_SHARE))
     }
 
-    /// Returns a mode's largest speed for a target without margins, with the first margin, with the first two, and so
-    /// on.
+    /// Returns a mode's largest speed for a target without margins, with one margin, with two margins, and so on.
     ///
     /// Errors: as for [`Planner::v_max_mps`].
     pub fn margins(&self, mode: usize, target_m: f64) -> Result<Margins, SamplingError> {
@@ -370,8 +369,8 @@ impl PlannedMode {
 
 /// Returns the more severe of two errors.
 ///
-/// From least to most severe: samples of a turn too far apart, a strip that no head sees, any other error. Of two
-/// errors of the same kind, the error with the larger value is more severe.
+/// The order from least to most severe is: samples of a turn too far apart, a strip that no head sees, any other error.
+/// Of two errors of the same kind, the error with the larger value is more severe.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),

@@ -17,7 +17,7 @@ pub struct WallPlace {
     pub t_y_m: f64,
     /// Smaller and larger distance between successive passes, m; `None` if no head sees the place.
     ///
-    /// The two differ only in sectors, where smaller and larger distances alternate.
+    /// The two distances differ only in sectors, where smaller and larger distances alternate.
     pub t_x_m: Option<[f64; 2]>,
     /// T at the place, m, from `t_y_m` and the larger `t_x_m`; `None` if no head sees the place.
     pub t_m: Option<f64>,
@@ -134,8 +134,7 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// Records the distance between two neighbouring samples of a head, at each place between the two that the head
-    /// sees.
+    /// Records the distance between two neighbouring samples of a head, at each place between them that the head sees.
     fn add(
         &mut self,
         planner: &Planner,

@@ -23,7 +23,7 @@ fn standing(profile: &Profile) -> Standing<'_> {
     Standing::new(profile, &pose(profile, 0.0, 0.0, 0.0), &mount()).unwrap()
 }
 
-/// The reference table lists T_max of Eq. 16 for `ceran` at 0.197 m/s.
+/// The reference table lists T_max, by Eq. 16 of Jorge et al. 2021, for the tunnel `ceran` at 0.197 m/s.
 ///
 /// In this test, the pings are at the head's actual angles.
 #[test]

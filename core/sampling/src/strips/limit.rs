@@ -26,7 +26,7 @@ pub struct Going {
 pub(super) struct Limit {
     pub(super) gap_s: f64,
     pub(super) t_y_m: f64,
-    /// Unevenness of the passes on the two sides of a strip between two sectors; `None` for any other strip.
+    /// Unevenness of the passes on the two sides of a strip that lies between two sectors; `None` for any other strip.
     ///
     /// The strip's width is `t_y_m`. See [`crate::passes::Passes::uneven_ends`].
     pub(super) uneven: Option<f64>,
@@ -49,10 +49,11 @@ impl Limit {
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
     ///
-    /// t is the sum of the pass gap and the ping period. w is `swing_mps`, u is `apart_swing_mps`, and a is `apart_m`.
+    /// In this equation, t is the sum of the pass gap and the ping period. w is `swing_mps`, u is `apart_swing_mps`,
+    /// and a is `apart_m`.
     ///
-    /// Two facts may allow a higher speed, which is then the result: a known largest displacement by swing, and the
-    /// limited size of a circle between two rows of turning points.
+    /// The result is higher than this solution in two cases: the largest displacement by swing is known, or a circle
+    /// between two rows of turning points limits the hole.
     pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let staggered_m =
@@ -134,11 +135,11 @@ mod tests {
                 let grid = (0..400).flat_map(|i| (0..=200).map(move |k| (f64::from(i), f64::from(k))));
                 let places = grid.map(|(i, k)| clear(i / 400.0 * along_m, k / 200.0 * across_m));
                 let widest_m = 2.0 * places.fold(0.0, f64::max);
-                let formula_m = staggered_m(along_m, across_m, uneven, 0.0);
-                let what = format!("{along_m} {across_m} {uneven}: {widest_m} {formula_m}");
-                assert!(widest_m <= formula_m + 1e-9, "{what}");
-                // If the circle's centre is not between the rows, `formula_m` is only an upper bound, because the samples
-                // of the other row also limit a circle that is centred on one row.
+                let told_m = staggered_m(along_m, across_m, uneven, 0.0);
+                let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
+                assert!(widest_m <= told_m + 1e-9, "{what}");
+                // If the circle's centre is not between the rows, `told_m` is only an upper bound. The circle is then
+                // centred on one row, and the samples of the other row limit it as well.
                 let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
                 assert!(!is_between || widest_m > formula_m - 0.005, "{what}");
                 assert!((staggered_m(along_m, across_m, 0.0, uneven * along_m) - formula_m).abs() < 1e-12);

@@ -129,7 +129,8 @@ fn gap_between_sectors_is_an_unseen_strip_that_limits_the_speed() {
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
     assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
     // For a large target, the spacing at the end of a sector limits the speed. For a small target, a circle through
-    // three samples does: two samples on one side of the gap, 8 s apart, and one between these two on the other side.
+    // three samples limits it. Two of them are on one side of the gap, 8 s apart. The third is on the other side,
+    // between the two.
     let v = speed(&some, &passes, 1.0).unwrap();
     assert!((v - closed(1.0, 0.2, 8.0)).abs() < 1e-9);
     let v = speed(&some, &passes, 0.35).unwrap();

@@ -1,4 +1,4 @@
-//! One scene's chart: a line per method, a marker per setting, the front, and the plateau.
+//! One scene's chart: a line per method, a marker per setting, the Pareto front, and the plateau of costly settings.
 //!
 //! Text states the default, the knee and the price of the next step.
 
@@ -12,14 +12,14 @@ use super::labels::Taken;
 use crate::point::{Point, Trade};
 use crate::words;
 
-/// Wide grey line drawn under the Pareto front.
+/// Wide grey line that is drawn under the Pareto front.
 pub(super) const BAND: Look = Look { colour: Colour(214, 214, 214), width_px: 9.0, ..look::T };
 /// Background colour of the plateau: settings that cost clearly more without a smaller error.
 pub(super) const PLATEAU: Colour = Colour(255, 240, 200);
 const WHISKER: Look = Look { colour: Colour(170, 170, 170), width_px: 0.9, ..look::T };
 /// Line from a marker to a label that is not beside the marker.
 const LEADER: Look = Look { colour: Colour(110, 110, 110), width_px: 0.7, ..look::T };
-/// A setting belongs to the plateau if its error is at most this multiple of the smallest error.
+/// A setting belongs to the plateau if its error is at most this multiple of its method's smallest error.
 const SAME: f64 = 1.05;
 /// Smallest error drawn, as a multiple of the oracle's own error.
 pub(super) const CLEAR: f64 = 10.0;
@@ -63,7 +63,8 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// Position of a point in the chart. Errors below [`CLEAR`] times the oracle's error are drawn at that limit.
+    /// Position of a point in the chart. Errors below [`CLEAR`] times the reference's own error are drawn at that
+    /// limit.
     fn place(&self, point: &Point) -> [f64; 2] {
         [self.shown(point.error()), point.cost.middle]
     }

@@ -31,7 +31,7 @@ fn section(trade: &Trade) -> String {
     text
 }
 
-/// The page of the method: program, machine, meaning of the figures, error of each oracle, and what was left out.
+/// The page of the method: program, machine, meaning of the figures, error of each reference, and what was left out.
 pub(super) fn method(results: &Results) -> String {
     let mut text = format!(
         "# How the cost of accuracy is measured\n\n\

@@ -13,14 +13,14 @@ use crate::point::{Given, Trade};
 
 pub use table::table;
 
-/// Version of `cost.json`.
+/// Version of the format of `cost.json`.
 pub const COST_VERSION: u32 = 1;
 
 /// Kind of bounds that are stated for each cost: quartiles or a 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bars {
-    /// Quartiles of nine rounds; the default for files that don't state a kind.
+    /// Quartiles of nine rounds. Files that don't state a kind have these bounds.
     #[default]
     Quartiles,
     /// The 95 % interval of the median.

@@ -51,7 +51,7 @@ enum Setting {
     Exact,
     Tolerance(f64),
     Section(f64),
-    /// Largest spacing T_max of the paper's Eq. 16 for the driven speed.
+    /// Largest spacing T_max at the driven speed, by Eq. 16 of Jorge et al. 2021.
     Planned,
     /// The largest diagonal of the sample lattice in a section.
     Lattice,
@@ -67,8 +67,8 @@ struct Case {
 
 /// Simulated field effects, for a vehicle with four heads.
 ///
-/// The shipped field scene of VITA 1 has the same effects with one head. Here the pilot sways less, since with that
-/// scene's sway every section would miss the target of half a metre.
+/// The shipped field scene of VITA 1 has the same effects with one head. Here the pilot sways less, because with that
+/// scene's sway every section misses the target of half a metre.
 const FIELD: &str = "motion_within_turn = {}\nocclusion = {}\n\
     pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 2, period_s = 40 }\n\
     imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -87,7 +87,7 @@ fn cases() -> Result<[Case; 3], CostError> {
     Ok([
         Case { name: "ideal", text: own("", "motion_within_turn = {}\nocclusion = {}\n") },
         Case { name: "drop-outs", text: drop_outs },
-        // The vehicle file must state the slack of a hanging cable.
+        // In this scene the cable hangs, and the vehicle file must state its slack.
         Case { name: "field", text: own("[vehicle_changes]\nnavigation.slack_sd_m = 0.06\n", FIELD) },
     ])
 }
@@ -273,7 +273,7 @@ impl Setting {
 
     /// CPU time of a replay, and of one additional search for the holes of all its sections, s.
     ///
-    /// For settings that need no search, the time of the search is subtracted from the replay's.
+    /// For settings that need no search, the time of the search is subtracted from the time of the replay.
     fn cost_s(self, vehicle: &mut VehicleConfig, recorded: &Recorded) -> Result<[f64; 2], CostError> {
         self.with(vehicle, |vehicle| {
             let (ended, whole_s) = recorded.timed(vehicle)?;
@@ -323,7 +323,7 @@ impl Setting {
     }
 }
 
-/// Name of the only figure that is a CPU time, not an error.
+/// Name of the only figure of this trade that is a CPU time and not an error.
 const SEARCH: &str = "search or count alone";
 
 /// Judges each section by the spacing T that `t_m` returns for it.
@@ -337,7 +337,7 @@ fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) ->
     verdicts::inner(dive).map(judged).collect()
 }
 
-/// Largest spacing T_max of the paper's Eq. 16 at the driven speed for the configured heads, m.
+/// Largest spacing T_max at the driven speed for the configured heads, m, by Eq. 16 of Jorge et al. 2021.
 fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     let failed = |why: &str| CostError::Figure { what: "T of the plan".to_owned(), why: why.to_owned() };
     let planner = Planner::new(vehicle.inspection().map_err(|why| failed(&why))?)?;

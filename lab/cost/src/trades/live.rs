@@ -1,5 +1,5 @@
-//! Cost of finer settings in the live loop: the rays that the advice casts in a ring around each head, the length of
-//! a tick, and the vertices of a surveyed profile.
+//! Cost of finer settings in the live loop. The settings are the number of rays that the advice casts around each head,
+//! the length of a tick, and the number of vertices of a surveyed profile.
 
 use headrace_coverage::Verdict;
 use std::fmt::Write as _;
@@ -299,12 +299,12 @@ impl Ran {
         Ok(Self { v_max_mps, verdicts, ticks_s, digest: report.digest.clone() })
     }
 
-    /// Rms difference between the advised speeds of two runs, update by update, m/s.
+    /// Root mean square of the differences between the advised speeds of two runs, update by update, m/s.
     fn off_mps(&self, other: &Self) -> f64 {
         rms(self.v_max_mps.iter().zip(&other.v_max_mps).map(|(a, b)| a - b)).unwrap_or(0.0)
     }
 
-    /// Number of sections, per 100, whose verdict differs from the other run's.
+    /// Number of sections, per 100, whose verdict differs between two runs.
     fn other_verdicts(&self, other: &Self) -> f64 {
         let differing = self.verdicts.iter().zip(&other.verdicts).filter(|(a, b)| a != b).count();
         let differing = differing + self.verdicts.len().abs_diff(other.verdicts.len());

@@ -48,7 +48,8 @@ pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<G
 
 type Function = (&'static str, fn(f64) -> f64, fn(f64) -> f64, [f64; 2]);
 
-/// Name, the core's function, the platform's function, and the range of arguments.
+/// For each function: its name, the implementation in `core`, the platform's implementation, and the range of
+/// arguments.
 #[expect(clippy::disallowed_methods, reason = "the platform's functions are the reference for the core's")]
 const FUNCTIONS: [Function; 4] = [
     ("sine", math::sin, |x| x.sin(), [-7.0, 7.0]),
@@ -137,7 +138,7 @@ fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
 fn packing(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     let (half, packed) = (filled(PACKED_M / 2)?, filled(PACKED_M)?);
     let moved_m = packed.fidelity(0.0, 10.0).moved_m;
-    // The unpacked part is the same in both stores, so the difference is packed samples alone.
+    // Both stores have the same unpacked part, so their difference consists of packed samples alone.
     let [fewer, more] = [half.usage(), packed.usage()];
     let bytes = (more.bytes - fewer.bytes) as f64 / (more.kept - fewer.kept).max(1) as f64;
     let costs = in_turns(inputs.effort.rounds(), &[PACKED_M, OPEN_M], |metres| {

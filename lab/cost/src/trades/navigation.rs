@@ -39,10 +39,10 @@ const DECIDES_M: f64 = 0.05;
 const MOMENT_S: f64 = 0.1;
 /// Length of the timed part of a dive, s.
 const TIMED_S: f64 = 15.0;
-/// Difference between the errors of two settings below which the settings count as equal, m.
+/// Largest difference between the errors of two settings that count as equal, m.
 const RESOLUTION_M: f64 = 5e-4;
-/// A beam width of more than a turn. With it, navigation uses no return, since consecutive returns of a head are too
-/// close to each other.
+/// Minimum angle between two used returns of a head, radians. No two returns differ by so much, so navigation uses only
+/// a head's first return.
 const NO_RETURNS_RAD: f64 = 1e9;
 
 /// A scene together with the chainage at which its dive starts.
@@ -153,22 +153,22 @@ fn places(inputs: &Inputs<'_>) -> Result<Vec<Place>, CostError> {
 const FOUR_HEADS: &str = "\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }";
 
-/// The field scene with VITA 2 and four heads.
+/// Returns the field scene with VITA 2 and four heads.
 ///
-/// The vehicle file's slack_sd_m = 0.02 is for a taut cable.
+/// The cable is nearly taut here, because the vehicle file's slack_sd_m = 0.02 is for a taut cable.
 fn four_heads(field: &str) -> String {
     let four = field.replace("vita1.toml", "vita2-4.toml").replace("\"sonar_0\"", FOUR_HEADS);
     four.replace(SLACK, "tether_slack = { reach_m = 0.03, period_s = 30 }")
 }
 
-/// The field scene with VITA 2 and four heads from a chainage on. Legs are given in metres and m/s.
+/// Returns the field scene with VITA 2 and four heads, started at chainage `from_m`. Legs are given in metres and m/s.
 ///
 /// Errors: the shipped scene isn't as expected.
 pub(super) fn field_of_four(from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     moved(&four_heads(file("vita1-field.toml")?), from_m, legs)
 }
 
-/// The field scene from another chainage on. Legs are given in metres and m/s.
+/// Returns the field scene, started at chainage `from_m`. Legs are given in metres and m/s.
 fn moved(text: &str, from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     const START: &str = "start_m = 5\n";
     const LEG: &str = "[[trajectory.legs]]\ndistance_m = 130\nspeed_mps = 0.16\n";
@@ -233,7 +233,7 @@ fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
 struct Prepared {
     scene: String,
     settings: Vec<Setting>,
-    /// The distinct settings. The default belongs to the lines of several varied parameters, but is measured once.
+    /// The distinct settings. The default lies on the lines of several varied parameters, but is measured only once.
     unique: Vec<(u32, Way)>,
     /// For each distinct setting, the number of simulated seeds and the errors.
     errors: Vec<(u32, Vec<Error>)>,
@@ -442,7 +442,8 @@ impl Dived {
     }
 }
 
-/// Mean delay between passing the true end of a section and the section's flag, s; `None` without flags.
+/// Mean delay from the moment at which the vehicle passes the true end of a section to the section's flag, s; `None`
+/// without flags.
 fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
     let end_s = dive.report.dive.duration_s;
     let passed_s = |chainage_m: f64| {
@@ -464,8 +465,8 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
 /// Error of the references.
 ///
 /// One comparison is between two computations of the true hole D_true. The other is between true places and the
-/// readings of a taut cable. The readings pass through emulator, bytes and decoder, and share only the trajectory with
-/// the true places.
+/// readings of a taut cable. The readings pass through emulator, bytes and decoder, so they share only the trajectory
+/// with the true places.
 fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostError> {
     let (mut hole_m, mut displacement_m) = (0.0_f64, 0.0_f64);
     for place in places.iter().filter(|place| place.all_knobs) {

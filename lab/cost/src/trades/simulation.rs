@@ -29,11 +29,11 @@ const OTHER_RAYS: u32 = 769;
 const DECIDES_M: f64 = 0.05;
 /// Smallest difference of the hole diameter D that counts, m. Rounding in the simulation is far smaller.
 const RESOLUTION_M: f64 = 1e-4;
-/// Minimum number of seeds, since differences need a spread.
+/// Minimum number of seeds, because differences need a spread.
 const LEAST_SEEDS: u32 = 2;
-/// At most this many seconds of a dive are timed. The simulation advances in slices of a second.
+/// Maximum number of seconds of a dive that are timed. The simulation advances in slices of a second.
 const TIMED_S: u32 = 8;
-/// Number of seeds when the number of rays is varied. It is small, since a simulation with [`MANY_RAYS`] takes long.
+/// Number of seeds when the number of rays is varied. It is small, because a simulation with [`MANY_RAYS`] takes long.
 const RAYS_SEEDS: u32 = 2;
 
 /// A scene and the effects that may be left out of it.
@@ -157,7 +157,7 @@ const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[tra
 
 /// The scenes in which the number of rays is varied.
 ///
-/// The scenes are short, since a dive with a thousand rays per beam takes long. Both references are compared in the
+/// The scenes are short, because a dive with a thousand rays per beam takes long. Both references are compared in the
 /// first scene.
 fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     let lengths = inputs.effort.pick(&[("field", 7.0)][..], &[("field", 20.0), ("boulders", 0.6)]);
@@ -299,7 +299,7 @@ fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepar
     Ok((prepared, references.get(1).map_or(f64::NAN, Differences::change_m)))
 }
 
-/// Differences of a changed scene's results from those of the original scene, one value per seed.
+/// Differences between the results of a changed scene and of the original scene, one value per seed.
 #[derive(Default)]
 struct Differences {
     hole_m: Vec<f64>,
@@ -312,8 +312,8 @@ impl Differences {
         spread(&self.hole_m).map_or(f64::NAN, |change| change.middle.abs())
     }
 
-    /// The errors: first the magnitude of the mean change of the hole diameter D, with an interval; then the changes
-    /// with their signs.
+    /// Returns the errors: first the magnitude of the mean change of the hole diameter D, with an interval; then the
+    /// changes with their signs.
     fn errors(&self) -> Vec<Error> {
         let size = spread(&self.hole_m).map(|Interval { low, middle, high }| Interval {
             low: if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) },
@@ -410,7 +410,7 @@ impl Figures {
     }
 }
 
-/// Numbers of the features that beam axes hit with a detected return.
+/// Numbers of the features that the axis of a beam hits with a detected return.
 fn features_hit(scene: &Scene) -> Result<Vec<u16>, CostError> {
     let mut simulation = Simulation::with_truth(scene)?;
     let mut hit = Vec::new();
@@ -493,7 +493,7 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    // A dive in which no section has a hole diameter D gives no finite change.
+    // A dive in which no section has a hole diameter D gives a change that isn't finite.
     let is_known = |point: &&Point| figure(point, "change of D").is_finite();
     let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);

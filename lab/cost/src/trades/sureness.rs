@@ -25,7 +25,8 @@ const TARGET_M: f64 = 0.5;
 const LENGTH_M: f64 = 7000.0;
 /// Standard deviations of the displacement between passes, m.
 const SIGMAS_M: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06];
-/// Compared confidences: required difference between hole and target for a verdict, in standard deviations.
+/// Compared confidences. A confidence is the required difference between hole and target for a verdict, in standard
+/// deviations.
 const CONFIDENCES: [u32; 3] = [1, 2, 3];
 const USUAL: u32 = 2;
 /// Ratio of the speed in the second half of a dive to the planned speed. It makes some sections fail.
@@ -133,8 +134,8 @@ fn point(
     })
 }
 
-/// Errors of verdicts that require `confidence` standard deviations, in simulated dives with field effects. The first
-/// half is driven at `speed_mps`, the second half faster.
+/// Errors of verdicts that require `confidence` standard deviations, in simulated dives with field effects. The vehicle
+/// drives the first half of a dive at `speed_mps`, and the second half faster.
 fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Error>, CostError> {
     let half_m = inputs.effort.pick(8.0, 15.0);
     let legs = [(half_m, speed_mps), (half_m, HURRY * speed_mps)];

@@ -31,16 +31,16 @@ const SHIPPED_MODE: &str = "fast";
 const PLACES: [[f64; 2]; 5] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 0.0]];
 /// Speed at which the vehicle returns without inspecting, m/s.
 ///
-/// The value is the rounded speed of the demonstration's pilot when in a hurry.
+/// The demonstration's pilot drives at about this speed when in a hurry.
 const WAY_BACK_MPS: f64 = 0.3;
 /// Share of the tunnel that is assumed to be inspected a second time.
 const AGAIN_SHARE: f64 = 0.1;
-/// Length of the sections in which both references are compared, m. `STRETCHES` is their number.
+/// Length of the sections in which both references are compared, m. `STRETCHES` is the number of these sections.
 const STRETCH_M: f64 = 0.25;
 const STRETCHES: u32 = 4;
-/// Smallest error claimed for the oracle, m. Both references are computed to this accuracy.
+/// Smallest error claimed for the references, m. Both references are computed to this accuracy.
 const LEAST_M: f64 = 1e-9;
-/// Names of the compared vehicles, with their files. Modes, layouts and drifts are compared for the last one in the
+/// Names of the compared vehicles, with their files. Modes, layouts and drifts are compared for the last vehicle in the
 /// list.
 const VEHICLES: [(&str, &str); 4] = [
     ("VITA 1, one head", "vita1.toml"),

@@ -22,7 +22,7 @@ impl Drop for Cluster {
 }
 
 impl Cluster {
-    /// Starts a scheduler and two executors. Each executor has one thread and uses this cache.
+    /// Starts a scheduler and two executors. Each executor has one thread and uses the cache at `cache`.
     fn start(cache: &Path) -> Self {
         let free = || TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
         let address = free();

@@ -1,4 +1,4 @@
-//! Draws pictures like the paper's Figures 6, 8, 12, 13 and 15.
+//! Draws pictures like Figures 6, 8, 12, 13 and 15 of Jorge et al. 2021.
 
 mod beam;
 mod patterns;

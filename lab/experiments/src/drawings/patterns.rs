@@ -12,7 +12,7 @@ const SIZE_PX: [u32; 2] = [900, 640];
 const FRAME: Frame = Frame { left: 66.0, top: 78.0, right: 806.0, bottom: 540.0 };
 /// Vertical position of the legend, pixels from the top.
 const LEGEND_PX: f64 = 600.0;
-/// Figure 6 marks one sample in 5, and Figure 8 one in 20, since more marks would overlap.
+/// Figure 6 marks one sample in 5, and Figure 8 one in 20, so that marks don't overlap.
 const MARKED: [usize; 2] = [5, 20];
 
 /// Line style of dimension lines.

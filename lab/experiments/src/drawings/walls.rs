@@ -123,7 +123,7 @@ fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
         let mut from = 0;
         for run in levels.chunk_by(|a, b| a == b) {
             let to = from + run.len();
-            // Edges are on whole pixels, so that no gap shows between neighbours.
+            // Edges are on whole pixels, so that no gap shows between neighbouring cells.
             let corner = |i: usize, k: usize| {
                 chart.px([i as f64 * size_m[0], k as f64 * size_m[1]]).map(|px| math::round_to_i64(px) as f64)
             };

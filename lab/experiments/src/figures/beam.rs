@@ -7,7 +7,7 @@ use headrace_simulator::effects::Cone;
 
 use crate::ExperimentError;
 
-/// Widths of the 881L's beam at 1 MHz and at 600 kHz, degrees (the paper's §6).
+/// Widths of the 881L's beam at 1 MHz and at 600 kHz, degrees (Jorge et al. 2021, §6).
 const BEAMS_DEG: [f64; 2] = [1.4, 2.4];
 /// Largest range setting of the paper's experiments, m.
 const RANGE_M: f64 = 10.0;
@@ -15,7 +15,7 @@ const RANGE_M: f64 = 10.0;
 const POINTS: u32 = 60;
 /// Number of rays of a simulated beam: the largest number that a scene allows.
 const RAYS: usize = 64;
-/// The footprint is also simulated for every curve point whose number is a multiple of this number.
+/// The footprint is also simulated for every curve point whose number is a multiple of `SIMULATED`.
 const SIMULATED: u32 = 6;
 
 /// Data of Figure 15.
@@ -79,7 +79,7 @@ pub(crate) fn footprints() -> Result<Footprints, ExperimentError> {
     Ok(Footprints { by_range, by_angle, height_m, corner_deg, range_m: RANGE_M })
 }
 
-/// Half the width of a flat floor, by bisection.
+/// Returns half the width of a flat floor, found by bisection.
 fn floor_half_m(profile: &Profile) -> f64 {
     let (mut floor_m, mut wall_m) = (0.0, profile.perimeter_m() / 2.0);
     for _ in 0..60 {
@@ -95,7 +95,7 @@ fn met_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> f64 {
     let (sine, cosine) = math::sin_cos(angle_rad);
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for [middle, _, across] in Cone::new(beam_rad, RAYS).parts() {
-        // The beam's axis is rotated from straight down towards the side by the angle.
+        // Rotates the ray by the beam's angle, from straight down towards the side.
         let (down, aside) = (middle * cosine - across * sine, middle * sine + across * cosine);
         let at = distance_m * aside / down;
         (least, most) = (least.min(at), most.max(at));

@@ -1,4 +1,4 @@
-//! Data of pictures like the paper's Figures 6, 8, 12, 13 and 15, without the drawing.
+//! Data of pictures like Figures 6, 8, 12, 13 and 15 of Jorge et al. 2021, without the drawing.
 
 mod beam;
 mod patterns;

@@ -13,8 +13,8 @@ use crate::spacing::passes_of;
 const BEFORE_M: f64 = 4.0;
 /// Chainage at which the simulated dives start, m.
 const START_M: f64 = 5.0;
-/// Place of the line on which the two distances between passes are shown: share of head 0's sector, counted from the
-/// floor's centre.
+/// Place of the line on which the two distances between passes are shown. It is a share of head 0's sector, counted
+/// from the floor's centre.
 const SHARE: f64 = 0.8;
 /// Angle between consecutive drawn points of the faster head's track, degrees.
 const FASTER_STEP_DEG: u32 = 2;
@@ -67,7 +67,8 @@ pub(crate) struct Sectors {
     pub line_m: f64,
     /// Positions at which head 0 passes the line, m.
     pub at_line: Vec<f64>,
-    /// The two distances between passes on the line by the paper's formula, the shorter one first, m.
+    /// The two distances between passes on the line, m, by the formula of Jorge et al. 2021. The shorter one comes
+    /// first.
     pub alternating_m: [f64; 2],
     /// Arc length of the middle of head 0's sector, m.
     pub middle_m: f64,
@@ -136,7 +137,7 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
         let turned_rad = f64::from(number * FASTER_STEP_DEG).to_radians();
         let (sine, cosine) = math::sin_cos(if growing { turned_rad } else { -turned_rad });
         let arc_m = match number * FASTER_STEP_DEG % 360 {
-            // An exact zero can't be rounded to the wrong side of the seam.
+            // An exact zero lies on the seam, and can't be rounded to the wrong side of it.
             0 => 0.0,
             _ => dive.profile.arc_of([y_m + sine, z_m - cosine]),
         };

@@ -19,11 +19,12 @@ const START_M: f64 = 5.0;
 const CELLS: [u32; 2] = [40, 100];
 /// Number of lines along the wall on which passes are counted.
 const LINES: u32 = 360;
-/// A line on the wall counts as occluded by another head if its largest gap exceeds this multiple of the usual gap.
+/// Another head counts as occluding a line on the wall if the line's largest gap exceeds this multiple of the usual
+/// gap.
 const IN_SHADOW: f64 = 1.5;
 /// Share of cells whose distances lie within the colour scale.
 ///
-/// The cells at a floor's corners lie beyond the scale, since a Poisson surface rounds corners off.
+/// The cells at a floor's corners lie beyond the scale, because a Poisson surface rounds corners off.
 const SCALE_SHARE: f64 = 0.93;
 
 /// Number of heads, their mode, whether they are in sector offset, and whether their phases are aligned.
@@ -78,10 +79,10 @@ pub(crate) struct Panel {
     pub distances_m: Vec<f64>,
     /// Mean distance of the cells from the surface, m.
     pub mean_m: f64,
-    /// The longest gap between passes along the tunnel, among lines with at least two passes.
+    /// The longest gap between passes along the tunnel, of all lines with at least two passes.
     pub widest: Option<Gap>,
-    /// Arc lengths of the start and end of each strip of wall in which some gap between passes exceeds 1.5 times the
-    /// usual one, T_x / s, m.
+    /// Arc lengths, m, of the start and end of each strip of wall with wide gaps. A gap between passes is wide if it
+    /// exceeds 1.5 times the usual gap, T_x / s.
     pub wide_m: Vec<[f64; 2]>,
     /// Arc lengths of the start and end of each strip of wall without passes, m.
     pub unseen_m: Vec<[f64; 2]>,
@@ -199,7 +200,7 @@ fn lines(dive: &Dive, window: Window) -> Vec<Line> {
     (0..LINES).map(line).collect()
 }
 
-/// The largest gap between passes. If one head occludes several adjacent lines, the gap of their middle line is
+/// The largest gap between passes. If another head occludes several adjacent lines, the gap of their middle line is
 /// returned.
 fn widest(lines: &[Line]) -> Option<Gap> {
     let mut lengths: Vec<f64> = lines.iter().filter_map(Line::widest).map(|gap| gap.length_m()).collect();

@@ -1,4 +1,4 @@
-//! Tables 3 and 4, columns "baseline": predictions by the paper's equations.
+//! Predictions by the equations of Jorge et al. 2021: the columns "baseline" of its Tables 3 and 4.
 
 use headrace_sampling::head::Turn;
 use headrace_sampling::layout::HeadLayout;

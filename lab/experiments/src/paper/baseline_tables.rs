@@ -1,4 +1,4 @@
-//! Tables 3 and 4: the printed baseline beside the recomputed one.
+//! Tables 3 and 4 of Jorge et al. 2021: the printed baseline (predictions) beside the recomputed one.
 
 use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
@@ -43,8 +43,8 @@ pub struct SeveralHeadsRow {
     pub t_y_max_m: Cell,
 }
 
-/// A printed number beside recomputed numbers at two speeds: the speed that the paper states, and the speed at which
-/// the printed digits result.
+/// A printed number beside recomputed numbers at two speeds: the speed that the paper states, and the speed that gives
+/// the printed digits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AtBothSpeeds {
     /// The number recomputed at [`STATED_SPEED_MPS`].

@@ -72,7 +72,8 @@ impl Cell {
 
     /// Adds the mark of a note, unless rounding the recomputed value gives the printed digits.
     ///
-    /// Truncation doesn't count here. If related numbers differ, truncation would match this number only by chance.
+    /// Truncation doesn't count here, because for related numbers that differ it gives the printed digits only by
+    /// chance.
     pub(super) fn noted_unless_rounded(self, mark: char) -> Self {
         if self.digits.rounded() { self } else { self.noted(mark) }
     }

@@ -1,4 +1,4 @@
-//! Table 5: T, the combined distance along and across.
+//! Table 5 of Jorge et al. 2021: the distance T, combined from the distances along and across the tunnel.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::spacing::t_max_m;
@@ -78,7 +78,7 @@ const SECTOR_OFFSET: Columns = Columns {
     ],
 };
 
-/// Recomputes Table 5, whose rows are in the same order as Table 4's.
+/// Recomputes Table 5. Its rows are in the same order as the rows of Table 4.
 pub(super) fn combined(baselines: &Baselines) -> Result<Table<CombinedRow>, PaperError> {
     let row = |(line, experiment): (Line, Line)| {
         Ok(CombinedRow {

@@ -9,24 +9,24 @@ use headrace_sampling::section;
 use super::PaperError;
 use super::modes::Mode;
 
-/// Greatest offset of the vehicle from the centre, up, down and sideways, m (§8.1).
+/// Greatest offset of the vehicle from the centre, up, down and sideways, m (Jorge et al. 2021, §8.1).
 const DRIFT_M: f64 = 1.5;
-/// Greatest yaw relative to the tunnel's direction, degrees (§8.1).
+/// Greatest yaw relative to the tunnel's direction, degrees (Jorge et al. 2021, §8.1).
 const YAW_DEG: f64 = 15.0;
 /// Number of computed ranges per turn, a hundredth of a degree apart.
 ///
-/// Every step of Table 2 is a whole multiple of this angle. The last step before a corner is found to 0.2 % of its
-/// length.
+/// Every step of Table 2 is a whole number of hundredths of a degree. The last step before a corner is found to 0.2 %
+/// of its length.
 const SOUNDINGS: u32 = 36_000;
 
-/// Mounting positions of the heads on the vehicle (§8).
+/// Mounting positions of the heads on the vehicle (Jorge et al. 2021, §8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Rig {
     /// One head, 0.15 m below the vehicle's middle.
     Vita1,
     /// Two heads, one behind the other.
     Vita2InLine,
-    /// Three or four heads, pairs of them 0.3 m apart.
+    /// Three or four heads, each 0.15 m to the left or right of the vehicle's centre.
     Vita2Pairs,
 }
 
@@ -105,7 +105,7 @@ fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f
     Ok(largest_m)
 }
 
-/// All combinations of the drifts -1, 0 and 1 times the maximum: left, up and in heading.
+/// All combinations of three drifts (left, up, in heading), each of which is -1, 0 or 1 times its maximum.
 fn extremes() -> impl Iterator<Item = [f64; 3]> {
     const ENDS: [f64; 3] = [-1.0, 0.0, 1.0];
     ENDS.into_iter().flat_map(|y| ENDS.into_iter().flat_map(move |z| ENDS.map(|yaw| [y, z, yaw])))

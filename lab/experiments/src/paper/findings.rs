@@ -34,7 +34,7 @@ pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }
 
-/// Values of an input, such as the perimeter or the speed, that agree with the printed numbers of all wanted rows.
+/// Interval of an input, such as the perimeter or the speed, that agrees with the printed numbers of all `wanted` rows.
 fn of_rows(
     rows: impl IntoIterator<Item = Line>,
     wanted: impl Fn(&str, u8) -> bool,
@@ -67,8 +67,8 @@ pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], Paper
     Ok([perimeter(super::Printed::rounded_from)?, perimeter(super::Printed::read_from)?])
 }
 
-/// Speeds that give all pass distances T_x printed in Table 3 except FAST's, and speeds that give all T_x / s and 2 T_x
-/// / s of Table 4, m/s.
+/// Two intervals of speeds, m/s. The first speeds give all distances T_x printed in Table 3, except those of FAST. The
+/// second ones give all T_x / s and 2 T_x / s of Table 4.
 pub(super) fn speeds_mps(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let speed = |line: &Line, column, passes: f64| {
         let period_s = baselines.of(line)?.0.turn.period_s();

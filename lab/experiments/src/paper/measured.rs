@@ -1,4 +1,4 @@
-//! The experimental columns of Tables 3 to 5, as printed.
+//! The experimental columns of Tables 3 to 5, as printed by Jorge et al. 2021.
 
 use super::PaperError;
 use super::printed::{Line, Printed, lines};

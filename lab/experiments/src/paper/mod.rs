@@ -31,7 +31,7 @@ pub const SOURCE: &str = "Jorge et al., Sensors 2021, 21, 1900 (CC BY 4.0)";
 pub const STATED_SPEED_MPS: f64 = 0.197;
 /// The speed for which Table 4's baseline was computed, m/s.
 ///
-/// This is the only multiple of 0.1 mm/s that gives the printed digits.
+/// This is the only multiple of 0.1 mm/s that gives the table's printed digits.
 pub const FITTING_SPEED_MPS: f64 = 0.196;
 
 /// The paper's Tables 1 to 5, recomputed.
@@ -47,7 +47,7 @@ pub struct Tables {
     pub consistent_speed_mps: Interval,
     /// The perimeter used for the recomputed means, m.
     pub perimeter_m: f64,
-    /// Perimeters that, with rounding, give all printed means of Tables 3 and 4 except the means of copied rows, m.
+    /// Perimeters that, with rounding, give the printed means of all rows of Tables 3 and 4 that aren't copies, m.
     pub consistent_perimeter_m: Interval,
     /// Table 1: overlap of beams.
     pub table_1: Table<OverlapRow>,

@@ -1,4 +1,4 @@
-//! Tables 1 and 2: the head's modes.
+//! Tables 1 and 2 of Jorge et al. 2021: the head's modes.
 
 use headrace_sampling::head::Turn;
 use headrace_sampling::section;
@@ -8,9 +8,9 @@ use super::PaperError;
 use super::cell::{Cell, Note, NoteKind, Table};
 use super::printed::{Printed, lines};
 
-/// Full width of the beam at 600 kHz, degrees (§6).
+/// Full width of the beam at 600 kHz, degrees (Jorge et al. 2021, §6).
 const BEAM_600_KHZ_DEG: f64 = 2.4;
-/// Full width of the beam at 1 MHz, degrees (§6).
+/// Full width of the beam at 1 MHz, degrees (Jorge et al. 2021, §6).
 const BEAM_1_MHZ_DEG: f64 = 1.4;
 
 /// A row of Table 1: overlap of beams.

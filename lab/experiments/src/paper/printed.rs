@@ -10,7 +10,7 @@ use super::PaperError;
 /// Tolerance for rounding errors of recomputed values, as a share of a printed number's last digit. In floating point,
 /// 0.196 x 8 / 2 is slightly off 0.784.
 const ROUNDING: f64 = 1e-6;
-/// Maximum number of decimals of a printed number; no table has as many.
+/// Maximum number of decimals of a printed number. It is larger than in any table.
 const MOST_DECIMALS: usize = 6;
 
 /// A number with its printed digits.
@@ -20,7 +20,7 @@ pub struct Printed {
     decimals: usize,
 }
 
-/// How a printed number's digits follow from the recomputed value.
+/// Way in which a printed number's digits follow from the recomputed value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Digits {
@@ -62,7 +62,7 @@ impl Printed {
         self.value
     }
 
-    /// How the digits follow from the recomputed value `ours`.
+    /// Returns how the printed digits follow from the recomputed value `ours`.
     pub fn digits_of(&self, ours: f64) -> Digits {
         let beyond = (ours - self.value) / self.last_digit();
         let rounded = beyond.abs() <= 0.5 + ROUNDING;
@@ -128,7 +128,7 @@ impl Interval {
 
 /// Difference of the recomputed number from the printed one, percent of the printed number; `None` for a printed zero.
 pub(super) fn difference_percent(ours: f64, printed: Printed) -> Option<f64> {
-    // Differences are rounded, since a rounding error would show as -0.00.
+    // Differences are rounded, so that a rounding error isn't displayed as -0.00.
     let percent = (ours / printed.value - 1.0) * 100.0;
     percent.is_finite().then(|| math::round_to_i64(percent * 1e6) as f64 / 1e6)
 }

@@ -91,7 +91,7 @@ fn printed_mean_steps_are_consistent_with_one_perimeter() {
     assert_eq!(apart(one), ["SLOW", "FAST", "FASTER", "FASTEST"]);
     let Interval { low, high } = tables.consistent_perimeter_m;
     assert!((low - 34.425).abs() < 1e-9 && (high - 34.5).abs() < 1e-9, "{low} to {high}");
-    // For any perimeter in the interval, all means match to the digit except the means of copied rows.
+    // For any perimeter in the interval, the means of all rows that aren't copies match to the digit.
     for perimeter_m in [low + 1e-6, high - 1e-6] {
         for line in lines(3).into_iter().chain(lines(4)) {
             let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());

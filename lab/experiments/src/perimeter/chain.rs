@@ -16,9 +16,9 @@ pub(crate) struct Chain {
     pub corners: usize,
     /// Length with steps of 1 and sqrt 2 pixels (Freeman), m. On average over all directions it is 5 % too long.
     pub steps_m: f64,
-    /// Length with weights 0.980 for straight steps, 1.406 for diagonal steps and -0.091 for corners, m.
+    /// Length of the chain, m, with weights 0.980 for straight steps, 1.406 for diagonal steps and -0.091 for corners.
     ///
-    /// For long lines it is unbiased on average over all directions. Source: Vossepoel, Smeulders 1982.
+    /// For long lines, this length is unbiased on average over all directions. Source: Vossepoel, Smeulders 1982.
     pub corrected_m: f64,
 }
 

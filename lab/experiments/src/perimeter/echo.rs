@@ -64,7 +64,7 @@ impl Echoes {
 /// Each ray adds an echo of the pulse's length, centred on the ray's range. All echoes have equal area.
 fn line(ranges_m: &[f64], settings: &Settings) -> Option<Vec<f64>> {
     let bin_m = settings.range_max_m / settings.bins as f64;
-    // An echo shorter than a bin would fall into one or two bins, depending on its position.
+    // An echo is made at least one bin long. Otherwise it falls into one or two bins, depending on its position.
     let half = settings.pulse_m.max(bin_m) / 2.0;
     let mut bins = vec![0.0; settings.bins];
     for range_m in ranges_m.iter().filter(|r| r.is_finite() && **r >= 0.0 && **r < settings.range_max_m) {

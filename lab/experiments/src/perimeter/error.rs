@@ -20,7 +20,7 @@ pub enum PerimeterError {
         /// Allowed values.
         wanted: &'static str,
     },
-    /// The skeleton doesn't close around the head; a longer pulse or more dilation would close it.
+    /// The skeleton doesn't close around the head. A longer pulse or more dilation closes the gaps.
     #[error("the wall's skeleton does not close round the head")]
     NotClosed,
     /// The skeleton still has a fork after pruning and thinning.

@@ -77,7 +77,7 @@ impl Image {
 
     /// The set pixels that bound the clear area around the centre; `None` if that area reaches the border.
     ///
-    /// Specks within the area bound it too, so only the largest component is returned.
+    /// Specks within the clear area bound it too, so only the largest component is returned.
     pub(super) fn round_the_middle(&self) -> Option<Self> {
         let middle = self.side / 2 * self.side + self.side / 2;
         let mut seen = vec![false; self.set.len()];

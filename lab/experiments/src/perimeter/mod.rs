@@ -1,5 +1,5 @@
-//! Perimeter of a cross-section from one turn of a stationary head (§9.2): by polygons through the ranges, and by the
-//! paper's method, the skeleton of an echo image.
+//! Perimeter of a cross-section from one turn of a stationary head (Jorge et al. 2021, §9.2). It is computed by
+//! polygons through the ranges, and by the paper's method, the skeleton of an echo image.
 
 mod chain;
 mod echo;

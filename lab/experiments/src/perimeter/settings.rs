@@ -28,8 +28,8 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// The paper's values where the paper gives them: 10 m, 500 points (§9.2). Pulse, pixel and threshold are chosen
-    /// here.
+    /// Settings of Jorge et al. 2021 where the paper states them: 10 m, 500 points (§9.2). Pulse, pixel and threshold
+    /// are chosen here.
     pub(crate) fn of_paper() -> Self {
         Self { range_max_m: 10.0, bins: 500, pulse_m: 0.05, pixel_m: 0.02, threshold: 0.5, grow_px: 2 }
     }

@@ -39,8 +39,8 @@ fn rises(ring: [bool; 8]) -> usize {
 
 /// Prunes and thins the image until neither step changes it, so that only single lines remain.
 ///
-/// One pass may not suffice. The end of a spur may be two pixels, neither of which is removed while the other is
-/// there. A removed spur may leave a filled corner.
+/// One pass may not be enough. Where a spur ends in two pixels, neither is removed while the other is there. A removed
+/// spur may leave a filled corner.
 pub(super) fn clean(image: &mut Image) {
     loop {
         let before = image.pixels().len();
@@ -73,7 +73,7 @@ fn to_single(image: &mut Image) {
 /// Whether the neighbours of an edge pixel stay connected if the pixel is removed.
 fn needless(image: &Image, pixel: usize) -> bool {
     let ring = image.round(pixel).map(|k| image.set[k]);
-    // Yokoi's connectivity number for eight neighbours: the number of runs of clear sides, separated by set corners.
+    // Yokoi's connectivity number for eight neighbours: the number of runs of clear sides that set corners separate.
     let pieces: usize =
         [0, 2, 4, 6].into_iter().filter(|k| !ring[*k] && (ring[k + 1] || ring[(k + 2) % 8])).count();
     pieces == 1

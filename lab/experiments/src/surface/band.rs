@@ -1,6 +1,6 @@
 //! Quadratic B-splines on a row of cells: values of the splines, and banded matrices of their integrals.
 //!
-//! n cells have n + 2 functions; function i has its support on cells i - 2 to i. Lengths are in cells. Integrals cover
+//! On n cells there are n + 2 splines; spline i is zero outside cells i - 2 to i. Lengths are in cells. Integrals cover
 //! only the existing cells, so the boundary condition is the natural one (no flux).
 
 /// Integrals over a cell of the product of two B-splines N_a and N_b.

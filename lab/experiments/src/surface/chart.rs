@@ -8,7 +8,7 @@ use super::Xyz;
 use super::wall::Stretch;
 use crate::Spread;
 
-/// Coordinates closer to zero than this become zero, since the triangulation's exact predicates refuse values below
+/// Coordinates closer to zero than this become zero, because the triangulation's exact predicates refuse values below
 /// 1e-142.
 const TINY_M: f64 = 1e-100;
 
@@ -30,7 +30,7 @@ impl Deviation {
         let direction = [place[1] - centre[0], place[2] - centre[1]];
         let length_m = math::hypot(direction[0], direction[1]);
         let hit = profile.cast_from_inside(centre, direction);
-        // The range is in units of the direction's length.
+        // The profile returns the range in units of the direction's length.
         let (arc_m, wall_m) = hit.map_or((0.0, 0.0), |hit| (hit.arc_m, hit.range_m * length_m));
         Self { x_m: place[0], arc_m, deviation_m: length_m - wall_m }
     }
@@ -104,8 +104,7 @@ impl Chart {
 
 /// The sample and its periodic image on the other side of the seam.
 ///
-/// The images extend the wall by half a perimeter on either side, which is more than any gap that a triangle could
-/// bridge.
+/// The images extend the wall by half a perimeter on either side. No triangle bridges such a wide gap.
 fn images(perimeter_m: f64, sample: &Deviation) -> [Vertex; 2] {
     let sigma = math::wrap(sample.arc_m, perimeter_m);
     let other = if sigma < perimeter_m / 2.0 { sigma + perimeter_m } else { sigma - perimeter_m };

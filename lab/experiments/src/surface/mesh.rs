@@ -31,8 +31,8 @@ const BINS_MAX: f64 = 4e6;
 impl MeshIndex<'_> {
     /// Builds the index with bins of side `bin_m`, m. The side should be about that of a triangle.
     ///
-    /// The side is enlarged if there would be too many bins. Returns `None` for a mesh without triangles, with an
-    /// invalid vertex index, or with a vertex that isn't finite.
+    /// The side is enlarged if it gives too many bins. Returns `None` for a mesh without triangles, with an invalid
+    /// vertex index, or with a vertex that isn't finite.
     pub(crate) fn new(mesh: &Mesh, bin_m: f64) -> Option<MeshIndex<'_>> {
         let known = |t: &[u32; 3]| t.iter().all(|k| (*k as usize) < mesh.vertices.len());
         let finite = |p: &Xyz| p.iter().all(|c| c.is_finite());
@@ -106,7 +106,7 @@ impl MeshIndex<'_> {
         let last = centre.iter().zip(&self.bins).map(|(c, n)| (n - 1 - c).max(*c)).max().unwrap_or(0);
         let mut best = f64::INFINITY;
         for shell in first..=last {
-            // All bins from this shell on are at least this far from the position, so none has a nearer triangle.
+            // All bins from this shell on are at least this far from the position, so no nearer triangle is left.
             if best <= (shell - 1) as f64 * self.bin_m {
                 break;
             }
@@ -154,7 +154,8 @@ fn bounds(places: &[Xyz]) -> (Xyz, Xyz) {
 
 /// The point of a triangle nearest to `place`.
 ///
-/// This is the foot on the triangle's plane if the foot is inside the triangle, and otherwise a point on an edge.
+/// This is the foot of the perpendicular on the triangle's plane if the foot is inside the triangle, and otherwise a
+/// point on an edge.
 fn nearest_of(place: Xyz, [a, b, c]: [Xyz; 3]) -> Xyz {
     let (u, v, w) = (sub(b, a), sub(c, a), sub(place, a));
     let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));

@@ -1,7 +1,7 @@
 //! Surfaces through scattered samples of a tunnel's wall, and their distance from the wall.
 //!
-//! `poisson` closes a surface around the samples as the paper did; `chart` interpolates deviations on the unrolled
-//! wall; `wall` measures the distance of the wall from a surface.
+//! `poisson` closes a surface around the samples, as Jorge et al. 2021 did. `chart` interpolates deviations on the
+//! unrolled wall. `wall` measures the distance of the wall from a surface.
 
 mod band;
 pub(crate) mod chart;

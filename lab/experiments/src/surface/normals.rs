@@ -7,8 +7,8 @@ use super::{Sample, Xyz};
 
 /// Normals towards the line along the tunnel through the profile's reference point.
 ///
-/// The normals don't depend on the design. On a flat floor off the centre, the error is at most the angle at which the
-/// floor is seen.
+/// The normals don't depend on the design. For a flat floor, the error at a sample is at most the sample's angle from
+/// straight down, as seen from the line.
 pub(crate) fn towards_axis(profile: &Profile, places: &[Xyz]) -> Vec<Sample> {
     let [y, z] = profile.reference();
     let sample = |place: &Xyz| {

@@ -5,9 +5,9 @@
 //! of chi^2 at the samples. The field jumps from negative to positive at the wall. The surface is the level set at the
 //! mean of the field's values at the samples.
 //!
-//! The implementation differs from the paper's tool in one respect: cells of the finest size fill a box around the
-//! samples, while the tool's octree has coarser cells away from samples. A tunnel is so slim that the whole box is
-//! small.
+//! The implementation differs from the tool used by Jorge et al. 2021 in one respect. Here, cells of the finest size
+//! fill a box around the samples; the tool's octree has coarser cells away from samples. A tunnel is so slim that the
+//! whole box is small.
 //!
 //! Source: Kazhdan, Hoppe, "Screened Poisson surface reconstruction", 2013; the paper's §8.2.
 
@@ -38,15 +38,15 @@ pub(crate) struct Settings {
     pub depth: u32,
     /// Weight of the constraint that the surface passes through the samples; 0 to 1000.
     pub point_weight: f64,
-    /// Approximate number of samples per cell on the grid level on which a normal is splatted; must be above 0.
+    /// Approximate number of samples per cell on the grid level on which a normal is spread; must be above 0.
     pub samples_per_node: f64,
-    /// Ratio of the cube of 2^depth cells to the largest extent of the samples; at least 1.
+    /// Ratio of the side of the cube of 2^depth cells to the largest extent of the samples; at least 1.
     pub scale: f64,
     /// Margin between the samples and the edge of the grid, cells; at least 2.
     pub margin_cells: usize,
     /// Relative residual at which the solver stops.
     pub tolerance: f64,
-    /// Maximum number of steps of the solver.
+    /// Maximum number of iterations of the solver.
     pub steps_max: usize,
 }
 
@@ -92,12 +92,12 @@ pub enum PoissonError {
         /// Allowed values.
         wanted: &'static str,
     },
-    /// The grid would be too large.
+    /// The grid needs too many nodes.
     #[error(
         "the grid would have {nodes:.0} nodes; at most {NODES_MAX} are allowed; a smaller depth needs fewer"
     )]
     TooLarge {
-        /// Number of grid nodes that would be needed.
+        /// Number of nodes that the grid needs.
         nodes: f64,
     },
     /// The solver hasn't converged within its step limit.
@@ -198,7 +198,7 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
     }
     let cell_m = settings.scale * largest / f64::from(1_u32 << settings.depth);
     let margin = settings.margin_cells as f64;
-    // The box consists of whole cells, and the samples are centred in it.
+    // The box consists of whole cells, with the samples in its middle.
     let cells = extents.map(|extent| (extent / cell_m).ceil() + 2.0 * margin);
     let nodes: f64 = cells.iter().map(|n| n + 2.0).product();
     if nodes > NODES_MAX as f64 {

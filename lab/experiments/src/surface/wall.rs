@@ -15,8 +15,8 @@ pub(crate) struct Stretch {
     pub to_m: f64,
     /// Lattice spacing along the tunnel and around it, m; above 0.
     ///
-    /// The paper doesn't state its spacing. 0.1 is fine compared with a beam's step; 0.2 gives the same figures four
-    /// times as fast.
+    /// The paper (Jorge et al. 2021) doesn't state its spacing. A spacing of 0.1 m is fine compared with a beam's step.
+    /// A spacing of 0.2 m gives the same figures four times as fast.
     pub step_m: f64,
 }
 

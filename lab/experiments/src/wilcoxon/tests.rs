@@ -50,7 +50,7 @@ fn critical_values_match_published_tables() {
 
 #[test]
 fn ten_pairs_with_a_rank_sum_of_eight_have_the_known_exact_p_value() {
-    // The differences are 1 to 10; ranks 3 and 5 are positive, the others negative.
+    // The differences are 1 to 10. Ranks 3 and 5 are positive, and all others are negative.
     let differences: Vec<f64> =
         (1..=10).map(|k| if k == 3 || k == 5 { f64::from(k) } else { -f64::from(k) }).collect();
     let test = of_differences(&differences, Options::default()).unwrap();

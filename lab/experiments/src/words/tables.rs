@@ -178,7 +178,7 @@ fn percent(cell: &Cell) -> String {
     }
 }
 
-/// The mark of the note on a cell. A cell without a note has a mark that states how its printed digits follow from the
+/// The mark of the note on a cell. For a cell without a note, the mark states how the printed digits follow from the
 /// recomputed value.
 fn sign(cell: &Cell) -> char {
     cell.note.unwrap_or(match cell.digits {

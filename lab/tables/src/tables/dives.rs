@@ -25,7 +25,7 @@ impl Row<'_> {
     }
 }
 
-/// The exit code that `headrace replay` would have returned.
+/// The exit code that `headrace replay` returns for the same log.
 fn exit_code(row: &Row<'_>) -> i64 {
     match row.report() {
         None => 2,

@@ -77,7 +77,7 @@ impl FromRequestParts<Arc<Shared>> for Admitted {
 }
 
 impl Admitted {
-    /// Admits a request that carries these tokens.
+    /// Admits a request that carries `tokens`, if one of them is right.
     pub(super) fn of_tokens(
         shared: &Shared,
         caller: &Caller,
@@ -101,8 +101,8 @@ impl Admitted {
 impl Shared {
     /// Returns the highest role among these tokens.
     ///
-    /// Each wrong token uses one guess of the client's budget. Two kinds of tokens use no guess: a right
-    /// token already shown on this connection, and a wrong token that is still remembered.
+    /// Each wrong token uses one guess of the client's budget. A right token that was already shown on this connection
+    /// uses no guess, and neither does a wrong token that is still remembered.
     fn role(&self, client: Client, place: &Place, tokens: &BTreeSet<String>) -> Result<Role, Denied> {
         if self.access.tokens.is_none() {
             return Ok(Role::Operator);

@@ -119,7 +119,8 @@ async fn missing() -> Response {
 
 /// Returns the page to any client, without a token.
 ///
-/// The page itself asks for the token. Programs that frame the page would retry any other status for ever.
+/// The page itself asks for the token. The status is never an error, because programs that frame the page retry for
+/// ever then.
 async fn page() -> Response {
     ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], assets::index()).into_response()
 }
@@ -137,7 +138,7 @@ async fn asset(Path(path): Path<String>) -> Response {
 
 /// Checks a token, and stores it in the browser as a cookie.
 ///
-/// A cookie sent with the request is from an earlier login and is ignored.
+/// Only this token counts. A cookie sent with the request is from an earlier login and is ignored.
 async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMap, uri: Uri) -> Response {
     let home = [(header::LOCATION, "/")];
     if shared.access.tokens.is_none() {

@@ -19,8 +19,8 @@ use crate::site::May;
 
 /// Time from a viewer's pong to the next WebSocket ping, and timeout of a pong.
 ///
-/// Ping and timeout together drop a stalled viewer within [`STALLED_AFTER`], even if the viewer's machine buffers the
-/// feed unread.
+/// Pings and the timeout drop a stalled viewer within [`STALLED_AFTER`], even if its machine buffers the feed while the
+/// viewer reads nothing.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(8);
 /// Minimum speed at which a viewer must read a long message, bytes per second. Slower viewers are dropped.
@@ -108,8 +108,8 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Ended => (close_code::AWAY, "ended"),
     };
     let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
-    // The viewer may already have disconnected. Otherwise wait for the viewer's answer to the close frame, so that the
-    // viewer reads all data sent before. The number of messages read is limited, because a client may flood the server.
+    // The viewer may already have disconnected. Otherwise, wait for its answer to the close frame, so that it reads all
+    // data sent before. The number of messages read is limited, because a client may flood the server.
     let _closed = timeout(Duration::from_millis(500), async {
         if viewer.socket.send(close).await.is_ok() {
             for _ in 0..MOST_AFTER_CLOSE {
@@ -286,8 +286,8 @@ impl Viewer {
     fn obey(&mut self, text: &str) -> Result<&'static str, String> {
         match Asked::parse(text)? {
             Asked::Rate(hz) => {
-                // The minimum interval is slightly shorter than the requested period, so that jitter skips no
-                // state.
+                // The minimum interval is slightly shorter than the requested period, so that no state is skipped
+                // because of jitter.
                 self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
                 Ok("rate")
             }

@@ -1,4 +1,5 @@
-//! Accepts connections at once, with TLS if there is a certificate. A connection without a request in time is closed.
+//! Accepts connections as they arrive, with TLS if there is a certificate. A connection that sends no request in time
+//! is closed.
 
 use std::io;
 use std::net::SocketAddr;
@@ -21,16 +22,17 @@ use super::stall::Stream;
 
 /// Pause after accepting a connection has failed.
 const PAUSE: Duration = Duration::from_millis(100);
-/// Timeout for the head of a request. Silent and idle connections are closed, and so are unfinished requests.
+/// Timeout for the head of a request. Silent and idle connections are closed, and so are connections with unfinished
+/// requests.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// Timeout of a TLS handshake.
 #[cfg(feature = "tls")]
 const HANDSHAKE_WITHIN: Duration = Duration::from_secs(5);
 /// Size of a connection's send buffer in the kernel, bytes; the kernel adds as much again for itself.
 ///
-/// The default of some megabytes would hide for a minute that a viewer reads nothing.
+/// With the default size of some megabytes, it takes a minute to notice that a viewer reads nothing.
 const SEND_BUFFER: u32 = 32 << 10;
-/// Maximum number of unsent bytes in a connection's send buffer. The buffer of a stalled viewer fills no further.
+/// Maximum number of unsent bytes in a connection's send buffer. It keeps the buffer of a stalled viewer from filling.
 #[cfg(any(target_os = "android", target_os = "linux"))]
 const MOST_NOT_SENT: u32 = 8 << 10;
 /// Size of a connection's buffer in this program, bytes.
@@ -102,8 +104,8 @@ impl Tls {
 /// Errors: system errors.
 pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
-    // The option SO_REUSEADDR is set on Unix only, as in the standard library. On other systems the option
-    // would let two programs share a port.
+    // The option SO_REUSEADDR is set on Unix only, as in the standard library. On other systems it lets two programs
+    // share a port.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
     // Accepted connections inherit the size of the send buffer and the limit of unsent bytes.
@@ -123,7 +125,7 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
     loop {
         match listener.accept().await {
             Ok((tcp, from)) => {
-                // Without TCP_NODELAY, TCP would delay small messages.
+                // Without TCP_NODELAY, TCP delays small messages.
                 if let Err(error) = tcp.set_nodelay(true) {
                     tracing::debug!(%error, "a connection of the page delays small messages");
                 }
@@ -136,8 +138,8 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Let each new connection run. Otherwise many later connections might arrive first, and this one would be
-        // closed to make room for them.
+        // Lets each new connection run. Otherwise many later connections might arrive first, and the new connection
+        // would be closed to make room for them.
         tokio::task::yield_now().await;
     }
 }

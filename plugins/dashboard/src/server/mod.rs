@@ -182,7 +182,7 @@ impl Page {
 
     /// Shows the result of the dive, and goes on serving the page.
     pub fn show_result(&self, end: serde_json::Value) {
-        // Sending fails if the page's thread has ended early, which `stop` reports.
+        // Sending fails if the page's thread has ended early. The function `stop` logs this error.
         let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
     }
 

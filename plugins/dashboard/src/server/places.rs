@@ -15,7 +15,8 @@ use crate::access::Role;
 pub(super) const MOST_OF_CLASS: usize = 64;
 /// Maximum number of feed streams in a class.
 pub(super) const MOST_STREAMS: usize = 32;
-/// Maximum number of streams from an address behind a declared proxy: Cockpit's three widgets and the page, twice.
+/// Maximum number of streams from an address behind a declared proxy. It is twice the streams of Cockpit's three
+/// widgets and the page.
 const MOST_STREAMS_FORWARDED: usize = 8;
 
 /// Places of all connections, the longest-standing first.
@@ -54,8 +55,8 @@ impl Places {
     }
 }
 
-/// If a class is full, closes a connection that has no stream: the oldest one of the client with the most such
-/// connections.
+/// If a class is full, closes a connection without a stream. It is the oldest one of the client that has the most
+/// connections without a stream.
 fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
     if held.iter().filter(|one| one.class == class).count() < MOST_OF_CLASS {
         return;

@@ -55,7 +55,7 @@ pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
             flush(&shared);
             return;
         }
-        // Let viewers run even while a replay sends data as fast as it can.
+        // Lets viewers run even while a replay sends data as fast as it can.
         tokio::task::yield_now().await;
     }
 }
@@ -75,8 +75,8 @@ fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
 }
 
 fn flush(shared: &Shared) {
-    // The lock is held until all messages are sent, so that a viewer that connects meanwhile gets either all or none
-    // of them.
+    // The lock is held until all messages are sent. A viewer that connects meanwhile therefore gets either all of them
+    // or none.
     let mut model = shared.model();
     let messages = model.flush();
     send(shared, messages);
@@ -92,7 +92,7 @@ fn send(shared: &Shared, messages: Vec<Message>) {
     if !messages.is_empty()
         && let Some(fan) = &*shared.fan()
     {
-        // Sending fails if there is no viewer, which needs no action.
+        // Sending fails if there is no viewer. This needs no action.
         let _nobody = fan.send(messages.into());
     }
 }

@@ -67,7 +67,7 @@ impl Served {
         stream
     }
 
-    /// Connects a client whose kernel stores only some unread bytes.
+    /// Connects a client whose kernel buffers about this many unread bytes.
     fn connect_with_buffer(&self, bytes: usize) -> TcpStream {
         let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).unwrap();
         socket.set_recv_buffer_size(bytes).unwrap();
@@ -245,8 +245,8 @@ fn unread_streams_are_dropped_10_s_after_their_machine_takes_no_more_data() {
     }
     println!("dropped after {dropped:.1?} s: WebSocket, lines with a small buffer and with the usual one");
     assert_eq!(dropped.len(), unread.len());
-    // The readers' kernels take up to some 200 kB at first, depending on the machine. The server counts these bytes as
-    // sent.
+    // At first the clients' kernels take up to some 200 kB, depending on the machine. The server counts these bytes as
+    // sent, although no client has read them.
     assert!(dropped[0] < 15.0 && dropped[2] < 40.0, "{dropped:?}");
     assert_eq!(served.page.viewers(), 0);
 }

@@ -21,7 +21,7 @@ const RATE: (f64, f64) = (8.0, 0.2);
 /// Handler that logs the recording of a voice note and then notifies the loop. Its error is the reason for a
 /// refusal.
 pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
-/// Handler that finds in a log the recording of the voice note with this id and time, seconds.
+/// Handler that finds a voice note's recording in a log, by the note's id and time, seconds.
 ///
 /// Returns `None` if the log has no readable recording of the note. The search may take seconds.
 pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;

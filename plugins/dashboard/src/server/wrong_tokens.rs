@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::client::Client;
 
-/// Maximum number of wrong tokens whose hashes are remembered, in total and per client.
+/// Maximum number of wrong tokens whose hashes are remembered: first for all clients together, then for one client.
 const MOST_WRONG: usize = 256;
 const MOST_WRONG_OF_CLIENT: usize = 4;
 

@@ -43,7 +43,7 @@ pub struct Command {
     pub start_gain_db: f64,
     /// Slope of the time-varied gain: 10, 20, 30 or 40 dB per decade of range.
     pub logf_db: f64,
-    /// Absorption that the gain compensates, 0 to 2.55 dB/m but not 2.53.
+    /// Absorption that the gain compensates, 0 to 2.55 dB/m but not 2.53, whose code is the terminator.
     pub absorption_dbpm: f64,
     /// Centre of the sector in the head's own angles, -180 to 180 degrees in steps of 3.
     pub train_deg: f64,
@@ -51,7 +51,7 @@ pub struct Command {
     pub sector_deg: f64,
     /// Step to the next ping: 0, 0.3, 0.6, 0.9, 1.2 or 2.4 degrees.
     pub step_deg: f64,
-    /// Pulse length, 0 to 2550 microseconds in steps of 10, but not 2530.
+    /// Pulse length, 0 to 2550 microseconds in steps of 10, but not 2530, whose code is the terminator.
     pub pulse_us: f64,
     /// Minimum range of the profile point, 0 to 25 m in steps of 0.1.
     pub min_range_m: f64,
@@ -63,7 +63,7 @@ pub struct Command {
     pub profile: bool,
     /// Whether the head calibrates its zero.
     pub calibrate: bool,
-    /// Delay before the head answers, 0 to 510 ms in steps of 2, but not 506.
+    /// Delay before the head answers, 0 to 510 ms in steps of 2, but not 506, whose code is the terminator.
     pub switch_delay_ms: f64,
     /// Acoustic frequency, 280 to 1100 kHz in steps of 5.
     pub frequency_khz: f64,
@@ -97,7 +97,7 @@ pub enum CommandError {
         /// Allowed values of the setting.
         allowed: &'static str,
     },
-    /// The code of a setting would terminate the command early.
+    /// The code of a setting is the terminator byte, which may occur only at the end of the command.
     #[error(
         "switch command: byte {index} would be 0xFD, which is allowed only at the end; choose a neighbouring value of the setting"
     )]
@@ -119,7 +119,7 @@ pub enum CommandError {
 
 /// Linear scale of a byte: value = zero + code * num / den.
 ///
-/// The factor is a fraction, since a product with 0.3 or 0.01 has a rounding error for some codes.
+/// The factor is a fraction, because a product with 0.3 or 0.01 has a rounding error for some codes.
 struct Scale {
     field: &'static str,
     unit: &'static str,
@@ -286,7 +286,7 @@ pub(crate) fn step_deg(counts: u8) -> f64 {
     STEP.value(counts)
 }
 
-/// Largest step of the head that is not above `counts`. Steps are in counts of 0.3 degrees.
+/// Largest step that the head supports and that is not above `counts`. Steps are in counts of 0.3 degrees.
 pub(crate) fn step_at_most(counts: i32) -> u8 {
     STEP_CODES.into_iter().rfind(|code| i32::from(*code) <= counts).unwrap_or(0)
 }

@@ -17,7 +17,7 @@ const MAX_ECHO: u16 = 500;
 const HEADER_BYTES: usize = 12;
 const TERMINATOR: u8 = 0xFC;
 const CLOCKWISE: u8 = 0x40;
-/// Smallest range setting at which a count of profile range is 1 cm, m.
+/// Smallest range setting at which one count of profile range means 1 cm, m.
 const COARSE_FROM_M: u8 = 5;
 
 /// Type of a return, which its tag states.
@@ -196,7 +196,7 @@ impl Header {
 
     /// Size of a profile range count, mm.
     ///
-    /// Source: Imagenex 881A serial interface, profile range; for the 852 its own specification.
+    /// Source: Imagenex 881A serial interface, profile range. For the 852, the specification of the 852.
     pub const fn count_mm(&self, model: Model) -> u32 {
         match model {
             Model::Head881 if self.range_m < COARSE_FROM_M => 2,

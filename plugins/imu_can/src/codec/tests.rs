@@ -173,7 +173,7 @@ fn frames_of_the_message_set_with_a_wrong_length_count_as_bad() {
 
 #[test]
 fn frame_over_eight_bytes_is_skipped_completely() {
-    // A CAN FD frame of 72 bytes. If its data were parsed, they would give more frames.
+    // A CAN FD frame of 72 bytes. Its data must not be parsed, because they look like more frames.
     let mut bytes = [0; 72];
     bytes[0] = 0x34;
     bytes[4] = 12;

@@ -15,7 +15,7 @@ use super::mapping::{Attitude, Axes, Condition, Mapping, Part, Stamp};
 use crate::codec::can_frame;
 use crate::frame::{CanFrame, CanId, FRAME_BYTES, FrameKind};
 
-/// Maximum number of frames that a mapping uses, if each signal has its own frame: 3 of rate, 3 of force, 4 of
+/// Maximum number of frames that a mapping uses. Each signal may have its own frame: 3 of rate, 3 of force, 4 of
 /// attitude, 4 states and a time.
 const MOST_FRAMES: usize = 15;
 

@@ -7,8 +7,8 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use super::layout::{Bits, DATA_BYTES, Layout, Order};
 use crate::frame::CanId;
 
-/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. In the worst
-/// case, lists of one-letter names, the parser takes 75 bytes of memory for each byte of text.
+/// Maximum size of a DBC text. Files of IMUs have some kilobytes, files of whole vehicles some hundreds. The worst case
+/// is a text with lists of one-letter names: the parser takes 75 bytes of memory for each byte of it.
 const MOST_BYTES: usize = 1 << 20;
 
 /// Maximum number of names that an error lists.
@@ -310,8 +310,8 @@ fn wide_ids(text: &str) -> BTreeMap<String, u64> {
 fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
     let words = error.to_string();
     let line = if matches!(error, can_dbc::DbcError::Pest(_)) {
-        // The line number is parsed from ` --> 3:1`, since other ways of getting it require naming the parser's grammar
-        // types.
+        // The line number is parsed from ` --> 3:1`, because other ways of getting it require naming the parser's
+        // grammar types.
         let at = words.split_once("--> ").and_then(|(_, at)| at.split(':').next());
         at.and_then(|line| line.trim().parse().ok()).unwrap_or(1)
     } else {

@@ -6,7 +6,7 @@ use headrace_sensor::geometry::time::DurNs;
 use super::file::{DbcError, DbcFile, Signal};
 use super::mapping::{Attitude, Axes, Condition, Conditions, Kind, Mapping, Part, Stamp};
 
-/// Reads `axes` and `signals` of a sensor's table with `dbc = file`.
+/// Reads the keys `axes` and `signals` of a sensor's table that names a DBC file.
 ///
 /// Errors: the DBC is invalid (with its line); a signal, unit or key is unknown; no reading is mapped.
 pub fn mapping(file: &NamedFile, own: &Section<'_>, latency: DurNs) -> Result<Mapping, ConfigError> {

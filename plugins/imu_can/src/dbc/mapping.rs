@@ -57,7 +57,7 @@ pub enum MappingError {
         /// Allowed units of the quantity.
         allowed: String,
     },
-    /// The signal can't be a sample time, since its tick is unsuitable.
+    /// The signal can't be a sample time, because its tick is unsuitable.
     #[error(
         "using {signal:?} as the sample time: a step of {factor} {unit:?}; allowed are whole numbers without an offset, \
          in ns, us, ms or s, a step being 1 ns to 15 minutes and whole nanoseconds"

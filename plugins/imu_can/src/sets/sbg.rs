@@ -1,7 +1,8 @@
 //! SBG Systems Ellipse and HPINS: little-endian, default identifiers (all outputs are off by default).
 //!
-//! Device axes are x forward, y right, z down, and the earth frame is north, east, down: y and z have the opposite sign
-//! to headrace's. [`to_ours`] converts vectors and [`rotation_to_ours`] rotations; both are their own inverse.
+//! Device axes are x forward, y right, z down. The earth frame is north, east, down. The signs of y and z are therefore
+//! opposite to headrace's. [`to_ours`] converts vectors, and [`rotation_to_ours`] converts rotations; each is its own
+//! inverse.
 //! Source: SBG Systems, sbgECom CAN protocol and sbgCan.dbc; bits of the status in its firmware reference.
 
 use super::fields::{MessageError, data_id, exactly, words};

@@ -100,7 +100,7 @@ record! {
 pub struct Profile {
     /// Distance and parameters of the ping.
     pub distance: Distance,
-    /// Echo strengths, evenly spaced over the scan. There are at most as many as fit a payload.
+    /// Echo strengths, evenly spaced over the scan; at most as many as fit in a payload.
     pub strengths: Bytes<MAX_STRENGTHS>,
 }
 
@@ -332,7 +332,7 @@ impl Message {
 
     /// Encodes the message as a frame from one device id to another. The frame replaces the content of `frame`.
     ///
-    /// The caller passes the buffer `frame`, since it is large: it can hold the longest message.
+    /// The caller passes the buffer `frame`, because a buffer for the longest message is large.
     ///
     /// Errors: the payload is longer than [`MAX_PAYLOAD_BYTES`], or the id may not be sent as [`Message::Other`].
     pub fn encode_to(

@@ -106,7 +106,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Creates the totals from those in a part's metadata. `last` is the time of the latest message.
+    /// Creates the totals from the totals in a part's metadata. `last` is the time of the latest message.
     pub(super) fn of(progress: &Progress, header: &LogHeader, last: MonoNs) -> Self {
         let sources = (0..).take(header.sources.len());
         let lanes = sources.flat_map(|number| [Lane::Raw(number), Lane::Sent(number)]);

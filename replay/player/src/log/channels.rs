@@ -10,7 +10,7 @@ use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
 use super::loss::Many;
 use super::writer::SourceInfo;
 
-/// Rank of the first channel that isn't raw. Source numbers are u16, so raw channels rank lower.
+/// Sort rank of the first channel that isn't raw. The rank of a raw channel is its source number, a u16.
 const OTHER_RANK: u32 = 1 << 16;
 
 /// Kind of content that a channel of a log has.
@@ -29,7 +29,8 @@ pub(super) enum ChannelKind {
 pub(super) struct Channel {
     pub(super) definition: Definition,
     pub(super) kind: ChannelKind,
-    /// Sort rank among messages with equal times. Raw channels are ordered by source, then other channels by topic.
+    /// Sort rank among messages with equal times. Raw channels come first, by source; all other channels follow, by
+    /// topic.
     pub(super) rank: u32,
 }
 
@@ -40,7 +41,7 @@ pub(super) enum Admission {
     Known,
     /// The definition contradicts a known channel.
     Conflict,
-    /// The channel would exceed a limit on the log's content.
+    /// The channel exceeds a limit on the log's content.
     Beyond(Many),
 }
 
@@ -52,7 +53,7 @@ pub(super) struct Channels {
     others: u32,
     /// Memory used by the channels' definitions.
     budget: HeaderBudget,
-    /// Limit that the definitions known at opening exceeded, if any.
+    /// The limit that the channel definitions exceeded when the log was opened, if any.
     refused: Option<Many>,
     /// Channel definitions found among the messages, in order of appearance.
     later: Vec<Definition>,
@@ -61,7 +62,7 @@ pub(super) struct Channels {
 impl Channels {
     /// Creates the channels, and numbers their sources.
     ///
-    /// The numbers are those in the channels' metadata, if every source has a number and the numbers count from 0.
+    /// Sources get the numbers in their channels' metadata, if every source has a number and the numbers count from 0.
     /// Otherwise the sources are numbered in the order of their names.
     pub(super) fn new(definitions: BTreeMap<u16, Definition>, budget: HeaderBudget) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
@@ -71,7 +72,7 @@ impl Channels {
         let stated = distinct.iter().copied().map(usize::from).eq(0..numbers.len());
         definitions.sort_by_cached_key(|d| (stated.then(|| stated_number(d)), d.topic.clone(), d.id));
         let mut channels = Self { budget, ..Self::default() };
-        // Raw channels come first, so that their sources get lower numbers than sources without a raw channel.
+        // Raw channels come first, so that sources with a raw channel get the lower numbers.
         let (raw, others): (Vec<_>, Vec<_>) =
             definitions.into_iter().partition(|d| stated || d.topic.starts_with(RAW_PREFIX));
         for definition in raw.into_iter().chain(others) {
@@ -82,7 +83,7 @@ impl Channels {
         channels
     }
 
-    /// Returns the limit that the channel definitions known at opening exceeded; `None` if they exceeded none.
+    /// Returns the limit that the channel definitions exceeded when the log was opened; `None` if they exceeded none.
     pub(super) fn refused(&self) -> Option<Many> {
         self.refused
     }

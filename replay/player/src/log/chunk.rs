@@ -1,7 +1,7 @@
-//! Uses the `mcap` crate's reader to unpack chunks, and to verify the checksums of larger parts of a file.
+//! Unpacks chunks, and verifies the checksums of a log's data section and summary, with the reader of the `mcap` crate.
 //!
-//! The decompressor of zstd works like that crate's, but limits the window, which a frame may otherwise set to 128 MiB.
-//! Formats of zstd before 0.8 have windows of another kind, and aren't supported.
+//! Chunks packed by zstd get their own decompressor. It works like the `mcap` crate's, but limits the window, which a
+//! frame may otherwise set to 128 MiB. Formats of zstd before 0.8 have windows of another kind, and aren't supported.
 
 use std::io::{Read, Seek};
 
@@ -43,11 +43,11 @@ pub(super) fn unpack<R: Read + Seek>(
     }
     let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
     if let Err(error) = reader.add_decompressor(Unzstd::default()) {
-        // The only possible error is a decompressor without a name, and this one has a name.
+        // Adding a decompressor fails only if the decompressor has no name, and this one has a name.
         tracing::error!(%error, "chunks packed by zstd can't be read");
     }
-    // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum would then
-    // cover data that is missing.
+    // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum then cover
+    // data that is missing.
     let head = chunk_head(place);
     reader.insert(head.len()).copy_from_slice(&head);
     reader.notify_read(head.len());
@@ -70,7 +70,7 @@ pub(super) fn unpack<R: Read + Seek>(
             Unpacked::Bad(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES })
         }
         Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
-        // Without a checksum nothing protects the content: a header of zeros would turn any bytes into an empty
+        // No checksum covers the content. A header that was overwritten with zeros could turn any bytes into an empty
         // chunk.
         _ if place.doubtful && place.crc == 0 => Unpacked::Bad(LossKind::Contents),
         _ if place.cut => Unpacked::Cut,
@@ -82,7 +82,7 @@ pub(super) fn unpack<R: Read + Seek>(
 
 /// Whether the checksum of everything before the data end record matches.
 ///
-/// Also true if there is no checksum, or a record is too large to read.
+/// Also true if there is no checksum, or if a record is too large to be read.
 pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Result<bool, LogError> {
     let reader = reader(|options| options.with_emit_chunks(true).with_validate_data_section_crc(true));
     let result = drive(file, 0..u64::MAX, reader, &mut |opcode, _| opcode != op::DATA_END)?;
@@ -146,7 +146,7 @@ fn chunk_head(place: &ChunkPlace) -> Vec<u8> {
 
 /// Error text of zstd for a window beyond the limit.
 const TOO_MUCH_MEMORY: &str = "Frame requires too much memory for decoding";
-/// Magic numbers of a frame, and of a skippable frame without its four free bits. Source: RFC 8878, 3.1.
+/// Magic numbers of a zstd frame, and of a skippable frame with its four variable bits cleared. Source: RFC 8878, 3.1.
 const FRAME: u32 = 0xFD2F_B528;
 const SKIPPABLE: u32 = 0x184D_2A50;
 

@@ -57,7 +57,7 @@ pub struct DiveLog<R = File> {
     /// For each source of the file being read, its source number in the dive.
     numbers: Vec<u16>,
     topics: Vec<String>,
-    /// Losses before, between and after the files, such as missing parts.
+    /// Losses outside the files, such as parts that are missing before, between or after them.
     between: Vec<Loss>,
     /// Losses of the files already read.
     earlier: Vec<Loss>,
@@ -128,7 +128,7 @@ impl<R: Read + Seek> DiveLog<R> {
     /// Creates a dive log with a single file, from its reader.
     pub fn of(reader: LogReader<R>) -> Self {
         let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
-        // A single log has no other file, so this is never called.
+        // A single log has no further file to open, so this function is never called.
         let open = |_| Err(LogError::NoLogs { folder: PathBuf::new() });
         Self::start(Box::new(open), reader, vec![file], Vec::new())
     }
@@ -219,8 +219,8 @@ impl<R: Read + Seek> DiveLog<R> {
         !(self.between.is_empty() && self.earlier.is_empty() && self.reader.losses().is_empty())
     }
 
-    /// Returns the number of messages delivered out of order: after a message with a later log time. It is 0 for a log
-    /// with ticks.
+    /// Returns the number of messages delivered out of order, which means after a message with a later log time. It is
+    /// 0 for a log with ticks.
     pub fn late(&self) -> u64 {
         self.late + self.reader.late()
     }
@@ -301,7 +301,7 @@ impl<R: Read + Seek> DiveLog<R> {
         }
         (self.earlier, self.late, self.delivered) = (place.earlier.clone(), place.late, place.delivered);
         self.reader.go_to(&place.place)?;
-        // The sources at this position depend on the channels known there.
+        // The known sources depend on the position, so they are numbered anew.
         self.number_sources();
         Ok(())
     }
@@ -320,7 +320,7 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(())
     }
 
-    /// Excludes messages of this file that the next file repeats.
+    /// Excludes the messages of the current file that the next file repeats.
     fn pass_over(&mut self) {
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
             self.reader.pass_over(&resumed.before);
@@ -344,7 +344,8 @@ impl<R: Read + Seek> DiveLog<R> {
     fn in_part(&self, loss: &Loss) -> Option<Loss> {
         let mut loss = loss.clone();
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
-            // The next part repeats all messages that weren't delivered, and states the fault. Nothing is lost here.
+            // The next part repeats all messages that weren't delivered, and states the fault. So this truncation loses
+            // nothing.
             if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
                 return None;
             }
@@ -399,7 +400,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
                 }
                 _ => return Err(LogError::NotAPart { path: path.clone() }),
             },
-            // An empty file that was created just before a power cut.
+            // The file has no MCAP header, like an empty file that was created just before a power cut.
             (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
                 let why = format!("it begins with [{found}], which no MCAP file does");
                 losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));

@@ -75,7 +75,7 @@ pub enum LogError {
         /// Path of the folder without a log.
         folder: PathBuf,
     },
-    /// There are several logs, and one of them isn't part of a recording.
+    /// Several logs were to be read as one recording, and one of them isn't part of a recording.
     #[error(
         "{} is not a part of a recording; name one log, or only the parts of one recording",
         path.display()
@@ -102,11 +102,11 @@ pub enum LogError {
     /// Two files have the same part number.
     #[error("{} and {} are both part {number} of the recording; name one of them", one.display(), other.display())]
     PartTwice {
-        /// Part number that both files have.
+        /// Part number that the two files have.
         number: u32,
         /// Path of one of the files.
         one: PathBuf,
-        /// Path of the other file.
+        /// Path of the file that has the same part number as `one`.
         other: PathBuf,
     },
     /// The topic of a result doesn't begin with the result prefix.
@@ -133,7 +133,7 @@ pub enum LogError {
         /// Error from the operating system.
         source: io::Error,
     },
-    /// At the end of a recording, the medium neither accepts data nor fails.
+    /// At the end of a recording, the medium accepts no data but reports no error.
     #[error(
         "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; the log's end may be missing"
     )]

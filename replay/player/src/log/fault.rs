@@ -49,8 +49,8 @@ impl RecordingFault {
 /// A change in the state of a recording, for display to people who watch the dive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RecordingEvent {
-    /// A part can't be written any more. Nothing is recorded until another part has been begun, which is tried
-    /// repeatedly.
+    /// A part can't be written any more. The recorder keeps trying to begin another part, and records nothing until it
+    /// succeeds.
     Failed {
         /// Path of the part that can't be written.
         path: PathBuf,
@@ -59,14 +59,14 @@ pub enum RecordingEvent {
     },
     /// The recording continues in another part after a fault.
     Resumed(RecordingFault),
-    /// The medium accepts no data, but reports no error. The queue is full, so new data isn't recorded.
+    /// The medium accepts no data, but reports no error. The recorder's queue is full, so new data isn't recorded.
     Behind,
     /// The medium, which blocked the recording, accepts data again.
     CaughtUp {
-        /// Number of packets that were not recorded in the meantime.
+        /// Number of packets that were not recorded while the medium was blocked.
         packets: u64,
     },
-    /// The medium is slow. A power cut would lose the last seconds.
+    /// The medium is slow, so a power cut now loses the last seconds.
     Late {
         /// Path of the recording.
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum RecordingEvent {
 }
 
 impl RecordingEvent {
-    /// Whether new data is being lost, or would be lost in a power cut.
+    /// Whether new data is being lost now, or will be lost if the power fails.
     pub fn fails(&self) -> bool {
         matches!(self, Self::Failed { .. } | Self::Behind | Self::Late { .. })
     }
@@ -118,7 +118,7 @@ pub struct RecordingHealth {
 }
 
 impl RecordingHealth {
-    /// Takes the recording's next event. The end of one fault doesn't end another.
+    /// Updates the state from the recording's next event. The end of one fault doesn't clear another fault.
     pub fn take(&mut self, event: &RecordingEvent) {
         match event {
             RecordingEvent::Failed { .. } => self.has_failed = true,
@@ -130,7 +130,7 @@ impl RecordingHealth {
         }
     }
 
-    /// Whether new data is being lost, or would be lost in a power cut.
+    /// Whether new data is being lost now, or will be lost if the power fails.
     pub fn fails(&self) -> bool {
         self.has_failed || self.is_behind || self.is_late
     }

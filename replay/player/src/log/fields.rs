@@ -58,7 +58,7 @@ impl<'a> Fields<'a> {
         str::from_utf8(self.take(len.into())?).ok()
     }
 
-    /// Reads a map; `None` if it is invalid, or would take more memory than a log's header may take.
+    /// Reads a map; `None` if it is invalid, or needs more memory than a log's header may take.
     pub(super) fn map(&mut self) -> Option<BTreeMap<String, String>> {
         if self.map_cost()? > MAX_HEADER_BYTES {
             return None;
@@ -72,8 +72,7 @@ impl<'a> Fields<'a> {
         Some(map)
     }
 
-    /// Returns the memory that the map at the current position would take, see [`map_cost`]. The position doesn't
-    /// change.
+    /// Returns the memory that the map at the current position needs, see [`map_cost`]. The position doesn't change.
     pub(super) fn map_cost(&self) -> Option<u64> {
         let mut all = *self;
         let len = all.u32()?;

@@ -11,8 +11,8 @@
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).
 //!
-//! Channels of bytes have the message encoding `application/octet-stream` and no schema. Their metadata has `plugin`,
-//! `connect` and `source`, the source's number in `/loop/tick`.
+//! Channels of bytes have the message encoding `application/octet-stream` and no schema. Their metadata has the keys
+//! `plugin`, `connect` and `source`. The value of `source` is the source's number in `/loop/tick`.
 
 use std::collections::BTreeMap;
 
@@ -41,13 +41,13 @@ pub const BYTES_ENCODING: &str = "application/octet-stream";
 pub const METADATA: &str = "headrace";
 /// Name of the metadata record that repeats the channel definitions and lists the attachments.
 ///
-/// For each channel it has the keys `<number>/topic` and `<number>/<key of its metadata>`. For each attachment the
-/// key is [`ATTACHMENT_PREFIX`] and its name, and the value is its length in bytes.
+/// Each channel has the keys `<number>/topic` and `<number>/<key of its metadata>`. Each attachment has the key
+/// [`ATTACHMENT_PREFIX`] followed by its name, and its length in bytes as the value.
 pub const CHANNEL_LIST: &str = "headrace.channels";
 /// Name of the metadata records that state known losses of the log.
 ///
-/// The key is `<number>`, the value is `<from> <to> <words>`, with log times in ns, or `-` without a time. A recorder
-/// writes them when the disk is full or after a fault, and `headrace recover` writes them too.
+/// The key is `<number>`, the value is `<from> <to> <words>`. The two log times are in ns; `-` stands for an unknown
+/// time. A recorder writes these records when the disk is full or after a fault; `headrace recover` writes them too.
 pub const LOSSES: &str = "headrace.losses";
 /// Prefix of the keys in [`CHANNEL_LIST`] that contain attachment names.
 pub const ATTACHMENT_PREFIX: &str = "attachment/";
@@ -57,11 +57,11 @@ pub const FORMAT_KEY: &str = "format";
 pub const DIGEST_KEY: &str = "sha256";
 /// Name of the attachment that holds the vehicle file.
 pub const VEHICLE_FILE: &str = "vehicle.toml";
-/// Metadata key of a channel: plugin of the device.
+/// Key in a channel's metadata whose value is the plugin of the device.
 pub const PLUGIN_KEY: &str = "plugin";
-/// Metadata key of a channel: connection of the device.
+/// Key in a channel's metadata whose value is the connection of the device.
 pub const CONNECT_KEY: &str = "connect";
-/// Metadata key of a channel: source number in `/loop/tick`.
+/// Key in a channel's metadata whose value is the source number in `/loop/tick`.
 pub const SOURCE_KEY: &str = "source";
 
 /// Length of a tick message before the list of sources, bytes.
@@ -69,9 +69,9 @@ pub const TICK_HEAD_BYTES: usize = 20;
 
 /// One tick of the loop, as stored in a `/loop/tick` message.
 ///
-/// Layout, little-endian: u64 index of the tick, u64 time in ns, u32 count, then as many u16. These are the source
-/// numbers of the packets that the tick consumed, one per packet, in the order of consumption. The packets of one
-/// source are consumed in the order of their sequence numbers, so the list identifies every packet.
+/// Layout, little-endian: u64 index of the tick, u64 time in ns, u32 count, then as many u16. The u16 are the source
+/// numbers of the packets that the tick consumed, in the order of consumption. The packets of one source are consumed
+/// in the order of their sequence numbers, so the list identifies every packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tick<'a> {
     /// Number of the tick in the dive, from 0.
@@ -188,7 +188,7 @@ pub(crate) fn stream_of(topic: &str) -> Option<usize> {
 
 /// Decodes a message of a result stream: index of the tick, number of the first record, and words.
 ///
-/// The words are those of [`headrace_monitor::result_stream`]. All numbers are u64, little-endian.
+/// [`headrace_monitor::result_stream`] defines the words. All numbers are u64, little-endian.
 pub(crate) fn read_results(message: &[u8]) -> Option<(u64, u64, Vec<u64>)> {
     let (words, rest) = message.as_chunks::<8>();
     let mut words = words.iter().map(|word| u64::from_le_bytes(*word));

@@ -1,10 +1,11 @@
 //! Finds record boundaries in a file that may be damaged.
 //!
-//! A record is an opcode, a u64 length and that many bytes. It has no start marker, so a wrong length would lose
-//! everything after it.
+//! A record is an opcode, a u64 length and that many bytes. It has no start marker, so a wrong length hides the start
+//! of everything after it.
 //!
 //! Three checks detect a wrong length. Most kinds of record imply their length twice, by the record length and by the
-//! lengths of fields. A length must leave room for the next record. Another record must follow.
+//! lengths of fields. The length must leave room for the next record in the file. Another record must begin where it
+//! ends.
 //!
 //! Source: MCAP format specification, "Records".
 
@@ -24,7 +25,7 @@ use super::medium::Medium;
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Length of a record's opcode and length field, bytes.
 const RECORD_HEAD_BYTES: usize = 9;
-/// Maximum number of bytes read to identify a record. They hold the fields of fixed length, and names of usual length.
+/// Maximum number of bytes read to identify a record. This is enough for fields of fixed length and usual names.
 const GLANCE_BYTES: usize = 1024;
 /// Length of a chunk record before its data, without the name of the compression, bytes.
 const CHUNK_HEAD_BYTES: u64 = 40;
@@ -142,7 +143,7 @@ pub(super) struct ChunkPlace {
     pub(super) times: (u64, u64),
     /// Whether the file ends within the chunk.
     pub(super) cut: bool,
-    /// Whether the chunk's header is damaged: its field lengths contradict the record length.
+    /// Whether the chunk's header is damaged, so that its field lengths contradict the record length.
     pub(super) doubtful: bool,
 }
 
@@ -299,8 +300,8 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
 
 /// Identifies a chunk, which implies its length twice.
 ///
-/// If the two lengths differ, the right length is the one after which another record begins. If both are the largest
-/// u64, the writer never closed the chunk.
+/// If the two lengths differ, another record begins after the right one. If both lengths are the largest u64, the
+/// writer never closed the chunk.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,

@@ -12,7 +12,7 @@ use headrace_geometry::time::MonoNs;
 pub(super) const LATEST: MonoNs = MonoNs(i64::MAX as u64);
 /// Maximum length of a record outside chunks, bytes.
 ///
-/// Also the maximum for all records of a chunk together, with [`RECORD_COST`] added for each.
+/// It is also the maximum for all records of a chunk together, with [`RECORD_COST`] added for each record.
 pub(super) const MAX_UNPACKED_BYTES: u64 = 32 << 20;
 /// Memory that a message takes in addition to its content, bytes.
 pub(super) const RECORD_COST: u64 = 64;
@@ -24,7 +24,8 @@ pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
 const UNPACKED_ANYWAY: u64 = 64 << 20;
 /// Maximum window of a chunk packed by zstd, as a power of two: 16 MiB. Levels up to 19 use less.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
-/// Memory limit for pieces that are merged because their times overlap, bytes. At most one piece may exceed the limit.
+/// Memory limit for pieces of a log that are in memory at once because their times overlap, bytes. One piece may exceed
+/// it.
 pub(super) const MAX_HELD_BYTES: usize = 32 << 20;
 /// Maximum number of pieces, which are chunks and runs of messages outside chunks. Three days of half-second chunks
 /// fit.

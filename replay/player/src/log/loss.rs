@@ -33,12 +33,12 @@ pub enum LossKind {
         /// Maximum length of a chunk or attachment, bytes.
         limit: u64,
     },
-    /// Chunks that would unpack to many times the length of the log. None of their messages is delivered.
+    /// Chunks that unpack to many times the length of the log. None of their messages is delivered.
     Swells {
         /// Maximum unpacked length, as a multiple of the log's length up to the chunk.
         limit: u64,
     },
-    /// A chunk that would take more memory to unpack than allowed.
+    /// A chunk that needs more memory to unpack than allowed.
     Window {
         /// Maximum memory for unpacking a chunk, bytes.
         limit: u64,
@@ -54,7 +54,7 @@ pub enum LossKind {
     Stamped {
         /// Number of messages not delivered because of their timestamps.
         messages: u64,
-        /// Earliest timestamp of these messages, ns.
+        /// Earliest timestamp of the messages that were not delivered, ns.
         first: u64,
     },
     /// An attachment that fails its checksum, or that the log lists but doesn't have.
@@ -90,10 +90,10 @@ pub enum LossKind {
         /// Number of the channel with two definitions.
         channel: u16,
     },
-    /// All records are readable, but the summary isn't where the footer says, so records are missing or were
+    /// All records are readable, but the summary isn't where the footer says. Records are therefore missing, or were
     /// inserted.
     Displaced,
-    /// All records are readable, but their common checksum doesn't match, so a byte has changed at an unknown
+    /// All records are readable, but their common checksum doesn't match. A byte has therefore changed at an unknown
     /// position.
     DataSection,
     /// Damage within one part of a recording.
@@ -110,7 +110,7 @@ pub enum LossKind {
         /// Number of the last missing part.
         last: Option<u32>,
     },
-    /// A part whose totals contradict those in the next part's header.
+    /// A part whose totals contradict the totals in the next part's header.
     PartUnlike {
         /// Number of the part with contradicting totals.
         part: u32,
@@ -119,14 +119,14 @@ pub enum LossKind {
         /// Number of messages up to the end of this part, as the next part's header states it.
         wanted: u64,
     },
-    /// A file that is named like a part of a recording, but has no data.
+    /// A file that is named like a part of a recording, but isn't a readable log.
     PartUnreadable {
         /// Part number that the file name states.
         part: u32,
-        /// Text that follows "the file can't be read:".
+        /// Reason why the file can't be read, which the text of the loss gives after a colon.
         why: String,
     },
-    /// A part whose part metadata is unreadable. Its number was taken from the file name.
+    /// A part whose part metadata is unreadable, so that its number was taken from the file name.
     PartByName {
         /// Part number that the file name states.
         part: u32,
@@ -284,7 +284,7 @@ impl LossKind {
 }
 
 impl Loss {
-    /// The same loss in dive time: with times counted from the beginning of the log, `begun`.
+    /// Returns the loss with times counted from `begun`, the beginning of the log.
     #[must_use]
     pub fn in_dive_time(&self, begun: MonoNs) -> Self {
         let dive_time = |at: MonoNs| MonoNs(at.0.saturating_sub(begun.0));

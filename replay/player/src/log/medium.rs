@@ -5,11 +5,11 @@ use std::ops::Range;
 
 /// Length of a disk sector, the smallest unit treated as unreadable, bytes.
 const SECTOR_BYTES: u64 = 512;
-/// Maximum number of unreadable ranges kept. More ranges are joined to the last one, together with the bytes between
+/// Maximum number of unreadable ranges kept. Further ranges are joined to the last one, together with the bytes between
 /// them.
 const MOST_RANGES: usize = 1024;
 
-/// Reads zeros in place of unreadable bytes, and records their ranges. Bytes elsewhere may be intact.
+/// A medium that gives zeros in place of unreadable bytes, and records their ranges. Other bytes may be intact.
 pub(super) struct Medium<R> {
     input: R,
     at: u64,

@@ -52,8 +52,8 @@ impl Batch {
     }
 }
 
-/// Sort key of a message: time, rank and sequence number, then position in the file. If the log is read in file order,
-/// the first three are zero.
+/// Sort key of a message: time, rank and sequence number, then position in the file. The first three are zero if the
+/// log is read in file order.
 type Key = (u64, u32, u32, usize, usize);
 
 /// Pieces of the log in memory, whose messages are being merged.

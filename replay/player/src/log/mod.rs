@@ -2,7 +2,7 @@
 //! results.
 //!
 //! [`mod@format`] names channels and metadata and defines `/loop/tick`. [`LogWriter`] writes a log. [`Recorder`] writes
-//! one on its own thread behind a lock-free queue. [`LogReader`] reads logs of this program and of others, intact or
+//! a log on its own thread, behind a lock-free queue. [`LogReader`] reads logs of this program and of others, intact or
 //! damaged.
 //!
 //! A log of this program, in file order:

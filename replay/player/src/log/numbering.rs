@@ -1,7 +1,7 @@
 //! Finds missing, repeated and reordered messages in this program's logs by their message numbers.
 //!
 //! Each channel counts its messages, and continues the count from part to part. A checksum covers one record, so it
-//! can't show that a whole record was removed, repeated or moved. The numbers can.
+//! can't show that a whole record was removed, repeated or moved. Message numbers show this.
 
 use std::collections::BTreeMap;
 
@@ -57,8 +57,8 @@ enum Fault {
 struct Break {
     fault: Fault,
     messages: u64,
-    /// First and last piece of a range. The break lies before one of these pieces. The index after that of the log's
-    /// last piece stands for the log's end.
+    /// First and last piece of a range. The break lies before one of these pieces. An index one above the last piece's
+    /// stands for the log's end.
     pieces: (usize, usize),
 }
 
@@ -69,7 +69,7 @@ impl Numbering {
     ///
     /// Also reports a part that was closed without an end record.
     pub(super) fn of(scan: &mut Scan, part: Option<&Part>, channels: &Channels, end: u64) -> Option<Self> {
-        // If the log was not closed, the scan has already reported that as a loss.
+        // If the log was not closed, the scan has already reported a loss.
         if part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
             let kind = LossKind::Metadata(PART_END.to_owned());
             scan.losses.push(Loss { kind, offset: end, bytes: 0, from: None, to: None });
@@ -130,7 +130,7 @@ impl Numbering {
     }
 }
 
-/// Whether the log's stated number of messages can still be checked, in spite of this loss.
+/// Whether a loss leaves the log's stated number of messages checkable.
 fn is_elsewhere(known: &Loss) -> bool {
     matches!(known.kind, LossKind::Stated(_) | LossKind::Misplaced | LossKind::Truncated)
 }
@@ -141,7 +141,7 @@ fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
         // The log's writer stated this loss. A writer numbers only messages that it writes, so the loss leaves no
         // break.
         LossKind::Stated(_) => false,
-        // A loss of these kinds may affect several positions in the file, but states only one range.
+        // A loss of this kind may affect several positions in the file, but states only one range.
         LossKind::Swells { .. } | LossKind::Beyond { .. } | LossKind::Unreadable(_) => true,
         _ => known.offset <= to && from <= known.offset.saturating_add(known.bytes),
     }
@@ -154,8 +154,8 @@ impl Break {
         self.fault == other.fault && first <= last
     }
 
-    /// Merges a break in the numbers of another channel into this one, and narrows the range of pieces to the
-    /// common part. A channel with few messages has a wide range.
+    /// Merges a break in the numbers of another channel into this one, and keeps the pieces common to the two ranges. A
+    /// channel with few messages has a wide range, because few messages locate the break only roughly.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));

@@ -1,10 +1,10 @@
 //! Metadata of a log that is one part of a recording.
 //!
 //! The record `headrace.part` comes before the first message. It has `dive`, `number` (from 1), and the totals of the
-//! earlier parts: `messages` of all channels, `tick` (index of the last tick, or `-`), and `sequence<topic>` (number
-//! of each channel's next message).
+//! earlier parts. The totals are `messages` of all channels, `tick` (index of the last tick, or `-`), and
+//! `sequence<topic>` (number of each channel's next message).
 //!
-//! The record `headrace.part.end` comes after the last message. It has `messages` and `tick` including this part. Its
+//! The record `headrace.part.end` comes after the last message. Its totals `messages` and `tick` include this part. Its
 //! `follows` is `yes` if the recording continues in the next part, and `no` if the dive has ended.
 
 use std::collections::BTreeMap;

@@ -29,16 +29,16 @@ pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 /// State that both ends of a recorder share, apart from the queue.
 pub(super) struct State {
     pub(super) stopping: AtomicBool,
-    /// Whether the recording ends without an end mark, so that a later dive can continue it.
+    /// Whether the recording ends without an end mark. A later dive can then continue it.
     pub(super) abandoned: AtomicBool,
     /// Whether the recorder has ended, so that the queue is no longer emptied.
     pub(super) closed: AtomicBool,
-    /// Whether nothing is being recorded at present, because of an error.
+    /// Whether an error keeps the recorder from recording at present.
     pub(super) failing: AtomicBool,
     /// Ticks that the loop skipped because the recorder was too far behind.
     pub(super) gaps: ArrayQueue<Gap>,
-    /// Log time of the latest tick that the loop recorded or skipped (`handed_ns`), and log time up to which all data
-    /// is synced or given up (`certain_ns`), ns. Both are 0 before the first tick.
+    /// `handed_ns` is the log time of the latest tick that the loop recorded or skipped, ns. `certain_ns` is the log
+    /// time up to which all data is synced or given up, ns. Both are 0 before the first tick.
     pub(super) handed_ns: AtomicU64,
     pub(super) certain_ns: AtomicU64,
     /// Number of the recorder's steps so far, which distinguishes a stuck recorder from a slow one.
@@ -69,7 +69,7 @@ impl State {
         }
     }
 
-    /// Returns the duration, up to the latest tick, whose data may not be on the disk yet.
+    /// Returns the time before the latest tick whose data may not be on the disk yet.
     pub(super) fn unsafe_for(&self) -> DurNs {
         let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
         DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))
@@ -101,7 +101,7 @@ pub(super) struct Dropped {
     pub(super) packets: u64,
 }
 
-/// Records messages to devices, and losses of packets, neither of which passes through the loop. Any thread may use it.
+/// Records bytes sent to devices, and losses of packets. They don't pass through the loop. Any thread may use it.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
@@ -181,8 +181,8 @@ impl<R: ByteProducer> Entries<R> {
 
 /// Calls `work` until `is_stopping` returns true and no work is left.
 ///
-/// `work` returns the amount of work that it found, and `idle` waits briefly. The flag is read before the queue.
-/// Everything that was pushed before the flag was set is therefore processed.
+/// `work` returns the amount of work that it found, and `idle` waits briefly. `is_stopping` is asked before each call
+/// of `work`, so everything pushed before the stop is processed.
 pub(super) fn until_stopped(
     is_stopping: impl Fn() -> bool,
     mut work: impl FnMut() -> usize,
@@ -222,7 +222,7 @@ pub(super) struct Entry {
 }
 
 impl<R: ByteConsumer> Queue<R> {
-    /// Takes the next entry if it is complete, and puts its message into `message`.
+    /// Takes the next entry if it is complete, and stores its message in the field `message`.
     pub(super) fn take(&mut self) -> Option<Entry> {
         let mut head = [0; ENTRY_HEAD_BYTES];
         if self.ring.peek(&mut head) < ENTRY_HEAD_BYTES {

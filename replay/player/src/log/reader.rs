@@ -37,10 +37,10 @@ pub struct LogInfo {
     /// Metadata of the log. Entries of this program's own record keep their key. Other entries have the key `<name of
     /// the record>/<key>`.
     pub metadata: BTreeMap<String, String>,
-    /// The sources. A source's index is its number in [`MessageKind`].
+    /// The sources of the log. A source's index is its number in [`MessageKind`].
     ///
-    /// In this program's logs, the channels' metadata contain the numbers. If some are missing, the sources are
-    /// numbered by name: `/raw/...` first, then `/sent/...`.
+    /// In this program's logs, the channels' metadata contain the source numbers. If some numbers are missing, the
+    /// sources are numbered by name: `/raw/...` first, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
     /// Position of this log in a recording with several parts.
     pub part: Option<Part>,
@@ -257,8 +257,7 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Excludes all messages that come after these totals of the recording. Call it before reading the first
-    /// message.
+    /// Excludes all messages that come after the totals `after`. Call it before reading the first message.
     pub(super) fn pass_over(&mut self, after: &Progress) {
         let number = |topic: &str| after.sequences.get(topic).copied().unwrap_or_default();
         self.repeated = self.channels.all().map(|channel| (channel.id, number(&channel.topic))).collect();
@@ -288,14 +287,14 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Returns the damage found so far.
     ///
-    /// Damage to the framing is known after opening, damage within chunks only after reading them. The list is
+    /// Damage to the framing is known after opening. Damage within chunks is known only after reading them. The list is
     /// complete when [`LogReader::next`] has returned `None`.
     pub fn losses(&self) -> &[Loss] {
         self.losses.list()
     }
 
-    /// Returns the number of messages delivered out of order: after a message with a later log time. It is 0 for a log
-    /// with ticks.
+    /// Returns the number of messages delivered out of order, which means after a message with a later log time. It is
+    /// 0 for a log with ticks.
     pub fn late(&self) -> u64 {
         self.late
     }
@@ -377,7 +376,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Continues from a position of this reader, or of another reader of the same file.
     ///
-    /// Messages, their order and losses are then the same as in a straight read, whatever was read before.
+    /// Messages, their order and losses are then the same as if the log were read straight through.
     ///
     /// Errors: an I/O error.
     pub fn go_to(&mut self, place: &LogPlace) -> Result<(), LogError> {
@@ -390,13 +389,13 @@ impl<R: Read + Seek> LogReader<R> {
         for (number, times) in &place.corrected {
             self.correct(*number, *times);
         }
-        // Messages before the definition of their channel must be lost again, as in a straight read.
+        // Messages before the definition of their channel must be lost again, as if the log were read straight through.
         self.channels.go_to(&place.defined);
         for (number, next) in &place.open {
             self.read_span(*number, *next)?;
         }
         (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
-        // Damage after the position will be found again when it is read.
+        // The list ends with the losses known at this position. Later damage is found again when it is read.
         self.losses = Losses::of(place.losses.clone());
         self.numbering.clone_from(&place.numbering);
         self.finished = false;
@@ -463,8 +462,8 @@ impl<R: Read + Seek> LogReader<R> {
             return;
         }
         if self.losses.is_full() {
-            // A full list only extends its last loss. The times of that loss are determined at the end, because
-            // searching for times again and again would be slow.
+            // If the list is full, this loss only extends the last one. The times of the last loss are determined at
+            // the end, because searching for them again and again is slow.
             let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
             self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
             return;
@@ -482,8 +481,8 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Verifies the checksum of the whole log at its end, if the log seems intact.
     ///
-    /// Messages outside chunks have no other checksum. Logs with chunks are not checked, because the `mcap` crate's
-    /// writer computes this checksum wrongly when chunk checksums are disabled.
+    /// Messages outside chunks have only this checksum. Logs with chunks are not checked, because the `mcap` crate's
+    /// writer computes it wrongly when chunk checksums are disabled.
     fn finish(&mut self) -> Result<(), LogError> {
         if self.finished {
             return Ok(());
@@ -528,7 +527,7 @@ fn read_chunk<R: Read + Seek>(
     let unpacked = unpack(file, place, |opcode, body| match opcode {
         op::MESSAGE => sound &= batch.push(body),
         op::SCHEMA | op::CHANNEL => definitions.take(opcode, body),
-        // Records of private kinds are skipped. Records of all other kinds belong outside chunks.
+        // Records of private kinds are skipped. Records of all other kinds don't belong in a chunk.
         opcode => misplaced |= opcode < PRIVATE,
     })?;
     if let Unpacked::Bad(kind) = unpacked {

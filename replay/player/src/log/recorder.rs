@@ -1,7 +1,7 @@
 //! The recorder: a log writer on its own thread, behind a lock-free queue.
 //!
 //! The loop must neither wait for a disk nor lose a byte. It checks [`RecorderPort::vacant_bytes`] before it consumes
-//! packets. While the queue is full it leaves packets in the rings of their ports.
+//! packets. While the queue is full, the loop leaves packets in the rings of their ports.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -29,15 +29,15 @@ use super::voice::VoicePort;
 use super::worker::{DerivedChannels, RecorderWorker};
 use super::writer::{Lane, LogHeader, Summary};
 
-/// Time that the thread sleeps while the queue is empty. Waking it earlier would cost the loop a system call.
+/// Time that the thread sleeps while the queue is empty. The loop doesn't wake it, because this takes a system call.
 const NAP: Duration = Duration::from_millis(2);
-/// Minimum size of the queue. It has room for the longest packet of a port, and for a tick with many packets.
+/// Minimum size of the queue: room for the longest packet of a port, and for a tick with many packets.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
-/// Capacity for messages to devices: some seconds of eight heads.
+/// Capacity for messages to devices, enough for some seconds with eight heads.
 const SENT_MESSAGES: usize = 2048;
 /// Capacity for voice recordings. Each lasts a minute at most, and takes 4 MiB at most.
 const VOICES: usize = 8;
-/// Time to wait at the end for a medium that neither accepts data nor fails.
+/// Time to wait at the end for a medium that accepts no data but reports no error.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Maximum number of waiting events about the recording.
 const EVENTS: usize = 64;
@@ -45,9 +45,10 @@ const EVENTS: usize = 64;
 /// Starts recorders on threads of their own.
 pub struct Recorder;
 
-/// The loop's end of a recorder. Its methods don't block, allocate or make system calls.
+/// The end of a recorder that the loop uses. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
-    /// A queue end without a cached index, so that the port is `Sync` and can be a resource of the loop's world.
+    /// An end of the queue that doesn't cache its index, so that the port is `Sync` and can be a resource of the loop's
+    /// world.
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
@@ -57,12 +58,12 @@ pub struct RecorderPort {
 
 /// Handle that ends the recorder.
 ///
-/// On drop, without [`RecorderHandle::finish`], everything is synced, but the recording gets no end mark and can be
-/// continued ([`Recorder::go_on`]). Errors are discarded.
+/// If the handle is dropped without [`RecorderHandle::finish`], everything is synced and errors are discarded. The
+/// recording gets no end mark, so it can be continued ([`Recorder::go_on`]).
 pub struct RecorderHandle {
     thread: Option<JoinHandle<Summary>>,
     state: Arc<State>,
-    /// Time to wait at the end for a medium that neither accepts data nor fails.
+    /// Time to wait at the end for a medium that accepts no data but reports no error.
     pub(super) patience: Duration,
     /// Time at which the end was requested, and whether the total wait is limited.
     ending: Option<(Instant, bool)>,
@@ -71,8 +72,8 @@ pub struct RecorderHandle {
 impl Recorder {
     /// Starts a recorder that writes to `writer`, with a queue of `queue_bytes`.
     ///
-    /// The header is written before this function returns. If flushing `writer` doesn't sync to the medium, a power
-    /// cut loses more than a second. The recording ends after an error, because it can't continue in another part.
+    /// The header is written before this function returns. If flushing `writer` doesn't sync to the medium, a power cut
+    /// loses more than a second. The recording ends after a write error, because it can't continue in another part.
     ///
     /// Errors: the header can't be written, or the thread can't be started.
     pub fn start<W: Write + Send + 'static>(
@@ -89,8 +90,8 @@ impl Recorder {
     /// Starts a recorder that writes to new files on disk, and syncs them every half second.
     ///
     /// When the disk fills, the recorder warns, and then drops echoes before other messages: [`Summary::left_out`].
-    /// `path` names the recording: its file or, with [`Rotation::every`], its parts, see [`super::part_path`]. After
-    /// an error the recording continues in another part: [`Summary::faults`].
+    /// `path` names the recording's file or, with [`Rotation::every`], its parts, see [`super::part_path`]. After an
+    /// error the recording continues in another part: [`Summary::faults`].
     ///
     /// Errors: as for [`Recorder::start`]; a file can't be created; the recording, or a file named like one of its
     /// parts, exists. A dive is never overwritten.
@@ -226,8 +227,8 @@ impl RecorderPort {
     pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), Full> {
         let len = TICK_HEAD_BYTES.saturating_add(order.len().saturating_mul(2));
         self.begin(Lane::Tick, now, now, len)?;
-        // `begin` has reserved room for the entry, whose length is a u32. The count is smaller, so it also fits into
-        // a u32.
+        // `begin` has reserved room for the entry, so the entry's length fits into a u32. The packet count is smaller,
+        // so it fits too.
         self.entries.put(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
         self.entries.ring.push_each(order_bytes(order));
         self.state.hand(now);
@@ -252,7 +253,7 @@ impl RecorderPort {
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {
-            // If the queue of events is full, nothing reads the events, so this one may be dropped.
+            // The queue of events is full only if nothing reads the events, so this event may be dropped.
             self.state.events.push(RecordingEvent::Behind).ok();
         }
         let gap = self.gap.get_or_insert(Gap { span: (at, at), packets: 0 });
@@ -330,7 +331,7 @@ impl Drop for RecorderPort {
 }
 
 impl RecorderHandle {
-    /// Whether nothing is being recorded at present, because of an error.
+    /// Whether an error keeps the recorder from recording at present.
     pub fn is_failing(&self) -> bool {
         self.state.failing.load(Ordering::Acquire)
     }
@@ -359,8 +360,8 @@ impl RecorderHandle {
 
     /// Tells the thread to end, without waiting for it. Several recorders can then end at the same time.
     ///
-    /// If `in_time` is true, the wait for the thread's end takes 30 s at most in total. Otherwise the wait continues
-    /// while there is progress.
+    /// If `in_time` is true, the program waits 30 s at most for the thread's end. Otherwise it waits as long as there
+    /// is progress.
     #[expect(clippy::disallowed_methods, reason = "how long a medium is waited for is wall time")]
     pub fn begin_to_end(&mut self, in_time: bool) {
         self.ending.get_or_insert((Instant::now(), in_time));
@@ -380,7 +381,7 @@ impl RecorderHandle {
 
     /// Writes the rest of the queue and the summary, and ends the thread. Write errors are in [`Summary::faults`].
     ///
-    /// Errors: the thread panicked, or its medium neither accepts data nor fails.
+    /// Errors: the thread panicked, or its medium accepts no data but reports no error.
     pub fn finish(mut self) -> Result<Summary, LogError> {
         self.stop().unwrap_or(Err(LogError::Panicked))
     }

@@ -1,10 +1,10 @@
 //! A recording with its parts.
 //!
-//! A part that can't be written any more is left without an end. Another part is begun, and messages that may be
-//! missing from the previous part are written again.
+//! If a part can't be written any more, it is left without an end. The recording begins another part, and repeats in it
+//! the messages that may be missing from the previous part.
 //!
-//! After an error, nothing written since the latest sync is reliable: a file system may discard it and report success
-//! the next time. Messages are therefore kept in memory until they are synced.
+//! After an error, nothing written since the latest sync is reliable, because a file system may discard it and report
+//! success the next time. Messages are therefore kept in memory until they are synced.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -26,11 +26,11 @@ const SYNC_BYTES: usize = 4 << 20;
 /// Wait after the first failed retry. The wait doubles after each further failed retry. The first retry is immediate.
 const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
-/// Number of attempts to write the rest after the dive has ended.
+/// Number of attempts to write the unsynced messages after the dive has ended.
 const LAST_ATTEMPTS: u32 = 3;
 /// Maximum number of statements of losses kept while no part can be begun.
 const MAX_STATEMENTS: usize = 100;
-/// Maximum number of names tried for a part, if files with these names exist.
+/// Maximum number of names tried for a part. Another name is tried if a file with the previous name exists.
 const NAMES: u32 = 1000;
 
 /// The part of the recording that is being written.
@@ -41,11 +41,11 @@ struct OpenPart {
     began: Option<MonoNs>,
     /// File size at which the open part should end, bytes.
     ends_at: u64,
-    /// Whether nothing but the part's header has been synced.
+    /// Whether only the part's header has been synced so far.
     fresh: bool,
     /// Number of synced raw messages in this part.
     raw_messages: u64,
-    /// Number of synced messages in this part, and total length of these messages, bytes.
+    /// Number of synced messages in this part, and the total length of the synced messages, bytes.
     certain: (u64, u64),
     /// Log time of the last message before this part.
     before: Option<MonoNs>,
@@ -73,10 +73,10 @@ pub(super) struct Recording {
     number: u32,
     /// Number in the file name of the latest part.
     named: u32,
-    /// Totals of all messages that are synced or lost, which are all messages before the backlog.
+    /// Totals of all messages that are synced or lost. The messages after them are in the backlog.
     settled: Tally,
     backlog: Backlog,
-    /// Statements of losses that aren't synced to the medium yet.
+    /// Statements of losses that the log doesn't have on its medium yet.
     statements: Vec<Statement>,
     /// Whether packets have been written, but not yet the tick that consumed them.
     within_tick: bool,
@@ -158,7 +158,7 @@ impl Recording {
         self.settled.last
     }
 
-    /// Whether nothing is being recorded at present, because of an error.
+    /// Whether an error keeps the recording from being written at present.
     pub(super) fn is_failing(&self) -> bool {
         self.open.is_none()
     }
@@ -251,8 +251,8 @@ impl Recording {
         let (mut lost, mut from) = (0, self.settled.last);
         // A part without synced content is removed. The first part is kept, because it has the recording's name.
         if is_taken {
-            // A deleted file isn't a part either. A file that is now at the deleted file's path belongs to another
-            // program.
+            // A deleted or replaced file isn't a part either. A file that is now at its path belongs to another
+            // program, so it isn't removed.
             (lost, from) = (certain.0, before);
             self.sum.messages -= certain.0;
             self.sum.message_bytes -= certain.1;

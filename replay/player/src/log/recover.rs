@@ -29,10 +29,11 @@ pub struct Recovered {
 /// Writes the readable content of a log to `output`, in the same order.
 ///
 /// The content is attachments, metadata, device messages, ticks and results. The new log replays to the same digest,
-/// and lists the losses. All parts of a recording become one log; a single part remains a part.
+/// and lists the losses. All parts of a recording become one log. If only one part is given, the new log remains a
+/// part.
 ///
-/// `open` opens the log; it is called twice, first to find all damage. `known` are the result channels whose schemas
-/// this program has. `from` is the name of the original log.
+/// `open` opens the log. It is called twice, because the first reading finds all damage. `known` are the result
+/// channels whose schemas this program has. `from` is the name of the original log.
 ///
 /// Errors: the log can't be read, or the output can't be written.
 pub fn recover<R: Read + Seek, W: Write>(
@@ -64,7 +65,7 @@ pub fn recover<R: Read + Seek, W: Write>(
     Ok(done)
 }
 
-/// Facts about a log that has been read to its end.
+/// Losses, result topics and sources of a log that has been read to its end.
 pub(super) struct Found {
     /// All losses, including content that dive logs have no channel for.
     pub(super) losses: Vec<Loss>,

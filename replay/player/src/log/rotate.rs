@@ -25,8 +25,8 @@ pub enum Every {
 /// How a recording is split into parts.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Rotation {
-    /// Condition under which a part ends; `None` for a single file, which is continued in another part only after an
-    /// error.
+    /// Condition under which a part ends; `None` for a single file. Even then the recording continues in another part
+    /// after an error.
     pub every: Option<Every>,
     /// Unique identifier of the recording, see [`super::dive_name`].
     pub dive: String,
@@ -60,8 +60,9 @@ pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
 
 /// Returns the log files for paths that the user named.
 ///
-/// A path may be a log, a folder of logs, or the given name of a recording in parts. Parts in which a log continues
-/// after an error are included. A file occurs only once, even if it is named twice or is also a part.
+/// A path may be a log, a folder of logs, or the given name of a recording in parts. If a log continued in further
+/// parts after an error, these parts are included. A file occurs only once, even if it is named twice or is also a
+/// part.
 ///
 /// Errors: a folder can't be read, or contains no log.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
@@ -82,7 +83,7 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
             files.push(path.clone());
             files.extend(continuations(path));
         } else {
-            // If there are no parts either, opening the log reports that it doesn't exist.
+            // If the recording has no parts either, opening the log reports that it doesn't exist.
             let parts = parts_of(path).unwrap_or_default();
             files.extend(if parts.is_empty() { vec![path.clone()] } else { parts });
         }
@@ -99,7 +100,8 @@ fn continuations(path: &Path) -> Vec<PathBuf> {
         return parts;
     }
     let Some(first) = part_head(path).filter(|head| head.number == 1) else { return Vec::new() };
-    // A part without a header was being created when the power failed. Its name shows that it belongs to the recording.
+    // A part has no header if the power failed while the part was created. Its name shows that it belongs to the
+    // recording.
     parts.retain(|part| part_head(part).is_none_or(|head| head.dive == first.dive));
     parts
 }

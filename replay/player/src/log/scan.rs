@@ -30,7 +30,7 @@ const RUN_BYTES: u64 = 1 << 20;
 /// Kind of piece of a log. A piece is the unit in which a log is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Piece {
-    /// A chunk. Its header is read again when needed, because a long dive has a hundred thousand chunks.
+    /// A chunk. Its header is read again when needed, to save memory: a long dive has a hundred thousand chunks.
     Chunk,
     /// A run of messages outside chunks. Records of other kinds may be between them.
     Run,
@@ -80,7 +80,8 @@ pub(super) struct Scan {
     attachment_bytes: u64,
     /// Number of bytes that the chunks so far unpack to.
     unpacked: u64,
-    /// Start and end of the range in which another log was last searched for, because times went back.
+    /// Start and end of the range in which another log was last searched for, because a chunk had earlier times than
+    /// its predecessor.
     searched: (u64, u64),
     budget: HeaderBudget,
 }
@@ -205,8 +206,8 @@ impl Scan {
         }
     }
 
-    /// Whether a chunk has earlier times than the chunk before it because another log begins between them, or within
-    /// the chunk before it.
+    /// Whether a chunk has earlier times than its predecessor because another log begins between them, or within the
+    /// predecessor.
     fn goes_back_into_other_log<R: Read + Seek>(
         &mut self,
         file: &mut LogFile<R>,
@@ -214,14 +215,16 @@ impl Scan {
     ) -> Result<bool, LogError> {
         let before = self.spans.last().filter(|before| before.is_after(&frame.item)).map(|before| before.at);
         let Some(before) = before else { return Ok(false) };
-        // If many chunks have earlier times than the same chunk, nothing is searched twice.
+        // Many chunks may have earlier times than the same chunk. Bytes that were already searched aren't searched
+        // again.
         let (start, end) = self.searched;
         let from = if start == before { end } else { before };
         self.searched = (before, frame.at);
         self.ends_at_other_log(file, from..frame.at, frame.at)
     }
 
-    /// Whether another log begins in this range of the file. If so, it isn't read, and the log was cut off at `at`.
+    /// Whether another log begins in this range of the file. If so, the other log isn't read, and this log was cut off
+    /// at `at`.
     fn ends_at_other_log<R: Read + Seek>(
         &mut self,
         file: &mut LogFile<R>,
@@ -237,7 +240,8 @@ impl Scan {
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
-        // A footer is the last record. Another record follows, so the footer was a damaged record of another kind.
+        // A footer is the last record of a log. Another record follows here, so the footer is a damaged record of
+        // another kind.
         if let Some((footer, _)) = self.footer.take() {
             self.lose(LossKind::Framing, footer);
         }
@@ -285,7 +289,7 @@ impl Scan {
             self.lose(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }, frame.at..frame.end);
             return;
         }
-        // The length of a run of messages includes the other records between these messages.
+        // The length of a run includes the records of other kinds between its messages.
         let within = |last: &&mut Span| self.run_open && frame.end - last.at <= RUN_BYTES;
         let last = self.spans.last_mut().filter(within);
         if let Some(run) = last {
@@ -354,7 +358,8 @@ impl Scan {
             self.lose(LossKind::Framing, frame.at..frame.end);
             return Ok(());
         };
-        // Each entry is stored together with the record's name, which takes memory too.
+        // Each entry is stored together with the name of its metadata record, so the name's memory counts for each
+        // entry.
         let names = cost / map_cost(1, 0) * name.len() as u64;
         if !self.budget.take(cost.saturating_add(names)) {
             self.lose_beyond(Many::HeaderBytes, frame.at..frame.end);
@@ -409,7 +414,8 @@ impl Scan {
         Ok(())
     }
 
-    /// Checks whether whole records are missing, which leaves no gap in the framing.
+    /// Checks whether whole records are missing. The framing can't show this, because the remaining records still
+    /// adjoin.
     ///
     /// If the end of the file is lost, the closing records are missing. If other records are lost, the summary isn't
     /// where the footer says.
@@ -436,7 +442,7 @@ impl Scan {
         Err(LogError::TooNew { name: file.name().to_owned(), found: found.clone(), known: FORMAT_VERSION })
     }
 
-    /// Uses the channels of an intact summary in place of all others. Returns whether the summary lists all channels.
+    /// Replaces all channel definitions by those in an intact summary. Returns whether the summary lists all channels.
     ///
     /// A tool that copied a log of this program may have renumbered its channels.
     fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<bool, LogError> {
@@ -456,9 +462,9 @@ impl Scan {
         numbers.map(|(schema, _)| *schema).any(|schema| schema > 0 && !self.schemas.contains_key(&schema))
     }
 
-    /// Searches all chunks for channel definitions. Truncated logs of other writers have them nowhere else.
+    /// Searches all chunks for channel definitions. Truncated logs of other writers have definitions nowhere else.
     ///
-    /// Definitions in intact chunks take precedence over those outside chunks.
+    /// Definitions in intact chunks take precedence over definitions outside chunks.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for number in 0..self.spans.len() {
             let Some(span) = self.spans.get(number).copied() else { break };
@@ -481,7 +487,7 @@ impl Scan {
         Ok(())
     }
 
-    /// Adds a definition found in a chunk. A definition from an intact chunk replaces a known one.
+    /// Adds a definition found in a chunk. If the chunk is intact, its definition replaces a known one.
     fn add_found(&mut self, definition: Definition, whole: bool, part: core::ops::Range<u64>) {
         let known = self.definitions.get(&definition.id);
         if known.is_some_and(|known| !whole || *known == definition) {
@@ -528,8 +534,8 @@ impl Scan {
 
 /// Sets the times of losses from the pieces of the log around them.
 ///
-/// If `read` is true, all pieces have been read, and their times are those of their messages. Before that, the times
-/// come from chunk headers, which may be wrong.
+/// If `read` is true, all pieces have been read, and their times are the times of their messages. Before reading, the
+/// times come from chunk headers, which may be wrong.
 pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     for loss in losses.list_mut().iter_mut().filter(|loss| !matches!(loss.kind, LossKind::Stated(_))) {
         let next = spans.partition_point(|span| span.at < loss.offset);
@@ -545,8 +551,8 @@ pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
 
 /// Whether a record's length is trusted: the record's fields confirm it, or another record follows.
 ///
-/// If the end of the file cuts off the following record, the length is trusted only if no records begin within that
-/// length.
+/// If the end of the file cuts off the following record, the length is trusted only if no records begin within the
+/// range that this length covers.
 fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Found) -> Result<bool, LogError> {
     let followed = !matches!(next, Found::Nothing);
     Ok(match next {
@@ -559,7 +565,7 @@ fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Foun
 }
 
 impl Span {
-    /// Whether an item is a chunk whose messages begin before this piece.
+    /// Whether an item is a chunk whose first message is earlier than this piece's.
     fn is_after(&self, item: &Item) -> bool {
         matches!(item, Item::Chunk(place) if place.times.0 < self.from)
     }

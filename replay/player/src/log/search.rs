@@ -14,8 +14,8 @@ const SEARCH_BYTES: usize = 64 * 1024;
 
 /// Returns the first position in `from..until` at which consecutive records begin.
 ///
-/// Bytes before a record may look like a record whose length happens to end at a record boundary. A position with an
-/// unconfirmed length is therefore accepted only if no records lie within that length.
+/// Bytes before a record may look like another record whose length happens to end at a record boundary. A position with
+/// an unconfirmed length is therefore accepted only if no records lie within that length.
 pub(super) fn find_records<R: Read + Seek>(
     file: &mut LogFile<R>,
     from: u64,
@@ -67,7 +67,8 @@ fn find<R: Read + Seek, T>(
     until: u64,
     examine: impl Fn(&mut LogFile<R>, &[u8], u64) -> Result<Option<T>, LogError>,
 ) -> Result<Option<T>, LogError> {
-    // A position is examined with the bytes after it. No more are read, because many short ranges may be searched.
+    // A position is examined with the seven bytes after it. No more are read, because many short ranges may be
+    // searched.
     let after = mcap::MAGIC.len() - 1;
     let block_bytes = |start: u64| {
         usize::try_from(until - start).map_or(SEARCH_BYTES, |len| SEARCH_BYTES.min(len.saturating_add(after)))

@@ -3,16 +3,17 @@
 //! Small irreplaceable messages (position readings, ticks, judgements, advice) are recorded until the disk is full.
 //! Echoes are by far the largest share of a log, and are dropped first. The disk then lasts for the whole dive.
 //!
-//! The recorder can't decode devices, so it recognises echoes by source and length; the log header lists the sonars.
-//! Heads that send only ranges have short packets, which are kept. Such a dive still replays to its digest.
+//! The recorder can't decode device data, so it recognises echoes by source and length; the log header lists the
+//! sonars. Heads that send only ranges have short packets, which are kept. A dive with such heads still replays to its
+//! digest.
 
 use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-/// Free bytes below which the user is warned. They last for some hours of a dive.
+/// Free bytes below which the user is warned. This space lasts for some hours of a dive.
 const WARN_BELOW_BYTES: u64 = 1 << 30;
-/// Free bytes below which echoes are dropped. For the messages that are still recorded, these bytes last for days.
+/// Free bytes below which echoes are dropped. The messages that are still recorded take days to fill this space.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
 /// Maximum length of a sonar packet that is kept, bytes. Longer packets are echoes, shorter ones have only ranges.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;
@@ -22,7 +23,7 @@ const ASK_EVERY: Duration = Duration::from_secs(2);
 /// Messages that a recorder dropped because its disk was nearly full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LeftOut {
-    /// Number of dropped messages: echoes, results per echo, and viewer messages.
+    /// Number of dropped messages. They are echoes, results per echo, and messages for viewers.
     pub messages: u64,
     /// Total length of the dropped messages, bytes.
     pub bytes: u64,
@@ -87,7 +88,7 @@ impl Space {
         self.sparing
     }
 
-    /// Counts a dropped message. For the first one, returns the statement for the log.
+    /// Counts a dropped message. For the first dropped message, returns a statement for the log.
     pub(super) fn leave_out(&mut self, at: MonoNs, bytes: usize) -> Option<String> {
         let first = self.left_out.span.map(|span| span.0);
         self.left_out.span = Some((first.unwrap_or(at), at));

@@ -24,15 +24,15 @@ pub trait Storage: Send {
 
 /// A file open for writing. Dropping it writes nothing more.
 pub trait StoredFile: Send {
-    /// Appends the first of these bytes, as many as possible, and returns their number.
+    /// Appends as many of `bytes` as possible, from the first on, and returns their number.
     ///
     /// Errors: a system error; after `Interrupted` the caller tries again.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
     /// Syncs the file. Once this function returns, everything written so far survives a power cut.
     ///
-    /// After an error, nothing written since the latest successful sync is certain. If another program has changed the
-    /// file, nothing in it is certain.
+    /// After an error, only what was on the medium at the latest successful sync is certain. If another program has
+    /// changed the file, nothing in it is certain.
     ///
     /// Errors: a system error; another program has deleted, truncated or replaced the file.
     fn sync(&mut self) -> io::Result<()>;
@@ -47,7 +47,8 @@ impl Storage for Disk {
         // The file is opened in append mode. If another program truncates it, its length stays below the written
         // length, which shows the fault.
         let file = OpenOptions::new().append(true).create_new(true).open(path)?;
-        // Another program sees by the lock that the file is being written. Some file systems have no locks.
+        // The lock shows other programs that the file is being written. On file systems without locks, the error is
+        // ignored.
         file.try_lock().ok();
         // The folder is synced only on Unix, because other systems can't open folders.
         let synced = if cfg!(unix) {
@@ -75,8 +76,7 @@ impl Storage for Disk {
     }
 }
 
-/// Kind of change that another program has made to a recording's file. The content is then gone, or no longer
-/// at the file's path.
+/// Kind of change that another program has made to a recording's file. The content is gone, or is at another path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Taken {
     #[error("another program has deleted the file")]
@@ -104,8 +104,8 @@ struct DiskFile {
     /// Device and inode number; `None` unless the file system reports the same numbers for the open file and for its
     /// path.
     known: Option<(u64, u64)>,
-    /// Whether the file has been synced once. The first sync doesn't report changes by other programs. If the first file
-    /// of a dive disappears while it has only a header, the second sync fails and the dive continues in another file.
+    /// Whether the file has been synced once. The first sync doesn't report changes by other programs. If a dive's
+    /// first file disappears while it has only a header, the second sync fails, and the dive continues in another file.
     is_begun: bool,
 }
 
@@ -119,7 +119,7 @@ impl DiskFile {
 
     /// Returns the change that another program has made to the file, if any.
     fn taken(&self) -> Option<Taken> {
-        // If the system can't tell, the file counts as unchanged.
+        // If the system can't give the file's metadata, the file counts as unchanged.
         let own = self.file.metadata().ok()?;
         if own.len() < self.written {
             return Some(Taken::CutShort);
@@ -211,8 +211,8 @@ impl io::Write for Buffered {
     }
 }
 
-/// A single writer as storage, for [`super::Recorder::start`]. Flushing the writer counts as a sync. There is no
-/// second file.
+/// A single writer as storage, for [`super::Recorder::start`]. Flushing the writer counts as a sync. No second file can
+/// be created.
 pub(super) struct OneWriter<W>(pub(super) Option<W>);
 
 struct WriterFile<W>(W);

@@ -14,8 +14,8 @@ use super::writer::{Lane, LogHeader, LogWriter, ResultChannel};
 /// Metadata key of a trimmed log. Its value describes the changes.
 pub const TRIMMED: &str = "trimmed";
 
-/// Changes a source message. The function may write replacement bytes, and returns whether it has done so. An empty
-/// replacement drops the message.
+/// Function that may change a source message. It writes any replacement into the last argument, and returns whether it
+/// has done so. An empty replacement drops the message.
 pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 
 /// Content that is kept of a log, and changes to this content.
@@ -30,8 +30,8 @@ pub struct Trim<'a> {
     pub change: Change<'a>,
     /// Whether to keep voice recordings within the kept spans.
     pub voices: bool,
-    /// Decides for a topic whether its results are kept. Used only if the whole dive is kept; otherwise no results are
-    /// kept.
+    /// Decides by topic whether results are kept. It is used only if the whole dive is kept, because otherwise all
+    /// results are dropped.
     pub results: &'a dyn Fn(&str) -> bool,
 }
 
@@ -42,8 +42,7 @@ pub struct Trimmed {
     pub messages: u64,
     /// Number of messages dropped because they are outside the spans.
     pub cut: u64,
-    /// Number of result messages dropped. They are dropped because a trimmed dive would get other judgements, and
-    /// because some results name people.
+    /// Number of dropped result messages. A trimmed dive has other judgements, and some results name people.
     pub results: u64,
     /// Number of source messages that were changed.
     pub changed: u64,
@@ -59,9 +58,9 @@ pub struct Trimmed {
     pub span: Option<(MonoNs, MonoNs)>,
 }
 
-/// Writes the content to keep to `output`, in the same order. The new log states the removed spans as losses.
+/// Writes the kept content to `output`, in the same order. The new log states the removed spans as losses.
 ///
-/// `open` opens the log; it is called twice. `known` are the result channels whose schemas this program has.
+/// `open` opens the log; it is called twice. `known` are the result channels whose schemas this program knows.
 ///
 /// Errors: the log can't be read, or the output can't be written.
 pub fn trim<R: Read + Seek, W: Write>(

@@ -18,7 +18,7 @@ use super::reader::{LogInfo, LogReader, MessageKind};
 use super::rotate::{files_of, in_the_way, part_head};
 use super::writer::LogHeader;
 
-/// A recording that did not end in order. A later dive can continue it in a new part.
+/// A recording that did not end in order, and that a later dive can continue in a new part.
 #[derive(Debug, Clone)]
 pub struct Unfinished {
     /// Path that names the recording, as given to `--record`.
@@ -29,16 +29,16 @@ pub struct Unfinished {
     pub last: MonoNs,
     /// First and last time of the log.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// Files of the parts, in order; empty if none of them is at [`Self::recording`].
+    /// Files of the recording's parts, in order; empty if none of them is at [`Self::recording`].
     pub files: Vec<PathBuf>,
-    /// Identifier of the recording, equal for all recordings of a dive.
+    /// Identifier of the recording, which all parts of a dive share.
     pub dive: String,
     /// Number of the last part, and number in its file name.
     pub(super) number: u32,
     pub(super) named: u32,
     /// Totals of all readable messages.
     pub(super) progress: Progress,
-    /// The last file, locked, so that no other program continues the recording. `None` on file systems without locks.
+    /// The last file, locked so that no other program continues the recording. `None` if the file system has no locks.
     _lock: Option<Arc<File>>,
 }
 
@@ -70,8 +70,8 @@ impl Interrupted {
 }
 
 impl Unfinished {
-    /// Reads the recording named `recording`. `None` if it ended in order, has no data, or is being written, or if its logs
-    /// aren't parts of a recording.
+    /// Reads the recording named `recording`. Returns `None` if it ended in order, has no data, or is being written.
+    /// Also returns `None` if its logs aren't parts of a recording.
     ///
     /// Errors: a log can't be read.
     pub fn read(recording: &Path) -> Result<Option<Self>, LogError> {
@@ -119,10 +119,10 @@ impl Unfinished {
         Ok(last.map(unfinished))
     }
 
-    /// Returns the path that names the latest recording in a folder, if that recording did not end in order.
+    /// Returns the name of the latest recording in a folder, as a path. `None` if that recording can't be continued.
     ///
     /// The latest recording is the one whose file was modified last. Files that aren't parts of a recording are
-    /// ignored, as are those for which `is_other` returns true.
+    /// ignored. Logs for which `is_other` returns true are ignored too.
     ///
     /// Errors: the folder can't be read.
     pub fn last_in(folder: &Path, is_other: &dyn Fn(&LogInfo) -> bool) -> Result<Option<PathBuf>, LogError> {
@@ -152,7 +152,7 @@ impl Unfinished {
         Ok(None)
     }
 
-    /// Whether the recording named `recording` exists and can be continued, judged as in [`Unfinished::read`].
+    /// Whether the recording named `recording` exists and can be continued, by the conditions of [`Unfinished::read`].
     ///
     /// Errors: a log can't be read.
     pub fn is_at(recording: &Path) -> Result<bool, LogError> {
@@ -161,7 +161,7 @@ impl Unfinished {
         Ok(has_head && unended(&files)?.is_some())
     }
 
-    /// Returns the same dive, to be continued at another path. `None` if parts of the dive are already there.
+    /// Returns the recording, to be continued at another path. `None` if that path already has parts of the dive.
     #[must_use]
     pub fn at(&self, recording: &Path) -> Option<Self> {
         let present = in_the_way(recording).unwrap_or_default();

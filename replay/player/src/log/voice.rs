@@ -1,10 +1,10 @@
-//! Voice recordings in a log: from the operator's page to the recorder, and back.
+//! Voice recordings in a log: passes them from the operator's page to the recorder, and reads them back.
 //!
-//! A message of `/notes/voice` has in little-endian order: u32 id of the note, u32 seconds, u16 length of the media
-//! type, the media type, and the recording as the browser made it. The message has its own chunk, so damage to it
+//! A message of `/notes/voice` contains, in little-endian order: u32 id of the note, u32 seconds, u16 length of the
+//! media type, the media type, and the recording as the browser made it. The message has its own chunk, so damage to it
 //! affects nothing else.
 //!
-//! A replay doesn't read these messages, because the operator's commands contain everything that the loop needs.
+//! A replay doesn't read voice messages, because the operator's commands contain everything that the loop needs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -52,17 +52,17 @@ pub struct VoicePort {
 impl VoicePort {
     /// Passes a recording to the log, without blocking.
     ///
-    /// The recording is as safe as sensor data. It is written within a second, and written again to another part if
-    /// the medium fails.
+    /// The recording is as safe as sensor data. It is written within a second. If the medium fails, it is written again
+    /// to another part.
     ///
-    /// Errors: see [`NotKept`]; nothing was accepted.
+    /// Errors: see [`NotKept`]; the recording was not accepted.
     pub fn keep(&self, voice: &Voice) -> Result<(), NotKept> {
         if self.state.failing.load(Ordering::Acquire) || self.state.voices_end.load(Ordering::SeqCst) {
             return Err(NotKept::Failing);
         }
         self.state.voices.push(encode(voice)).map_err(|_| NotKept::Full)?;
-        // The recorder sets the flag before it looks at the queue for the last time. If the flag is still unset, the
-        // recorder takes this recording.
+        // The recorder sets this flag before it looks at the queue for the last time. If the flag is unset, the
+        // recorder is still going to take this recording from the queue.
         if self.state.voices_end.load(Ordering::SeqCst) { Err(NotKept::Failing) } else { Ok(()) }
     }
 }
@@ -79,7 +79,8 @@ pub fn encode(voice: &Voice) -> Vec<u8> {
     message
 }
 
-/// Decodes a message. The recording must pass the page's own checks, because a log may come from anywhere.
+/// Decodes a message. The recording must pass the checks that the page applies to it, because a log may come from
+/// anywhere.
 ///
 /// Errors: see [`VoiceMessageError`].
 pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {
@@ -95,7 +96,7 @@ pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {
     Ok(Voice { id, seconds, container, audio: audio.to_vec() }.checked()?)
 }
 
-/// Finds the recording of a note in a log. `from` is the time of the note; the recording isn't earlier.
+/// Finds the recording of a note in a log. `from` is the time of the note, and its recording isn't earlier.
 ///
 /// Returns `None` if the log has no readable recording of the note.
 ///

@@ -1,4 +1,4 @@
-//! The work of a recorder: takes entries from the queue and writes them to the log.
+//! The work of a recorder, which takes entries from the queue and writes them to the log.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use super::writer::{Lane, LogHeader, Summary};
 
 /// Interval at which a chunk is closed and synced.
 ///
-/// A power cut may cost a second. The interval is half of that, because closing and syncing take time too.
+/// A power cut may lose one second of data. The interval is half a second, because closing and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 /// Minimum interval at which the log records how many packets the connections to devices dropped.
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
@@ -26,7 +26,8 @@ const BATCH: usize = 256;
 /// A message derived from results, such as one for viewers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
-    /// Number of the result channel for the message. The message is ignored if the log has no such channel.
+    /// Number of the result channel to which the message is written. The message is ignored if the log has no such
+    /// channel.
     pub channel: u16,
     /// Log time of the derived message.
     pub at: MonoNs,
@@ -36,7 +37,8 @@ pub struct Made {
 
 /// Derives messages from results on the recorder's thread, so that the loop has no extra work.
 pub trait DerivedChannels: Send {
-    /// Processes a message of result channel `channel`. It is called even if the disk has no room for that message.
+    /// Processes a message of result channel `channel`. It is called even if the disk has no room for the message
+    /// itself.
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>);
 
     /// Called at the end of the dive.
@@ -57,11 +59,11 @@ pub struct RecorderWorker {
     skipped: u64,
     /// Ids of the sources.
     ids: Vec<String>,
-    /// Packets that the connections to devices dropped and that the log doesn't state yet, by source. `dropped_stated`
-    /// is the time of the latest statement.
+    /// Dropped packets that the log doesn't state yet, by source. The connections to devices dropped them.
+    /// `dropped_stated` is the time of the latest statement in the log.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
-    /// Log time of the latest entry. A voice recording has no log time of its own, so it gets this one.
+    /// Log time of the latest entry. A voice recording has no log time of its own, so it gets this time.
     last: Option<MonoNs>,
     state: Arc<State>,
     _closed: ClosedWhenDropped,
@@ -122,7 +124,7 @@ impl RecorderWorker {
         }
     }
 
-    /// Returns a port that records messages to devices, and losses of packets, which don't pass through the loop.
+    /// Returns a port that records two things that bypass the loop: messages to devices, and losses of packets.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
@@ -142,7 +144,7 @@ impl RecorderWorker {
         &self.state
     }
 
-    /// Writes some entries of the queue. Also syncs, or tries again after an error, if due.
+    /// Writes some entries of the queue. If due, also syncs, or tries again after an error.
     ///
     /// `now` is the time since the recording began, which never goes back. Returns whether the queue had entries.
     pub fn step(&mut self, now: Duration) -> bool {
@@ -162,8 +164,8 @@ impl RecorderWorker {
         taken += self.write_voices();
         self.state_gaps();
         self.state_dropped(now, false);
-        // A full batch means that the recorder is behind, so it doesn't sync yet. The next sync then covers all
-        // entries that arrived meanwhile. Under constant load the size of the backlog triggers a sync.
+        // After a full batch the recorder is behind, so it doesn't sync yet. The next sync then covers all entries that
+        // arrived meanwhile. Under constant load, the amount of unsynced data triggers a sync.
         if !is_behind {
             self.flush_in_time(now);
         }
@@ -214,7 +216,7 @@ impl RecorderWorker {
 
     /// Records in the log how many packets the connections to devices dropped, every few seconds and at the end.
     ///
-    /// The interval limits the number of records if packets are dropped for hours.
+    /// Because these records are at least some seconds apart, even hours of dropped packets give few records.
     fn state_dropped(&mut self, now: Duration, at_end: bool) {
         let dropped = core::iter::from_fn(|| self.state.dropped.pop());
         for Dropped { source, span: (from, to), packets } in dropped {

@@ -1,4 +1,4 @@
-//! Writes a log on the caller's thread. Only this module encodes messages as records.
+//! Writes a log on the caller's thread. No other module encodes messages as records.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,7 +25,7 @@ use super::space::LeftOut;
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Span of dive time at which a chunk is closed.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
-/// Bytes that each chunk adds to the summary, and bytes that each channel in a chunk adds.
+/// Bytes that each chunk adds to the summary, and bytes that each channel in the chunk adds to it.
 ///
 /// Source: MCAP format specification, "Chunk Index".
 const CHUNK_INDEX_BYTES: u64 = 80;
@@ -42,7 +42,7 @@ pub struct LogHeader {
     pub metadata: BTreeMap<String, String>,
     /// The sources. A source's index is its number in the messages.
     pub sources: Vec<SourceInfo>,
-    /// Whether the log will have ticks. The log of a simulation has none, and no channel for them.
+    /// Whether the log will have ticks. The log of a simulation has no ticks, and no channel for them.
     pub ticks: bool,
     /// Whether the log may have recordings of voice notes.
     pub voices: bool,
@@ -51,7 +51,8 @@ pub struct LogHeader {
     /// Numbers of the sources that are sonars. Their long packets are echoes, which are dropped first when a disk
     /// fills.
     pub sonars: Vec<u16>,
-    /// Metadata of this part, if the recording has parts. The part continues the message numbers of earlier parts.
+    /// Metadata of this part, if the recording has parts. The message numbers of this part continue those of earlier
+    /// parts.
     pub part: Option<PartHead>,
 }
 
@@ -93,7 +94,7 @@ pub struct ResultChannel {
     pub message_encoding: String,
     /// Whether the messages are dropped together with echoes when the disk fills.
     ///
-    /// True if the channel has a record per echo, or if a replay doesn't need the channel.
+    /// True if the channel has a record per echo, or if a replay doesn't need the channel's messages.
     pub follows_echoes: bool,
 }
 
@@ -102,7 +103,7 @@ pub struct ResultChannel {
 pub struct Summary {
     /// Number of messages of all channels in the log.
     pub messages: u64,
-    /// Length of these messages, uncompressed and without framing, bytes.
+    /// Total length of the messages, uncompressed and without framing, bytes.
     pub message_bytes: u64,
     /// Number of chunks, including the one with the channel definitions.
     pub chunks: u32,
@@ -133,7 +134,7 @@ pub struct PartSummary {
     pub raw_messages: u64,
 }
 
-/// Destination of a message: a channel, identified by its content.
+/// Destination of a message, which is a channel identified by its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Lane {
     Raw(u16),
@@ -159,7 +160,7 @@ struct Channel {
 /// Chunks are compressed by zstd at its lowest level. A dive produces some hundred kB/s, which even a small computer
 /// compresses a thousand times faster. A smaller file is therefore worth more than the speed of lz4.
 pub struct LogWriter<W: Write> {
-    /// Declared before the writer, so that it is dropped first. Otherwise the writer would end the log on drop.
+    /// Declared before `writer`, so that it is dropped first. Otherwise the `mcap` crate's writer ends the log on drop.
     medium: Closing,
     writer: mcap::Writer<NoSeek<Counted<W>>>,
     raw: Vec<Channel>,
@@ -202,9 +203,8 @@ impl<W: Write> LogWriter<W> {
         if let Some(result) = header.results.iter().find(|result| !result.topic.starts_with(RESULT_PREFIX)) {
             return Err(LogError::Topic { topic: result.topic.clone() });
         }
-        // No threads: the log of a simulation must depend only on its scene, and threads would make it depend on the
-        // machine.
-        // No seeking: each chunk is written as soon as it is closed.
+        // Without threads, because the log of a simulation must depend only on its scene and not on the machine.
+        // Without seeking, so that each chunk is written as soon as it is closed.
         let options = mcap::WriteOptions::new()
             .profile("headrace")
             .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
@@ -288,7 +288,7 @@ impl<W: Write> LogWriter<W> {
         self.medium.0.bytes.load(Ordering::Relaxed) + index * self.chunks
     }
 
-    /// Writes the totals up to the end of this part, and whether another part follows. Closes the chunk.
+    /// Closes the chunk, and writes the totals up to the end of this part and whether another part follows.
     ///
     /// Errors: an error of the writer.
     pub(super) fn end_part(&mut self, follows: bool) -> Result<(), LogError> {
@@ -391,7 +391,7 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// Records in the log a loss between the times `from` and `to`. An unknown time is `None`. Closes the chunk.
+    /// Records a loss between the times `from` and `to` in the log, and closes the chunk. `None` is an unknown time.
     ///
     /// Errors: an error of the writer.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {
@@ -444,11 +444,12 @@ fn write_metadata<W: Write>(
     Ok(())
 }
 
-/// Number of bytes passed to the medium so far, and whether more may be passed.
+/// Number of bytes passed to the log's medium so far, and whether more may be passed.
 #[derive(Default)]
 struct Medium {
     bytes: AtomicU64,
-    /// Set to refuse further bytes: after an error, and before the `mcap` crate's writer ends the log on drop.
+    /// Set to refuse further bytes. This happens after an error, and before the `mcap` crate's writer ends the log on
+    /// drop.
     shut: AtomicBool,
     /// Whether a flush must not reach the medium.
     is_spared: AtomicBool,
@@ -513,7 +514,7 @@ fn attach<W: Write>(
     writer.attach(&attachment).map_err(LogError::writing("an attachment"))
 }
 
-/// Adds channels, and collects them for the record that repeats the definitions.
+/// Adds channels to a log, and collects their definitions for the metadata record that repeats them.
 struct ChannelList<'a, W: Write> {
     writer: &'a mut mcap::Writer<NoSeek<Counted<W>>>,
     list: BTreeMap<String, String>,

@@ -1,7 +1,7 @@
 //! Content-defined chunking: cuts bytes into blocks, so that two snapshots share most of their blocks.
 //!
-//! Cuts depend on the surrounding bytes, not on their offset (gear hash: Xia et al., "FastCDC", USENIX ATC 2016). An
-//! insertion therefore changes only the blocks around it.
+//! Where a cut is made depends on the surrounding bytes, not on their offset (gear hash: Xia et al., "FastCDC", USENIX
+//! ATC 2016). An insertion therefore changes only the blocks around it.
 
 /// Minimum length of a block, bytes. Only the last block may be shorter.
 const MIN_BYTES: usize = 8 << 10;

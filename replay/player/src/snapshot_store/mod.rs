@@ -26,7 +26,7 @@ pub struct SnapshotStore {
 impl SnapshotStore {
     /// Creates an empty store for at most `max_bytes`. A snapshot is due after each `interval` of processing time.
     ///
-    /// The first snapshot is kept, whatever its size is.
+    /// The first snapshot is kept, however large it is.
     pub fn new(max_bytes: usize, interval: Duration) -> Self {
         Self { snapshots: BTreeMap::new(), blocks: BTreeSet::new(), used_bytes: 0, max_bytes, interval }
     }
@@ -43,8 +43,8 @@ impl SnapshotStore {
 
     /// Adds a snapshot, unless the store has one of the same time.
     ///
-    /// While there is no room, every other snapshot is dropped and the interval is doubled. A snapshot that doesn't
-    /// fit beside the first one isn't kept.
+    /// While there is no room, every other snapshot is dropped and the interval is doubled. If only the first snapshot
+    /// is left and the new one still doesn't fit, the new one isn't kept.
     pub fn insert(&mut self, at: MonoNs, snapshot: &[u8]) {
         if self.snapshots.contains_key(&at) {
             return;
@@ -66,12 +66,12 @@ impl SnapshotStore {
         self.used_bytes += references;
     }
 
-    /// Returns the bytes of the snapshot of time `at`. [`SnapshotStore::latest`] returns such times.
+    /// Returns the bytes of the snapshot of time `at`, which [`SnapshotStore::latest`] has returned.
     pub fn load(&self, at: MonoNs) -> Option<Vec<u8>> {
         self.snapshots.get(&at).map(|blocks| blocks.concat())
     }
 
-    /// Returns the memory needed for blocks that aren't stored yet, bytes.
+    /// Returns the memory that the blocks not stored yet will need, bytes.
     fn growth(&self, blocks: &BTreeSet<&[u8]>) -> usize {
         blocks.iter().filter(|block| !self.blocks.contains(**block)).map(|block| block_bytes(block)).sum()
     }
@@ -136,7 +136,8 @@ mod tests {
         for at in times {
             assert_eq!(store.load(MonoNs(at)).unwrap(), snapshot(at));
         }
-        // The interval doubled at least three times: each thinning makes room for only half as many new snapshots.
+        // The interval has doubled at least three times, because each thinning makes room for only half as many new
+        // snapshots.
         assert!(store.interval() > 4 * INTERVAL);
         assert_eq!(store.load(MonoNs(1)), None);
     }

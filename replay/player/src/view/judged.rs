@@ -14,26 +14,26 @@ use super::site::Site;
 const EVERY: DurNs = DurNs(2_000_000_000);
 /// Maximum number of stretches in a list. The stretches farthest from the portal are kept.
 ///
-/// The log stays small even if a dive misses everything.
+/// The limit keeps the log small even if a dive misses everything.
 const MOST_STRETCHES: usize = 40;
 
 /// Judgements of all sections so far.
 #[derive(Debug, Default)]
 pub(super) struct Sections {
-    /// Flagged sections by number, each with its cause and the diameter of its hole, m.
+    /// Flagged sections by number, each with its cause of failure and the diameter of its hole, m.
     flagged: BTreeMap<i64, (Cause, f64)>,
     /// First and last section of each missed stretch, by the stretch's number.
     runs: BTreeMap<u64, (i64, i64)>,
     /// Numbers of the missed stretches that have changed, each with its change.
     ///
-    /// The next judgement is of the section that caused the change, and creates the alert to the pilot.
+    /// The next judgement is of the section that caused the change. It creates the alert to the pilot.
     changed_runs: Vec<(u64, u64)>,
     shown: Option<MonoNs>,
     changed: bool,
 }
 
 impl Sections {
-    /// Stores the change of a missed stretch until the next judgement of a section.
+    /// Stores the change of a missed stretch, for use at the next judgement of a section.
     pub(super) fn run(&mut self, id: u64, change: u64) {
         self.changed_runs.push((id, change));
     }
@@ -79,7 +79,8 @@ impl Sections {
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
-            // Some sections of the cleared stretch may now belong to another stretch, which is still missed.
+            // Some sections of the cleared stretch may still be flagged, because they now belong to another missed
+            // stretch.
             let open = self.flagged.range(from..=to).next().is_some();
             let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
             return (!open).then(|| Log::new(judged.at, Level::Info, words));
@@ -114,7 +115,7 @@ impl Sections {
         })
     }
 
-    /// Returns the list for display. A stretch consists of adjacent flagged sections with the same cause.
+    /// Returns the list for display. Adjacent flagged sections with the same cause form one stretch.
     fn stretches(&self, site: &Site) -> Vec<Stretch> {
         let mut stretches: Vec<Stretch> = Vec::new();
         let mut last = None;

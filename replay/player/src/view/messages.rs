@@ -5,7 +5,7 @@
 use headrace_geometry::time::MonoNs;
 use serde::Serialize;
 
-/// A time in Foxglove's format, on the host's monotonic clock, as all times in a log.
+/// A time in Foxglove's format. Like all times in a log, it is on the host's monotonic clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(super) struct Time {
     sec: u64,

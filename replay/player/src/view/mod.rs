@@ -122,7 +122,7 @@ impl View {
             }
             RecordKind::Alert => self.observation(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
-            // Viewers get only samples. Doubtful returns, live states and the list of alerts are in the log's
+            // Viewers get only samples. Doubtful returns, live states and the list of alerts are only in the log's
             // results.
             RecordKind::NoSample
             | RecordKind::Doubtful
@@ -351,7 +351,7 @@ impl Words<'_> {
         Some(first.map(f64::from_bits))
     }
 
-    /// Returns the element of `all` whose index is the next word of the record.
+    /// Returns the element of `all` whose `number` is the next word of the record.
     fn one_of<T: Copy>(&mut self, all: &[T], number: impl Fn(T) -> u64) -> Option<T> {
         let word = self.integer()?;
         all.iter().copied().find(|kind| number(*kind) == word)

@@ -11,10 +11,10 @@ const SPAN: DurNs = DurNs(500_000_000);
 const MOST_POINTS: usize = 4096;
 /// Length of a point, bytes: three floats.
 ///
-/// Rounding makes the least significant byte of x zero, so that byte holds the head number. A viewer that reads it as
-/// part of x shows x wrong by some micrometres. The head number in a byte of its own would make the stride 13 bytes.
-/// Base64 encodes groups of three bytes, so points would no longer align with groups, and the compressed text would be
-/// a seventh longer.
+/// Rounding makes the least significant byte of x zero, so that byte holds the head number. A viewer that reads this
+/// byte as part of x shows x wrong by some micrometres. If the head number had a byte of its own, the stride would be
+/// 13 bytes. Base64 encodes groups of three bytes, so points would no longer align with groups, and the compressed text
+/// would be a seventh longer.
 const STRIDE: usize = 12;
 const FIELDS: [Field; 4] =
     [Field::float("x", 0), Field::float("y", 4), Field::float("z", 8), Field::byte("head", 0)];
@@ -22,8 +22,8 @@ const FIELDS: [Field; 4] =
 ///
 /// The lower half of each float is then zero and compresses well.
 const PARTS_PER_M: f64 = 256.0;
-/// Maximum distance of a point from the cloud's origin, m. Farther points would have fewer zero bits, and are
-/// dropped.
+/// Maximum distance of a point from the cloud's origin, m. Farther points are dropped, because they have fewer zero
+/// bits.
 const FARTHEST_M: f64 = 128.0;
 
 /// Points of the current point cloud.
@@ -37,8 +37,8 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// Adds a sample of a head, received at `at`. Returns the previous cloud if it was full or too old for the
-    /// sample.
+    /// Adds a sample of a head, received at `at`. If the current cloud was full, or too old for the sample, returns
+    /// that cloud and begins another.
     pub(super) fn add(&mut self, at: MonoNs, head: u8, [x_m, y_m, z_m]: [f64; 3]) -> Option<PointCloud> {
         let full = if self.data.len() >= MOST_POINTS * STRIDE { self.close() } else { self.close_before(at) };
         if self.began.is_none() {
@@ -53,7 +53,7 @@ impl Points {
         full
     }
 
-    /// Returns the current cloud if it is too old at `at`, or the clock was set back.
+    /// Returns the current cloud if it is too old at `at`, or if the clock was set back.
     pub(super) fn close_before(&mut self, at: MonoNs) -> Option<PointCloud> {
         let age = at.since(self.began?).0;
         if (0..SPAN.0).contains(&age) { None } else { self.close() }

@@ -17,7 +17,7 @@ pub struct Site {
     pub target_m: f64,
     /// Length of a judged section along the tunnel, m.
     pub section_m: f64,
-    /// Distance before a missed stretch at which the vehicle turns round, m.
+    /// Distance before a missed stretch at which the vehicle turns round to pass it again, m.
     pub run_up_m: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,

@@ -26,7 +26,7 @@ const FIELDS: [Field; 6] = [
     Field::byte("samples", 4),
     Field::byte("verdict", 5),
 ];
-/// Maximum sample count of a cell. Exact counts would take up most of the message's length.
+/// Maximum sample count of a cell. Exact counts take up most of the message's length.
 const MOST_SAMPLES: u8 = 3;
 
 /// Samples and verdicts of the wall's cells. Columns are allocated only where the vehicle has passed.
@@ -132,7 +132,7 @@ impl Wall {
 
 /// Returns the colour, sample count and verdict of a cell.
 ///
-/// A cell without a sample is transparent in an open section, and dark in a judged one, so that holes are visible.
+/// A cell without a sample is transparent in an open section, and dark in a judged section, so that holes are visible.
 fn cell(column: Option<&Column>, row: usize) -> [u8; FIELDS.len()] {
     let Some(column) = column else { return [0; FIELDS.len()] };
     let samples = column.samples.get(row).copied().unwrap_or(0);

@@ -80,7 +80,7 @@ fn t_max_at_the_largest_speed_equals_the_target() {
     }
 }
 
-/// The reference table lists T_max of Eq. 16.
+/// The reference table lists T_max, by Eq. 16 of Jorge et al. 2021.
 ///
 /// The planner assumes the worst start angle of the pings, so its T_max is at most slightly larger than in the table.
 #[test]
@@ -117,8 +117,8 @@ fn occluded_side_walls_get_half_of_the_passes() {
     for strip in hidden {
         assert!(strip.seen_by.len() == 2 && (strip.arc.length_m - 1.7).abs() < 0.1, "{strip:?}");
     }
-    // Neighbouring samples of a turn are close on the side walls. So the corners limit the speed, and all heads see
-    // them.
+    // On the side walls, neighbouring samples of a turn are close together. The corners therefore limit the speed, and
+    // all heads see them.
     let t_m = planner.t_max_m(fast, 0.1).unwrap();
     assert!((0.41..0.43).contains(&t_m), "{t_m}");
 }
@@ -192,7 +192,7 @@ fn error_about_an_impossible_plan_names_the_cause() {
     for bad in [0.0, -1.0, f64::NAN] {
         assert!(planner.answers(&speed(bad), None).is_err() && planner.t_max_m(0, bad).is_err());
     }
-    // A target that a mode cannot meet is an answer, not an error.
+    // If a mode can't meet the target, its answer says so. This isn't an error.
     let answers = planner.answers(&speed(0.1), None).unwrap();
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
@@ -216,7 +216,7 @@ fn margins_lower_the_speed_step_by_step_to_the_largest_planned_speed() {
     }
 }
 
-/// The range that the plan states is the smallest of the heads' maximum ranges. The ping period follows from the turn
+/// The maximum range in the plan is the smallest of the heads' maximum ranges. The ping period follows from the turn
 /// period.
 #[test]
 fn plan_states_the_maximum_range_and_ping_period() {

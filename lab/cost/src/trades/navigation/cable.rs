@@ -12,7 +12,7 @@ use headrace_sensor::reading::Reading;
 
 /// Time over which the speed is averaged from the cable counter's readings, s.
 const SPEED_OVER_S: f64 = 1.0;
-/// Age above which the cable counter's last reading is ignored, s.
+/// Age above which the cable counter's latest reading is ignored, s.
 const STALE_S: f64 = 2.0;
 
 /// The chainage of a cable reading, m; `None` for any other reading.
@@ -31,7 +31,7 @@ pub(super) fn chainage_m(info: &SensorInfo, reading: &Reading) -> Option<f64> {
 /// come from the counter's resolution.
 pub(super) struct CableNavigation {
     middle: Yz,
-    /// The last reading, as time and chainage, m. `before` is a reading about [`SPEED_OVER_S`] earlier.
+    /// The latest reading, as time and chainage, m. `before` is a reading about [`SPEED_OVER_S`] earlier.
     last: Option<(MonoNs, f64)>,
     before: Option<(MonoNs, f64)>,
     speed_mps: f64,

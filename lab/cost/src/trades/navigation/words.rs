@@ -13,8 +13,8 @@ fn figure(point: &Point, name: &str) -> Option<f64> {
     point.errors.iter().find(|error| error.name == name).map(|error| error.interval.middle)
 }
 
-/// Worst case of a method: its largest lateral position error, m, and the smallest share of displacements whose error
-/// is within two stated standard deviations, %.
+/// Worst case of a method. It is given by the largest lateral position error, m, and by the smallest share of
+/// displacements whose error is within two stated standard deviations, %.
 fn worst(points: &[Point], method: &str) -> Option<[f64; 2]> {
     let of = |name: &'static str| {
         points.iter().filter(|point| point.value == method).filter_map(move |point| figure(point, name))
@@ -23,7 +23,7 @@ fn worst(points: &[Point], method: &str) -> Option<[f64; 2]> {
     Some([across_m, of("displacements within two sigma").reduce(f64::min)?])
 }
 
-/// Reasons for the filter with sonar returns as default, although other settings beat this default.
+/// Reasons why the filter with sonar returns is the default, although other settings beat it.
 pub(super) fn reasons(points: &[Point]) -> Vec<String> {
     let mut reasons = Vec::new();
     if let (Some(usual), Some(cable), Some(direct)) =

@@ -107,10 +107,10 @@ fn echo_data_resembling_a_return_is_not_decoded_as_a_return() {
 
 /// Sonar returns that can't form a false return together with the next one.
 ///
-/// The front of one return and the whole of the next could form a false return that no decoder can detect. These
-/// returns exclude this in three ways. 0xFC occurs only at the end. Echo lengths differ by less than a header. No
-/// position, if it is read in place of an echo length, equals one of these lengths. `echo_of_any_bytes_round_trips`
-/// covers the other values.
+/// The front of one return and the whole of the next could form a false return that no decoder can detect. The
+/// generated returns exclude this in three ways. 0xFC occurs only at the end. Echo lengths differ by less than a
+/// header. No position, if read in place of an echo length, equals one of the allowed lengths.
+/// `echo_of_any_bytes_round_trips` covers the values that are excluded here.
 fn returns(tags: &[Tag], lengths: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Return> + use<> {
     let tags = proptest::sample::select(tags.to_vec());
     let echo = (proptest::collection::vec(0u8..0xFC, MAX_ECHO_BYTES), lengths);

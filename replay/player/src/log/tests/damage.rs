@@ -250,7 +250,8 @@ fn wrong_record_length_loses_at_most_its_chunk() {
         let mut bytes = bytes.clone();
         bytes[places[2] + 1..places[2] + 9].copy_from_slice(&lie.to_le_bytes());
         let (got, _) = read(&bytes);
-        // The chunk's fields imply its length a second time, and another record follows, so nothing is lost.
+        // The chunk's fields imply its length a second time, and another record follows at that length, so nothing is
+        // lost.
         assert!(got == seen, "length {lie}: {} messages", got.len());
         bytes[places[2] + 9 + 36..places[2] + 9 + 44].copy_from_slice(&(lie ^ 3).to_le_bytes());
         let (got, losses) = read(&bytes);

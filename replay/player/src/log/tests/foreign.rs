@@ -24,8 +24,8 @@ fn messages() -> Vec<(usize, u64, u32)> {
     messages
 }
 
-/// Messages in the expected reading order: by time, then raw channels by name, then other channels by topic, then
-/// sequence.
+/// Messages in the expected reading order: by time, then by channel, then by sequence. Raw channels come first, by
+/// name; other channels follow, by topic.
 fn wanted() -> Vec<(String, u64, u32)> {
     let kinds = [("raw 1", 1), ("other", 3), ("raw 0", 0), ("sent 0", 2)];
     let mut wanted: Vec<_> =
@@ -110,7 +110,7 @@ fn unclosed_chunk_delivers_its_messages() {
             let header = MessageHeader { channel_id, sequence: 0, log_time: n, publish_time: n };
             writer.write_to_known_channel(&header, &(n * n * 0x9E37_79B9).to_le_bytes()).unwrap();
         }
-        // The writer must not be dropped, because that would finish the file.
+        // The writer must not be dropped, because dropping it finishes the file.
         std::mem::forget(writer);
         let mut reader = open(file.get_ref());
         let seen = read_all(&mut reader);
@@ -184,8 +184,8 @@ fn wrong_message_length_loses_at_most_two_messages() {
         let mut bytes = bytes.clone();
         bytes[at + 1..at + 9].copy_from_slice(&u64::to_le_bytes(lie));
         let (seen, losses) = read(&bytes);
-        // With some wrong lengths, no record seems to begin here. The length of the previous message then seems wrong
-        // too.
+        // With some wrong lengths, no record seems to begin at `at`. The length of the previous message then seems
+        // wrong too.
         let lost = if (22..1000).contains(&lie) { 1 } else { 2 };
         assert_eq!(seen.len(), 400 - lost, "length {lie}");
         assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Framing), "length {lie}: {losses:?}");
@@ -341,8 +341,8 @@ fn with_attachment(name: &str) -> (Vec<u8>, usize) {
 fn unreadable_attachment_is_left_out_and_reported() {
     let (whole, at) = with_attachment("notes.txt");
     assert_eq!(read(&whole).1, vec![]);
-    // The data's length comes after the opcode and the record length, two timestamps, and the name and the media type,
-    // each with its own length.
+    // Before the data's length come the opcode, the record length and two timestamps. The name and the media type
+    // follow, each with its own length.
     let data_len_at = at + 9 + 16 + 4 + "notes.txt".len() + 4 + "text/plain".len();
     assert_eq!(whole[data_len_at..data_len_at + 8], 3000_u64.to_le_bytes());
     for len in [u64::MAX, u64::MAX - 3, u64::MAX - 60, 1 << 63, 3001] {

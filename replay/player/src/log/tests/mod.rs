@@ -94,7 +94,7 @@ fn record_after(bytes: &[u8], at: usize) -> usize {
 /// Returns the positions of all records with that opcode, in a log or a part of a log.
 fn places(bytes: &[u8], opcode: u8) -> Vec<usize> {
     let (mut at, mut places) = (8, Vec::new());
-    // The rest is shorter than a record's header: the closing magic bytes, or a part of a record.
+    // Fewer bytes than a record's header are left: the closing magic bytes, or a part of a record.
     while at + 9 <= bytes.len() - 8 {
         places.extend((bytes[at] == opcode).then_some(at));
         at = record_after(bytes, at);

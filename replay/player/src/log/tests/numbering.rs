@@ -1,5 +1,5 @@
-//! Logs from which whole records were removed, or in which they were repeated or moved.
-//! All records are valid, and the change is reported nevertheless.
+//! Logs in which whole records were removed, repeated or moved. All remaining records are valid, but the change is
+//! reported.
 
 use mcap::records::op;
 

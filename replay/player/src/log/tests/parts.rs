@@ -103,7 +103,7 @@ fn parts_have_the_same_messages_as_a_single_file() {
             assert!(ended.iter().all(|path| (bytes..bytes + 10_000).contains(&len(path))));
         }
         for path in &paths {
-            // Each part is a complete log, and no tick is split.
+            // Each part can be read as a complete log, and no tick is split between parts.
             let (seen, losses) = read(&std::fs::read(path).unwrap());
             assert_eq!((seen[0].0.as_str(), losses), ("raw 0", vec![]));
             let info = LogReader::open(path).unwrap();
@@ -179,7 +179,7 @@ fn damaged_parts_lose_only_their_damaged_messages() {
     let folder = Folder::new("damaged");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let whole = all(&mut DiveLog::open(&folder.files()).unwrap());
-    // As after a power cut, part 3 has no end, and part 4 is still empty.
+    // As after a power cut, part 3 has no end, and part 4 is empty.
     let third = std::fs::read(folder.part(3)).unwrap();
     std::fs::write(folder.part(3), &third[..third.len() * 2 / 3]).unwrap();
     std::fs::write(folder.part(4), []).unwrap();
@@ -203,7 +203,7 @@ fn damaged_parts_lose_only_their_damaged_messages() {
 #[test]
 fn existing_part_name_is_skipped() {
     let folder = Folder::new("refused");
-    // A folder that is created after the start of the recording has the path of the second part.
+    // A folder that is created after the start of the recording occupies the path of the second part.
     let (mut port, handle) = Recorder::create(
         &folder.0.join("dive.mcap"),
         &header(true),

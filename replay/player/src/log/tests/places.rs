@@ -69,7 +69,7 @@ fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
 
 /// Checks that reading resumes correctly from the position after `first` messages.
 ///
-/// It resumes with the same reader, which has meanwhile read `further` more messages, and with a new reader.
+/// Reading resumes with a new reader, and with the same reader after it has read `further` more messages.
 fn check(bytes: &[u8], first: usize, further: usize) -> Result<(), TestCaseError> {
     let mut straight = open(bytes);
     let all = take(&mut straight, usize::MAX);
@@ -102,8 +102,8 @@ proptest! {
     }
 }
 
-/// Two adjacent chunks fail their checksums, and the first one states a wrong time.
-/// The times of each loss depend on the other chunk.
+/// Two adjacent chunks fail their checksums, and the first chunk states a wrong time. The loss times of each chunk
+/// depend on its neighbour.
 #[test]
 fn reading_from_any_message_gives_the_same_loss_times_of_damaged_chunks() {
     for (whole, changed) in [(by_ticks(), 2), (by_times(), 4)] {

@@ -68,8 +68,8 @@ fn slow_medium_loses_nothing_if_the_loop_waits_for_the_queue() {
     }
 }
 
-/// A medium on which each flush waits until the test releases it. After the test has dropped its sender, no
-/// flush waits.
+/// A medium on which each flush waits until the test releases it. Flushes no longer wait after the test has dropped its
+/// sender.
 struct Held(mpsc::Receiver<()>);
 
 impl Write for Held {
@@ -327,7 +327,7 @@ fn messages_beyond_the_queue_capacity_are_counted() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let sent = handle.line_port();
-    // No thread can empty the queue of 2,048 messages as fast as this loop fills it.
+    // The loop fills the queue of 2,048 messages faster than any thread can empty it.
     for number in 0..1_000_000_u64 {
         sent.sent(1, MonoNs(number), b"poll");
         if sent.sent_dropped() > 0 {
@@ -341,8 +341,8 @@ fn messages_beyond_the_queue_capacity_are_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
-/// Runs the recorder's steps at the given times. Connections drop packets before each step. Returns the
-/// losses that the log states.
+/// Runs the recorder's steps at the given times. Before each step, some packets are dropped. Returns the losses that
+/// the log states.
 fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
     let (medium, flushed) = slow(0);
     let storage = Box::new(Within(None, Some(medium)));
@@ -383,8 +383,7 @@ fn counts_of_dropped_packets_are_recorded_per_source_every_few_seconds() {
     );
 }
 
-/// Every dropped packet is counted while the recorder is too slow, but the source of some dropped packets is then
-/// unknown.
+/// While the recorder is too slow, every dropped packet is counted. The source of some dropped packets is then unknown.
 #[test]
 fn dropped_packets_beyond_the_queue_capacity_are_counted() {
     let (medium, flushed) = slow(0);

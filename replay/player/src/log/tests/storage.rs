@@ -1,5 +1,5 @@
 //! Recordings on a storage with faults. Each operation fails in turn, once or for a while. Every loss is reported, no
-//! message is written twice, and no cut-off log looks complete.
+//! message is written twice, and no log that was cut off looks complete.
 
 #![expect(
     clippy::disallowed_types,
@@ -33,7 +33,7 @@ enum Op {
 /// Decides whether an operation fails, by its kind and number.
 type Plan = Box<dyn FnMut(Op, u64) -> Option<io::Error> + Send>;
 
-/// Content of a file, and number of its bytes that survive a power cut.
+/// Content of a file, and the number of its bytes that survive a power cut.
 #[derive(Debug, Clone, Default)]
 struct Content {
     bytes: Vec<u8>,
@@ -169,8 +169,8 @@ fn eio() -> io::Error {
     io::Error::from_raw_os_error(5)
 }
 
-/// Returns the messages of a dive without faults, and the number of storage operations.
-/// The first operations write the header.
+/// Returns the messages of a dive without storage faults, and the number of storage operations. The first operations
+/// write the header.
 fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     let folder = Folder::new(name);
     let storage = Faulty::new(|_, _| None);
@@ -182,8 +182,8 @@ fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     (seen, storage.with(|world| world.ops))
 }
 
-/// Returns the number of operations before the first message. They create the first part, and write and sync its
-/// header.
+/// Returns the number of storage operations before the first message. They create the first part, and write and sync
+/// its header.
 fn header_ops() -> u64 {
     let folder = Folder::new("header");
     let storage = Faulty::new(|_, _| None);
@@ -213,8 +213,7 @@ fn single_storage_fault_is_recorded_and_loses_no_message() {
             };
             assert_eq!((summary.faults.len(), fault.lost), (1, 0), "{which}");
             assert!(fault.error.contains("Input/output error"), "{which}");
-            // If the sync of the summary fails, the summary may still be complete. Everything before the summary is
-            // synced.
+            // If the summary can't be synced, it may still be complete. Everything before the summary is synced.
             if fault.error.contains("the summary") {
                 continue;
             }
@@ -225,7 +224,7 @@ fn single_storage_fault_is_recorded_and_loses_no_message() {
             // The part in which the fault occurred must have no end record.
             let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
             let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
-            // A part without synced content was removed, and created again under the same name.
+            // A part without synced content is removed, and created again under the same name.
             let is_anew = fault.continued.as_ref() == Some(&fault.path);
             assert!(is_anew || alone.iter().any(is_cut), "{which}: {alone:?}");
             if let [RecordingEvent::Failed { .. }, RecordingEvent::Resumed(resumed)] = events.as_slice() {
@@ -248,11 +247,11 @@ fn medium_fault_loses_no_message_if_brief_and_no_earlier_message_if_permanent() 
             let which = format!("{lasts} from operation {from} on: {:?}", summary.faults);
             let lost: u64 = summary.faults.iter().map(|fault| fault.lost).sum();
             assert_eq!(summary.messages + lost, 4 * TICKS, "{which}");
-            // Messages that were written but not synced may also be found.
+            // The log may also contain messages that were written but not synced.
             assert!(expected.starts_with(&seen) && seen.len() as u64 >= summary.messages, "{which}");
             let is_end = summary.faults.iter().all(|fault| fault.error.contains("the summary"));
             assert!(!summary.faults.is_empty() && (is_end || !losses.is_empty()), "{which}");
-            // The first part is kept, even if no other part can be created.
+            // The first part must be kept, even if no other part can be created.
             assert!(folder.0.join("dive.mcap").exists());
             if lasts < u64::MAX && from < ops / 2 {
                 assert_eq!((lost, seen.len()), (0, expected.len()), "{which}: {events:?}");
@@ -285,7 +284,8 @@ fn backlog_overflow_loses_and_counts_the_oldest_messages() {
     storage.store(false);
     let (seen, losses) = read_back(&folder);
     assert_eq!(seen.len() as u64, summary.messages);
-    // The messages have one gap. The log's statement of the loss gives the times at the two ends of that gap.
+    // One gap in the messages is wider than 0.1 s. The log's statement of the loss gives the times at the two ends of
+    // that gap.
     let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
     let gaps: Vec<_> = times.windows(2).filter(|pair| pair[1] - pair[0] > 100_000_000).collect();
     let stated = losses.iter().find(
@@ -317,8 +317,8 @@ fn synced_messages_survive_a_power_cut_after_an_error() {
         storage.store(true);
         let (seen, losses) = read_back(&folder);
         assert!(expected.starts_with(&seen), "operation {at}");
-        // At most seven steps of a tenth of a second are lost: half a second between two syncs, and the steps around
-        // the retry.
+        // At most seven steps of a tenth of a second are lost. Half a second lies between two syncs, and the rest is
+        // around the retry.
         assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
         assert!(!losses.is_empty(), "operation {at}");
     }
@@ -390,9 +390,9 @@ fn recording_with_a_fault_is_recovered_as_one_log_that_lists_the_fault() {
     assert_eq!(done.messages, 4 * TICKS);
     let (recovered, losses) = read(&output);
     assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
-    let text = losses[0].to_string();
-    assert!(text.contains(&summary.faults[0].words()), "{text}");
-    // The first part alone lacks the rest of the dive, and is reported as cut off.
+    let told = losses[0].to_string();
+    assert!(told.contains(&summary.faults[0].words()), "{told}");
+    // Without the later parts, the first part lacks the rest of the dive, so it is reported as cut off.
     let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
     assert!(first.messages < 4 * TICKS);
     assert!(first.losses.iter().any(|loss| loss.kind == LossKind::Truncated), "{:?}", first.losses);

@@ -162,7 +162,7 @@ fn dive_is_continued_at_another_path_if_its_medium_is_gone() {
     let (after, losses) = messages(&elsewhere);
     assert_eq!(after.len(), 90);
     assert!(losses.iter().any(|loss| loss.contains("part 1 of the recording is missing")), "{losses:?}");
-    // In one folder, the two recordings are one dive again.
+    // In one folder, the files of the two recordings are read as one dive again.
     std::fs::copy(folder.0.join("other.part002.mcap"), folder.part(2)).unwrap();
     let (all, losses) = messages(&recording);
     assert!(all.len() > 90 && losses.len() == 1, "{losses:?}");
