@@ -68,7 +68,7 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
         return false;
     }
     // Cells with these conditions are near the portal only, because their results don't depend on the place.
-    let anywhere = [Condition::Told, Condition::AsBuilt, Condition::Altered];
+    let anywhere = [Condition::Declared, Condition::AsBuilt, Condition::Altered];
     if anywhere.contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);
     }

@@ -244,7 +244,7 @@ impl State {
     /// Handles a message of a Bosch unit; returns the acceleration once all three components have arrived.
     ///
     /// Turn rates are not reported, because the unit has none about its pitch axis.
-    fn take_bosch(&mut self, message: bosch::Message) -> Told {
+    fn take_bosch(&mut self, message: bosch::Message) -> DelayedReading {
         let [x, y, z] = &mut self.acceleration_mps2;
         match message {
             bosch::Message::Roll(_, acceleration) => *x = Some(acceleration.mps2()),

@@ -207,7 +207,7 @@ impl Verifier {
             }
             // Logs of earlier program versions have no channel for states or alerts. A log without any results isn't
             // the log of a live dive.
-            let is_told = has_results && (has_channel(name) || !LATER.contains(&name));
+            let is_reported = has_results && (has_channel(name) || !LATER.contains(&name));
             verified.same += stream.same;
             verified.unrecorded += stream.unrecorded;
             verified.differences.extend(stream.difference.take().filter(|_| is_reported));

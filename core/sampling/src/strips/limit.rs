@@ -135,10 +135,10 @@ mod tests {
                 let grid = (0..400).flat_map(|i| (0..=200).map(move |k| (f64::from(i), f64::from(k))));
                 let places = grid.map(|(i, k)| clear(i / 400.0 * along_m, k / 200.0 * across_m));
                 let widest_m = 2.0 * places.fold(0.0, f64::max);
-                let told_m = staggered_m(along_m, across_m, uneven, 0.0);
-                let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
-                assert!(widest_m <= told_m + 1e-9, "{what}");
-                // If the circle's centre is not between the rows, `told_m` is only an upper bound. The circle is then
+                let formula_m = staggered_m(along_m, across_m, uneven, 0.0);
+                let what = format!("{along_m} {across_m} {uneven}: {widest_m} {formula_m}");
+                assert!(widest_m <= formula_m + 1e-9, "{what}");
+                // If the circle's centre is not between the rows, `formula_m` is only an upper bound. The circle is then
                 // centred on one row, and the samples of the other row limit it as well.
                 let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
                 assert!(!is_between || widest_m > formula_m - 0.005, "{what}");

@@ -390,8 +390,8 @@ fn recording_with_a_fault_is_recovered_as_one_log_that_lists_the_fault() {
     assert_eq!(done.messages, 4 * TICKS);
     let (recovered, losses) = read(&output);
     assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
-    let told = losses[0].to_string();
-    assert!(told.contains(&summary.faults[0].words()), "{told}");
+    let text = losses[0].to_string();
+    assert!(text.contains(&summary.faults[0].words()), "{text}");
     // Without the later parts, the first part lacks the rest of the dive, so it is reported as cut off.
     let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
     assert!(first.messages < 4 * TICKS);
