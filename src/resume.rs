@@ -184,9 +184,13 @@ fn named_recording(args: &Run, named: &Path) -> Result<Unfinished, Failure> {
     }
     let recording = named_part(named).map_or_else(|| named.to_owned(), |(recording, _)| recording);
     Unfinished::read(&recording)?.ok_or_else(|| {
+        let why = if named.exists() {
+            "it ended in order, has no data, or another program is recording to it"
+        } else {
+            "there is no such file"
+        };
         Failure::Usage(format!(
-            "run --resume: {shown} can't be continued: it ended in order, has no data, or another program is recording to \
-             it; begin another dive with --new"
+            "run --resume: {shown} can't be continued: {why}; begin another dive with --new"
         ))
     })
 }

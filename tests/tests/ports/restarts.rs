@@ -170,4 +170,7 @@ fn run_refuses_to_begin_beside_an_unfinished_dive_without_resume_or_new() {
     let named = run(&["--record", "fourth.mcap", "--resume=second.mcap"]);
     assert_eq!(named.code, Some(2));
     insta::assert_snapshot!(named.stderr, @"headrace: run --resume: second.mcap can't be continued: it ended in order, has no data, or another program is recording to it; begin another dive with --new");
+    let absent = run(&["--record", "fourth.mcap", "--resume=absent.mcap"]);
+    assert_eq!(absent.code, Some(2));
+    insta::assert_snapshot!(absent.stderr, @"headrace: run --resume: absent.mcap can't be continued: there is no such file; begin another dive with --new");
 }

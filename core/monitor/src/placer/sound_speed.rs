@@ -10,6 +10,8 @@ use headrace_sensor::reading::{Decoded, Reading, SourceId};
 /// Plausible water temperatures, degrees Celsius. Outside this range the sensor is faulty or not in the
 /// water.
 const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;
+/// Plausible absolute pressures, Pa: from half an atmosphere to water 2 km deep. Outside this range the sensor is faulty.
+const WATER_PA: core::ops::RangeInclusive<f64> = 5.0e4..=2.0e7;
 /// Time constant of the low-pass filter of the speed of sound, s. Faster changes are sensor noise.
 const SLOWNESS_S: f64 = 60.0;
 
@@ -45,10 +47,12 @@ impl SoundSpeed {
     pub(super) fn pass(&mut self, source: SourceId, decoded: &mut Decoded) {
         match &mut decoded.reading {
             Reading::Pressure(water)
-                if self.source == Some(source) && WATER_DEGC.contains(&water.temperature_degc) =>
+                if self.source == Some(source)
+                    && WATER_DEGC.contains(&water.temperature_degc)
+                    && WATER_PA.contains(&water.pressure_pa) =>
             {
-                let told_mps = fresh_water_sound_speed_mps(water.temperature_degc, water.pressure_pa);
-                self.hear(decoded.valid_at, told_mps);
+                let measured_mps = fresh_water_sound_speed_mps(water.temperature_degc, water.pressure_pa);
+                self.hear(decoded.valid_at, measured_mps);
             }
             Reading::Sonar(sonar) => sonar.sound_speed_mps = self.corrected(sonar.sound_speed_mps),
             Reading::Echo(echo) => echo.sound_speed_mps = self.corrected(echo.sound_speed_mps),
@@ -56,15 +60,15 @@ impl SoundSpeed {
         }
     }
 
-    fn hear(&mut self, at: MonoNs, told_mps: f64) {
+    fn hear(&mut self, at: MonoNs, measured_mps: f64) {
         match self.heard {
             None => {
-                self.now_mps = told_mps;
-                self.span_mps = [told_mps; 2];
+                self.now_mps = measured_mps;
+                self.span_mps = [measured_mps; 2];
             }
             Some(last) => {
                 let elapsed_s = at.since(last).as_secs_f64().max(0.0);
-                self.now_mps += (told_mps - self.now_mps) * (elapsed_s / (elapsed_s + SLOWNESS_S));
+                self.now_mps += (measured_mps - self.now_mps) * (elapsed_s / (elapsed_s + SLOWNESS_S));
             }
         }
         self.heard = Some(self.heard.map_or(at, |last| last.max(at)));
@@ -88,7 +92,11 @@ mod tests {
     const DEPTH: SourceId = SourceId(3);
 
     fn depth(at_s: f64, temperature_degc: f64) -> Decoded {
-        let water = WaterPressure { pressure_pa: 101_325.0, resolution_pa: 300.0, temperature_degc };
+        water(at_s, temperature_degc, 101_325.0)
+    }
+
+    fn water(at_s: f64, temperature_degc: f64, pressure_pa: f64) -> Decoded {
+        let water = WaterPressure { pressure_pa, resolution_pa: 300.0, temperature_degc };
         Decoded { valid_at: MonoNs(0) + DurNs::from_secs_f64(at_s), reading: Reading::Pressure(water) }
     }
 
@@ -106,9 +114,12 @@ mod tests {
         let site = Site::default();
         let mut sound = SoundSpeed::new(site.sound_speed_mps, Some(DEPTH));
         assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);
-        // Other sensors and implausible temperatures are ignored.
+        // Other sensors and implausible temperatures and pressures are ignored.
         sound.pass(SourceId(2), &mut depth(1.0, 20.0));
         sound.pass(DEPTH, &mut depth(1.0, 85.0));
+        for pressure_pa in [0.0, 1.0e9, f64::NAN, f64::INFINITY] {
+            sound.pass(DEPTH, &mut water(1.0, 20.0, pressure_pa));
+        }
         assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);
         sound.pass(DEPTH, &mut depth(1.0, 20.0));
         assert!((metres(&mut sound, &site) - 4.0 * 1482.34 / 1500.0).abs() < 1e-3);
