@@ -350,7 +350,7 @@ pub(crate) struct Replay {
     pub(crate) tick_ms: u32,
     #[command(flatten)]
     pub(crate) threads: Threads,
-    /// Start at this time of the dive (90s, 1h20min, 1:23:45). The part before it is processed, too.
+    /// Start at this dive time (90s, 1h20min, 1:23:45). The part before it is processed, too.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "smooth")]
     pub(crate) from: Option<DurNs>,
     #[arg(short, long, conflicts_with = "smooth", help = interactive_help())]
@@ -513,14 +513,13 @@ pub(crate) struct Calibrate {
     /// Vehicle file, overriding the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Start time, seconds from the log's first message.
+    /// Start, seconds of dive time.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "0")]
     pub(crate) from: f64,
-    /// End time, seconds from the log's first message. The default is 1200 s after the start, which is also
-    /// the most.
+    /// End, seconds of dive time. The default is 1200 s after the start, which is also the most.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) to: Option<f64>,
-    /// Time span in which the depth sensor was at or above the water surface, seconds from the log's first message.
+    /// Time span in which the depth sensor was at or above the water surface, seconds of dive time.
     #[arg(long, value_name = "FROM..TO", value_parser = seconds_range)]
     pub(crate) at_surface: Option<[f64; 2]>,
     /// True chainage at which the vehicle stood still, metres.

@@ -8,7 +8,7 @@ use crossbeam::channel::unbounded;
 use headrace_config::Document;
 use headrace_dashboard::Mode;
 use headrace_devices::KINDS;
-use headrace_geometry::time::DurNs;
+use headrace_geometry::time::{DiveClock, DurNs};
 use headrace_replay::drive::{Pace, PacketSource as _};
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
@@ -116,12 +116,12 @@ fn replay_demo(
     let span = player.span();
     let dive = Assembly::of(&scene.vehicle, &scene.vehicle_text).kept(true).assemble()?;
     player.connect(dive.armed.sources());
-    let mut watch = Watch::quiet().followed_by(served.replay_follower(&dive.armed, span));
+    let mut watch = Watch::quiet().followed_by(served.replay_follower(&dive.armed, &player));
     let (sender, commands) = unbounded();
-    let close = served.direct(&sender, true, Arc::clone(interrupted));
+    let close = served.direct((&sender, player.dive_clock()), true, Arc::clone(interrupted));
     say("The page now replays the dive, with pause, seek and speed. Press q to end.");
     let playing = Playing {
-        from: span.map(|(from, to)| to.since(from) + BEYOND_END),
+        from: span.map(|(_, to)| player.dive_clock().time(to) + BEYOND_END),
         interactive: true,
         pace: Pace { speed: args.speed.0.or(Some(REPLAY_SPEED)), ..Pace::default() },
         commands: (sender, commands),
@@ -141,6 +141,7 @@ fn of_demo<'a>(scene: &'a Scene, log: &Path, dive: &Dive) -> Of<'a> {
         compared_m: None,
         utc_of_zero_s: None,
         span: None,
+        clock: DiveClock::default(),
         is_playback: false,
         console: dive.console(),
         voices: VoicesOf::Dive(dive.voice_ports()),
@@ -196,6 +197,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
         compared_m: None,
         utc_of_zero_s: None,
         span: player.span(),
+        clock: player.dive_clock(),
         is_playback: false,
         console: None,
         voices: VoicesOf::Log(files_of_player(&player)),
@@ -249,7 +251,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
             watch = watch.followed_by(served.follower(&dive.armed));
             let stays = args.page.page.is_some();
             let interrupted = if stays { interrupt::flag()? } else { Arc::default() };
-            close = served.direct(&sender, stays, interrupted);
+            close = served.direct((&sender, player.dive_clock()), stays, interrupted);
         }
         let takes_keys = args.following.may_command();
         let mut joining = Joining::new(&vehicle, tui::Mode::Source, &Arc::default());
@@ -313,6 +315,7 @@ fn replay_page(
         compared_m: args.target.get(1).copied(),
         utc_of_zero_s: page::utc_of_zero_s(&player.info().metadata),
         span: player.span(),
+        clock: player.dive_clock(),
         is_playback: true,
         console: None,
         voices: VoicesOf::Log(files_of_player(player)),

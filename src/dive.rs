@@ -548,9 +548,9 @@ impl Dive {
         // takes as much memory as the samples.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
-        let recordings = core::mem::take(&mut self.recordings);
+        let (recordings, clock) = (core::mem::take(&mut self.recordings), self.armed.view().clock());
         drop(self.armed);
-        report.log = recordings.end(&report);
+        report.log = recordings.end(&report, clock);
         if let Some(log) = &mut report.log {
             self.earlier.complete(log);
         }

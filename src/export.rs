@@ -46,6 +46,7 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
         compared_m: None,
         utc_of_zero_s: page::utc_of_zero_s(&player.info().metadata),
         span: player.span(),
+        clock: player.dive_clock(),
         is_playback: false,
         console: None,
         voices: VoicesOf::Log(files.clone()),

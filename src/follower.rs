@@ -31,8 +31,8 @@ pub(crate) trait Follower {
     fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
     /// Called with a new state of the recordings, which is shown from now on.
     fn recorded(&mut self, _state: &RecordingState) {}
-    /// Called when a replay has paused, jumped or ended. `time` counts from the log's beginning. It may differ from the
-    /// time of the loop's state.
+    /// Called when a replay has paused, jumped or ended. `time` is a dive time. It may differ from the time of the
+    /// loop's state.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
     /// Called when the state of an interrupted dive has been rebuilt from its log.
     fn rebuilt(&mut self, _dive: &Loop) {}

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use headrace_dashboard::Mode;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_ports::{Connection, LineRecord, Phase, Status, Supervisor};
 use headrace_replay::log::part_path;
 use headrace_sensor::connect::{Connect, ConnectError};
@@ -150,6 +150,7 @@ fn live_page(
         compared_m: None,
         utc_of_zero_s: Some(utc_of_zero_s()),
         span: None,
+        clock: DiveClock::default(),
         is_playback: false,
         console: dive.console(),
         voices: VoicesOf::Dive(dive.voice_ports()),

@@ -87,16 +87,18 @@ fn tell(
         });
         return deliver(&json!({"notes": notes.collect::<Vec<_>>(), "lost": lost}).to_string());
     }
+    let begun_utc_s = utc_of_zero_s(&found.metadata).zip(found.clock.zero());
+    let begun_utc_s = begun_utc_s.map(|(zero_s, begun)| zero_s + begun.as_secs_f64());
     for note in &found.notes {
         let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
         let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
         let id = note.voice.as_ref().map(|voice| voice.id);
         let file = id.and_then(|id| named.get(&id)).map(|path| format!(": {}", path.display()));
-        let utc = utc_of_zero_s(&found.metadata).map(|zero_s| format!(" ({})", utc_text(zero_s + note.at_s)));
+        let utc = begun_utc_s.map(|begun_s| format!(" ({})", utc_text(begun_s + note.at_s)));
         let text = format!(
             "{:>4}  {place}  {:.1} s{}  {}{by}{}",
             note.number,
-            note.at_s - found.begun.as_secs_f64(),
+            note.at_s,
             utc.unwrap_or_default(),
             note.words(),
             file.unwrap_or_default()

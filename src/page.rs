@@ -20,16 +20,18 @@ use headrace_dashboard::server::{Act, Direct, PORT};
 use headrace_dashboard::{
     Command, HeadSite, Mode, Page, Play, SensorSite, Settings, Site, TlsFiles, Token, Tokens, Voices,
 };
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_monitor::console::{Command as Input, ConsolePort, NoteText, Who};
 use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
 use headrace_ports::Status;
+use headrace_replay::drive::PacketSource as _;
 use headrace_replay::log::voice::find_voice;
 use headrace_replay::log::{RecordingEvent, VoicePort};
 use headrace_replay::playback::PlaybackCommand;
+use headrace_replay::player::Player;
 use headrace_sampling::occlusion::{AngleRange, hidden_by_vehicle};
 use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
@@ -47,6 +49,8 @@ use crate::report_output::exit_code;
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Number of stops of a playback that begins with a jump to the end of the log: the jump and the end.
 const STOPS_TO_END: u8 = 2;
+/// Error text for a command to playback.
+const NO_PLAYBACK: &str = "no playback is running that could be controlled";
 /// Name of a BlueOS machine.
 const BLUEOS: &str = "blueos.local";
 
@@ -63,6 +67,8 @@ pub(crate) struct Of<'a> {
     pub(crate) utc_of_zero_s: Option<f64>,
     /// First and last time of the replayed log; `None` in a live dive.
     pub(crate) span: Option<(MonoNs, MonoNs)>,
+    /// Clock of the replayed dive.
+    pub(crate) clock: DiveClock,
     /// Whether the dive is a replay that can be paused and can jump to another time.
     pub(crate) is_playback: bool,
     /// Receiver of the operator's commands; `None` in a replay.
@@ -83,6 +89,7 @@ pub(crate) enum VoicesOf {
 pub(crate) struct Served {
     page: Page,
     span: Option<(MonoNs, MonoNs)>,
+    clock: DiveClock,
     is_playback: bool,
     waits: bool,
     directed: Arc<Directed>,
@@ -91,14 +98,14 @@ pub(crate) struct Served {
 /// Playback that the page controls.
 #[derive(Default)]
 struct Directed {
-    /// Sender of commands; `None` if no playback is running.
-    commands: Mutex<Option<Sender<PlaybackCommand>>>,
+    /// Sender of commands, and the dive's clock; `None` if no playback is running.
+    commands: Mutex<Option<(Sender<PlaybackCommand>, DiveClock)>>,
     /// Whether playback is at the end of the log.
     is_at_end: AtomicBool,
 }
 
 impl Directed {
-    fn commands(&self) -> MutexGuard<'_, Option<Sender<PlaybackCommand>>> {
+    fn commands(&self) -> MutexGuard<'_, Option<(Sender<PlaybackCommand>, DiveClock)>> {
         self.commands.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -137,7 +144,7 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
     let instance =
         Token::random().map_err(|error| format!("getting a random number for the page: {error}"))?;
     let instance = instance.text().chars().take(12).collect();
-    let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
+    let (span, clock, is_playback, waits) = (of.span, of.clock, of.is_playback, of.mode != Mode::Live);
     let directed: Arc<Directed> = Arc::default();
     let act = act(of.console.clone(), &directed);
     let voices = voices(&of);
@@ -148,7 +155,7 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
     }
     let told = told(&page, tokens.as_ref());
     lines.unwrap_or(&mut complain)(told.trim_end());
-    Ok(Served { page, span, is_playback, waits, directed })
+    Ok(Served { page, span, clock, is_playback, waits, directed })
 }
 
 /// Tokens for access; `None` if other machines can't reach the page.
@@ -252,7 +259,7 @@ pub(crate) fn site(of: Of<'_>) -> Site {
         heads,
         sensors,
         utc_of_zero_s: of.utc_of_zero_s,
-        span_s: of.span.map(|(from, to)| [from, to].map(MonoNs::as_secs_f64)),
+        span_s: of.span.map(|(from, to)| [from, to].map(|at| of.clock.seconds(at))),
         takes_commands: of.console.is_some(),
         is_playback: of.is_playback,
         recorded_to: of.recorded_to,
@@ -307,9 +314,9 @@ fn act(console: Option<ConsolePort>, directed: &Arc<Directed>) -> Act {
 fn voices(of: &Of<'_>) -> Voices {
     match (&of.voices, &of.console) {
         (VoicesOf::Log(files), _) => {
-            let files = files.clone();
+            let (files, clock) = (files.clone(), of.clock);
             Voices::Recalled(Arc::new(move |id, at_s| {
-                let from = MonoNs(0) + DurNs::from_secs_f64(at_s);
+                let from = clock.timestamp(DurNs::from_secs_f64(at_s));
                 find_voice(&files, id, from).map_err(|error| error.to_string())
             }))
         }
@@ -333,6 +340,8 @@ fn voices(of: &Of<'_>) -> Voices {
 fn direct(directed: &Arc<Directed>) -> Direct {
     let directed = Arc::clone(directed);
     Arc::new(move |play| {
+        let commands = directed.commands();
+        let Some((commands, clock)) = commands.as_ref() else { return Err(NO_PLAYBACK.to_owned()) };
         let command = match play {
             Play::Pause => PlaybackCommand::Pause,
             Play::Go => PlaybackCommand::Go,
@@ -340,19 +349,13 @@ fn direct(directed: &Arc<Directed>) -> Direct {
             Play::StepSection => PlaybackCommand::StepSection,
             Play::End => PlaybackCommand::End,
             Play::Speed(speed) => PlaybackCommand::Speed(speed),
-            Play::Seek(to_s) => PlaybackCommand::Seek(MonoNs(0) + DurNs::from_secs_f64(to_s)),
+            Play::Seek(to_s) => PlaybackCommand::Seek(clock.timestamp(DurNs::from_secs_f64(to_s))),
         };
-        let commands = directed.commands();
         if command == PlaybackCommand::Go && directed.is_at_end.load(Ordering::Relaxed) {
             // If this jump fails, so does sending the command below, and that failure is returned.
-            commands.as_ref().and_then(|commands| commands.send(PlaybackCommand::Seek(MonoNs(0))).ok());
+            let _failed = commands.send(PlaybackCommand::Seek(MonoNs(0)));
         }
-        let sent = commands.as_ref().map(|commands| commands.send(command));
-        if matches!(sent, Some(Ok(()))) {
-            Ok(())
-        } else {
-            Err("no playback is running that could be controlled".to_owned())
-        }
+        commands.send(command).map_err(|_| NO_PLAYBACK.to_owned())
     })
 }
 
@@ -360,14 +363,15 @@ impl Served {
     /// Creates the follower that feeds the page.
     pub(crate) fn follower(&self, dive: &Loop) -> Box<dyn Follower> {
         let span = self.span.filter(|_| self.is_playback);
-        Box::new(PageFollower { span, ..self.directing_follower(dive) })
+        Box::new(PageFollower { span, clock: self.clock, ..self.directing_follower(dive) })
     }
 
     /// Creates the follower that feeds the page with a replay of the dive that the page has shown until now. The replay
     /// must begin with a jump to the end of the log.
-    pub(crate) fn replay_follower(&self, dive: &Loop, span: Option<(MonoNs, MonoNs)>) -> Box<dyn Follower> {
+    pub(crate) fn replay_follower(&self, dive: &Loop, player: &Player) -> Box<dyn Follower> {
+        let (span, clock) = (player.span(), player.dive_clock());
         let (now, ignored_stops) = (span.map_or(MonoNs(0), |(_, to)| to), STOPS_TO_END);
-        Box::new(PageFollower { span, now, ignored_stops, ..self.directing_follower(dive) })
+        Box::new(PageFollower { span, clock, now, ignored_stops, ..self.directing_follower(dive) })
     }
 
     fn directing_follower(&self, dive: &Loop) -> PageFollower {
@@ -380,18 +384,18 @@ impl Served {
         self.page.show_result(end_message(report));
     }
 
-    /// Lets the page control a replay.
+    /// Lets the page control a replay of the dive with this clock.
     ///
     /// With `stays` the replay remains at the end of the log until `interrupted`. Otherwise the returned
     /// function ends the page's control of the replay.
     pub(crate) fn direct(
         &self,
-        to: &Sender<PlaybackCommand>,
+        (to, clock): (&Sender<PlaybackCommand>, DiveClock),
         stays: bool,
         interrupted: Arc<AtomicBool>,
     ) -> Option<Box<dyn Fn()>> {
         let directed = Arc::clone(&self.directed);
-        *directed.commands() = Some(to.clone());
+        *directed.commands() = Some((to.clone(), clock));
         if !stays {
             return Some(Box::new(move || drop(directed.commands().take())));
         }
@@ -444,6 +448,7 @@ struct PageFollower {
     collector: Collector,
     /// First and last time of a replay's log; `None` in a live dive.
     span: Option<(MonoNs, MonoNs)>,
+    clock: DiveClock,
     now: MonoNs,
     /// Playback that the page controls; `None` for a page in a file.
     directed: Option<Arc<Directed>>,
@@ -453,7 +458,14 @@ struct PageFollower {
 
 impl PageFollower {
     fn new(collector: Collector) -> Self {
-        Self { collector, span: None, now: MonoNs(0), directed: None, ignored_stops: 0 }
+        Self {
+            collector,
+            span: None,
+            clock: DiveClock::default(),
+            now: MonoNs(0),
+            directed: None,
+            ignored_stops: 0,
+        }
     }
 }
 
@@ -481,7 +493,7 @@ impl Follower for PageFollower {
     fn mode(&mut self, paused: bool, speed: Option<f64>) {
         let Some((from, to)) = self.span else { return };
         let paused = paused || self.ignored_stops > 0;
-        let [at_s, from_s, to_s] = [self.now.max(from), from, to].map(MonoNs::as_secs_f64);
+        let [at_s, from_s, to_s] = [self.now.max(from), from, to].map(|at| self.clock.seconds(at));
         self.collector.playback(PlaybackState { paused, speed, at_s, from_s, to_s });
     }
 

@@ -7,7 +7,7 @@ use std::io::{BufRead, IsTerminal as _};
 use std::time::Duration;
 
 use crossbeam::channel::{Receiver, Sender};
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_monitor::notice_outlet::NoticeReceiver;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
@@ -60,21 +60,21 @@ impl Playing {
             let interactive = interactive && !others.as_ref().is_some_and(|others| others.takes_keys);
             let close = others.and_then(|others| others.close);
             let has_keys = interactive && has_keys();
-            let mut screen = Screen { notices, watch, begun: MonoNs(0), has_keys, close };
+            let mut screen = Screen { notices, watch, clock: DiveClock::default(), has_keys, close };
             let store = SnapshotStore::new(SNAPSHOT_BYTES, interval);
             let mut playback = Playback::new(armed, player, store, pace)?;
-            screen.begun = playback.begun();
+            screen.clock = playback.dive_clock();
             if let Some(from) = from {
                 // The jump is a command, so that followers show the state after it, as after any other jump. Sending
                 // can't fail, because the receiver lives as long as this function.
-                let _received = sender.send(PlaybackCommand::Seek(screen.begun + from));
+                let _received = sender.send(PlaybackCommand::Seek(screen.clock.timestamp(from)));
             }
             screen.watch.mode(false, pace.speed);
             // A terminal gives keys; a pipe or a file gives lines.
             let keyboard = match interactive {
                 true if has_keys => Some(keys::listen(sender, pace.speed)?),
                 true => {
-                    listen(sender, screen.begun);
+                    listen(sender, screen.clock);
                     None
                 }
                 false => {
@@ -98,7 +98,7 @@ pub(crate) fn has_keys() -> bool {
 struct Screen<'a> {
     notices: &'a NoticeReceiver,
     watch: &'a mut Watch,
-    begun: MonoNs,
+    clock: DiveClock,
     has_keys: bool,
     /// Function that drops the other controllers' senders at the end of the log.
     close: Option<Box<dyn Fn()>>,
@@ -122,7 +122,7 @@ impl PlaybackObserver for Screen<'_> {
     }
 
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
-        self.watch.stopped(dive, at.since(self.begun), ended);
+        self.watch.stopped(dive, self.clock.time(at), ended);
         if let Some(close) = self.close.as_ref().filter(|_| ended) {
             close();
         }
@@ -133,10 +133,10 @@ impl PlaybackObserver for Screen<'_> {
 }
 
 /// Reads commands from standard input on a separate thread, until standard input ends.
-fn listen(to: Sender<PlaybackCommand>, begun: MonoNs) {
+fn listen(to: Sender<PlaybackCommand>, clock: DiveClock) {
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            match command(&line, begun) {
+            match command(&line, clock) {
                 Ok(command) => {
                     if to.send(command).is_err() {
                         return;
@@ -148,8 +148,8 @@ fn listen(to: Sender<PlaybackCommand>, begun: MonoNs) {
     });
 }
 
-/// Parses a command. `begun` is the log's first time.
-fn command(line: &str, begun: MonoNs) -> Result<PlaybackCommand, String> {
+/// Parses a command. Its times are dive times.
+fn command(line: &str, clock: DiveClock) -> Result<PlaybackCommand, String> {
     let mut words = line.split_whitespace();
     let (word, argument) = (words.next().unwrap_or_default(), words.next());
     let unknown = || format!("{:?} isn't a command; expected one of: {COMMANDS}", line.trim());
@@ -161,7 +161,7 @@ fn command(line: &str, begun: MonoNs) -> Result<PlaybackCommand, String> {
         ("step", None) => PlaybackCommand::Step(1),
         ("step", Some(ticks)) => PlaybackCommand::Step(ticks.parse().map_err(|_| unknown())?),
         ("speed", Some(text)) => PlaybackCommand::Speed(speed(text)?.0),
-        ("seek", _) => PlaybackCommand::Seek(begun + moment()?),
+        ("seek", _) => PlaybackCommand::Seek(clock.timestamp(moment()?)),
         ("ahead", _) => PlaybackCommand::Skip(moment()?),
         ("back", _) => PlaybackCommand::Skip(DurNs(-moment()?.0)),
         _ => return Err(unknown()),
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn unknown_playback_command_is_refused_with_the_list_of_commands() {
-        let command = |line| command(line, MonoNs(5));
+        let command = |line| command(line, DiveClock::new(Some(MonoNs(5))));
         assert_eq!(command(" step 12 "), Ok(PlaybackCommand::Step(12)));
         assert_eq!(command("seek 10s"), Ok(PlaybackCommand::Seek(MonoNs(10_000_000_005))));
         assert_eq!(command("back 1min"), Ok(PlaybackCommand::Skip(DurNs(-60_000_000_000))));

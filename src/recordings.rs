@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_monitor::report::{LogReport, Report};
 use headrace_ports::LineRecord;
 use headrace_replay::log::{
@@ -91,17 +91,16 @@ impl Recordings {
 
     /// Ends all recordings at the same time.
     ///
-    /// The result has the files of the first recording and the losses of all. If a medium is missing, the
+    /// The result has the files of the first recording and the losses of all, with dive times. If a medium is missing, the
     /// other recordings still end.
-    pub(crate) fn end(mut self, report: &Report) -> Option<LogReport> {
+    pub(crate) fn end(mut self, report: &Report, clock: DiveClock) -> Option<LogReport> {
         self.all.iter_mut().for_each(|one| one.handle.begin_to_end(self.is_live));
-        let begun = MonoNs(0) + DurNs::from_secs_f64(report.dive.start_s);
         let (mut log, several): (Option<LogReport>, _) = (None, self.all.len() > 1);
         for One { path, handle, .. } in self.all {
             let written = handle.finish();
             let mut losses = match &written {
                 Err(error) => vec![format!("recording failed: {error}")],
-                Ok(written) => unrecorded(written, begun),
+                Ok(written) => unrecorded(written, clock),
             };
             if several {
                 for loss in &mut losses {
@@ -147,10 +146,10 @@ impl One {
 }
 
 /// Texts about data missing in a recording, and about errors while it was recorded.
-fn unrecorded(written: &Summary, begun: MonoNs) -> Vec<String> {
-    let mut losses: Vec<String> = written.faults.iter().map(|one| fault(one, begun)).collect();
+fn unrecorded(written: &Summary, clock: DiveClock) -> Vec<String> {
+    let mut losses: Vec<String> = written.faults.iter().map(|one| fault(one, clock)).collect();
     let left = Some(written.left_out).filter(|left| left.messages > 0);
-    losses.extend(left.map(|left| left_out(left, begun)));
+    losses.extend(left.map(|left| left_out(left, clock)));
     let counts = [
         (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
         (written.skipped, "packets not recorded: the recorder was behind"),
@@ -162,15 +161,15 @@ fn unrecorded(written: &Summary, begun: MonoNs) -> Vec<String> {
 }
 
 /// Text about an error of the recording, with dive times.
-fn fault(fault: &RecordingFault, begun: MonoNs) -> String {
-    let from = fault.from.map(|from| format!(", after {}", seconds(from, begun)));
-    let to = fault.to.map(|to| format!(", before {}", seconds(to, begun)));
+fn fault(fault: &RecordingFault, clock: DiveClock) -> String {
+    let from = fault.from.map(|from| format!(", after {}", seconds(from, clock)));
+    let to = fault.to.map(|to| format!(", before {}", seconds(to, clock)));
     [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
 }
 
 /// Text about data that the recorder has dropped, with dive times.
-fn left_out(left: LeftOut, begun: MonoNs) -> String {
-    let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from, begun), seconds(to, begun)));
+fn left_out(left: LeftOut, clock: DiveClock) -> String {
+    let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from, clock), seconds(to, clock)));
     format!("{}{}", left.words(), span.unwrap_or_default())
 }
 

@@ -3,8 +3,9 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::DiveClock;
 use headrace_replay::atomic_file::AtomicFile;
+use headrace_replay::clocks::clock_of;
 use headrace_replay::log::{DiveLog, Recovered, files_digest, files_of, recover as rewrite};
 use headrace_replay::record::result_channels;
 use serde_json::json;
@@ -23,7 +24,7 @@ pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     DiveLog::open(&files)?;
     Claims::reading(files.clone(), &args.overwrite).claim("-o", &args.output, Kind::Recovered)?;
     let recovered = write(&files, &args.output)?;
-    tell(args, &recovered)?;
+    tell(args, &recovered, clock_of(&files)?)?;
     Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
@@ -41,12 +42,12 @@ fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     Ok(recovered)
 }
 
-fn tell(args: &Recover, recovered: &Recovered) -> Result<(), Failure> {
-    let seconds = recovered.span.map(|(from, to)| [from.as_secs_f64(), to.as_secs_f64()]);
+fn tell(args: &Recover, recovered: &Recovered, clock: DiveClock) -> Result<(), Failure> {
+    let seconds = recovered.span.map(|(from, to)| [clock.seconds(from), clock.seconds(to)]);
     if args.json {
         let losses = recovered.losses.iter().map(|loss| {
             json!({
-                "what": loss.to_string(), "from_ns": loss.from.map(|at| at.0), "to_ns": loss.to.map(|at| at.0),
+                "what": loss.in_dive_time(clock).to_string(), "from_ns": loss.from.map(|at| at.0), "to_ns": loss.to.map(|at| at.0),
                 "offset": loss.offset, "bytes": loss.bytes,
             })
         });
@@ -57,9 +58,8 @@ fn tell(args: &Recover, recovered: &Recovered) -> Result<(), Failure> {
         });
         return deliver(&told.to_string());
     }
-    let begun = recovered.span.map_or(MonoNs(0), |(begun, _)| begun);
     for loss in &recovered.losses {
-        say(&format!("lost     {}", loss.in_dive_time(begun)));
+        say(&format!("lost     {}", loss.in_dive_time(clock)));
     }
     let span = seconds.map(|[from, to]| format!(", {:.3} s", to - from)).unwrap_or_default();
     let nothing = if recovered.losses.is_empty() { "; nothing is missing" } else { "" };

@@ -3,7 +3,8 @@
 use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
+use headrace_replay::clocks::clock_of;
 use headrace_replay::log::{
     Interrupted, LogInfo, RECOVERED_FROM, TRIMMED, Unfinished, files_of, in_the_way, named_part,
 };
@@ -30,6 +31,8 @@ pub(crate) struct Resuming {
     pub(crate) recordings: Vec<Interrupted>,
     /// Time without data.
     pub(crate) gap: DurNs,
+    /// Clock of the dive.
+    clock: DiveClock,
     /// Paths at which the dive isn't recorded any more, because their folder is gone.
     gone: Vec<PathBuf>,
 }
@@ -103,6 +106,7 @@ impl Resuming {
         }
         let gap = set_clock(longest);
         let to = longest.last + gap;
+        let clock = clock_of(&longest.files)?;
         let last_part = longest.last_part().display().to_string();
         let stated = |recording: Unfinished| {
             let seconds = to.since(recording.last).as_secs_f64();
@@ -119,7 +123,7 @@ impl Resuming {
             };
             Interrupted { recording, to, words }
         };
-        Ok(Self { gap, recordings: recordings.into_iter().map(stated).collect(), gone: Vec::new() })
+        Ok(Self { gap, clock, recordings: recordings.into_iter().map(stated).collect(), gone: Vec::new() })
     }
 
     /// Data about the interruption, for the continued dive.
@@ -134,7 +138,7 @@ impl Resuming {
 
     /// Losses that the interruption caused, as text.
     fn losses(&self) -> Vec<String> {
-        let interruptions = self.recordings.iter().map(Interrupted::loss_text);
+        let interruptions = self.recordings.iter().map(|interrupted| interrupted.loss_text(self.clock));
         interruptions.chain(self.gone.iter().map(|log| gone_text(log))).collect()
     }
 

@@ -3,7 +3,7 @@
 //! The output has the dive's state, and each missed, unsure or cleared stretch once.
 
 use headrace_config::plain::one_line;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
 use headrace_monitor::live_state::{Condition, Lamp, LiveState};
 use headrace_monitor::live_text::{PilotLine, message_line, status_line};
@@ -53,8 +53,7 @@ pub(crate) struct Watch {
     shown: Option<(MonoNs, Condition)>,
     recorded: RecordingState,
     sensor_lines: SensorLines,
-    /// Time of the dive's first packet; dive times are counted from it.
-    begun: Option<MonoNs>,
+    clock: DiveClock,
 }
 
 impl Watch {
@@ -71,7 +70,7 @@ impl Watch {
             shown: None,
             recorded: RecordingState::default(),
             sensor_lines: SensorLines::default(),
-            begun: None,
+            clock: DiveClock::default(),
         }
     }
 
@@ -116,6 +115,7 @@ impl Watch {
         if !self.has_readers() {
             return;
         }
+        self.clock = dive.view().clock();
         let mut told = Vec::new();
         self.teller.hear(notice, dive, &mut |one| told.push(one));
         for follower in &mut self.followers {
@@ -135,7 +135,7 @@ impl Watch {
         if !self.has_readers() {
             return;
         }
-        self.begun = dive.view().span().map(|(begun, _)| begun);
+        self.clock = dive.view().clock();
         let state = dive.view().live_state();
         let mut told = Vec::new();
         self.teller.tick(state, dive, &mut |one| told.push(one));
@@ -222,6 +222,7 @@ impl Watch {
         if self.recorded.rebuilt_pct == Some(pct) {
             return;
         }
+        self.clock = dive.view().clock();
         self.show_recorded(RecordingState { rebuilt_pct: Some(pct), ..self.recorded });
         let words = self.recorded.words().map(|(words, _)| words).unwrap_or_default();
         match self.show {
@@ -235,6 +236,7 @@ impl Watch {
 
     /// Shows that an interrupted dive goes on, after its state has been rebuilt.
     pub(crate) fn rebuilt(&mut self, dive: &Loop, words: &str) {
+        self.clock = dive.view().clock();
         self.show_recorded(RecordingState { rebuilt_pct: None, ..self.recorded });
         self.teller = LiveMessages::default();
         self.followers.iter_mut().for_each(|follower| follower.rebuilt(dive));
@@ -245,9 +247,9 @@ impl Watch {
         }
     }
 
-    /// Shows that a replay has paused, jumped or ended. `time` counts from the log's beginning.
+    /// Shows that a replay has paused, jumped or ended. `time` is a dive time.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
-        self.shown = None;
+        (self.shown, self.clock) = (None, dive.view().clock());
         self.teller.stopped(dive.now());
         self.followers.iter_mut().for_each(|follower| follower.stopped(dive, time, ended));
         let (tick, samples, digest) =
@@ -366,8 +368,7 @@ impl Watch {
 
     fn json(&mut self, at: MonoNs, mut value: Value) {
         if let Some(object) = value.as_object_mut() {
-            let dive_time = self.begun.map_or(DurNs(0), |begun| at.since(begun).max(DurNs(0)));
-            object.insert("t_s".to_owned(), dive_time.as_secs_f64().into());
+            object.insert("t_s".to_owned(), self.clock.seconds(at).into());
         }
         self.print(one_line(&value.to_string()).into_owned());
     }

@@ -2,7 +2,7 @@
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::messages::Event;
 use headrace_monitor::ring::{Port, RingError};
@@ -23,6 +23,8 @@ pub(crate) struct Window {
     pub(crate) to_s: Option<f64>,
     /// Beginning and end of the time that the vehicle spent at the water's surface.
     pub(crate) at_surface_s: Option<[f64; 2]>,
+    /// Clock of the dive.
+    pub(crate) clock: DiveClock,
 }
 
 /// Reason why readings can't be collected.
@@ -56,8 +58,8 @@ pub(crate) enum CollectError {
 /// Readings of a part of a log.
 #[derive(Debug)]
 pub(crate) struct Collected {
-    /// Time of the log's first message.
-    pub(crate) first: MonoNs,
+    /// Clock of the dive.
+    pub(crate) clock: DiveClock,
     /// Start of the requested part.
     pub(crate) from: MonoNs,
     /// End of the requested part.
@@ -76,9 +78,9 @@ impl Collected {
         self.events.iter().filter(|event| event.received >= self.from && event.received < self.to)
     }
 
-    /// Converts a time on the log's clock to seconds from the log's first message.
+    /// Dive time of a timestamp, seconds.
     pub(crate) fn seconds(&self, at: MonoNs) -> f64 {
-        at.since(self.first).as_secs_f64()
+        self.clock.seconds(at)
     }
 }
 
@@ -110,8 +112,8 @@ pub(crate) fn collect(
     window: &Window,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Collected, CollectError> {
-    let first = feed.coming()?.map_or(MonoNs(0), |coming| coming.at);
-    let after = |seconds: f64| first + DurNs::from_secs_f64(seconds);
+    let clock = window.clock;
+    let after = |seconds: f64| clock.timestamp(DurNs::from_secs_f64(seconds));
     let from_s = window.from_s;
     let to_s = window.to_s.unwrap_or(from_s + MOST_S);
     if to_s <= from_s {
@@ -133,7 +135,7 @@ pub(crate) fn collect(
         progress(events.len());
     })?;
     let last = events.last().map_or(from, |event| event.received + DurNs(1));
-    Ok(Collected { first, from, to: to.min(last.max(from)), at_surface, sensors, events })
+    Ok(Collected { clock, from, to: to.min(last.max(from)), at_surface, sensors, events })
 }
 
 /// Readings of a log, with the sensors and settings that the vehicle file describes.

@@ -47,7 +47,8 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     check(args, &vehicle, &player)?;
     let dive = Assembly::of(&vehicle, &text).assemble()?;
     player.connect(dive.armed.sources());
-    let window = Window { from_s: args.from, to_s: args.to, at_surface_s: args.at_surface };
+    let clock = player.dive_clock();
+    let window = Window { from_s: args.from, to_s: args.to, at_surface_s: args.at_surface, clock };
     let mut progress = Progress::start();
     let (span, at) = (player.span(), Cell::new(MonoNs(0)));
     let mut feed = Followed { feed: &mut player, at: &at };
@@ -86,7 +87,7 @@ fn check(args: &Calibrate, vehicle: &VehicleConfig, player: &Player) -> Result<(
             args.log.display()
         )));
     }
-    let lasts_s = player.span().map_or(0.0, |(first, last)| last.since(first).as_secs_f64());
+    let lasts_s = player.span().map_or(0.0, |(_, last)| player.dive_clock().seconds(last));
     if args.from > lasts_s {
         return Err(Failure::Usage(format!(
             "calibrating by {}: --from {} is after the log's end, at {lasts_s:.1} s",

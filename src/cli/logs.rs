@@ -80,10 +80,10 @@ pub(crate) struct Trim {
     /// Log to write.
     #[arg(short, long, value_name = "TRIMMED.mcap")]
     pub(crate) output: PathBuf,
-    /// Start time, from the log's first message: 90s, 10min, 1.5h.
+    /// Start, as dive time: 90s, 10min, 1.5h.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
     pub(crate) from: Option<DurNs>,
-    /// End time, from the log's first message.
+    /// End, as dive time.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
     pub(crate) to: Option<DurNs>,
     /// Keep the times at which the vehicle was in this range of chainage, metres. The log is replayed to find

@@ -5,9 +5,10 @@ mod anonymous;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_monitor::console::{CONSOLE_ID, Command};
 use headrace_replay::atomic_file::AtomicFile;
+use headrace_replay::clocks::clock_of;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{
     DiveLog, LogHeader, LogInfo, Trim as Work, Trimmed, files_digest, files_of, trim as rewrite,
@@ -44,7 +45,8 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let log = DiveLog::open(&files)?;
     let info = log.header().clone();
     let vehicle = vehicle(args, given, &files, &info)?;
-    let spans = spans(args, &files, vehicle.as_ref())?;
+    let clock = clock_of(&files)?;
+    let spans = spans(args, &files, vehicle.as_ref(), clock)?;
     let anonymous = match &vehicle {
         Some(vehicle) if args.anonymise => Some(Anonymous::of(&log, vehicle)?),
         _ => None,
@@ -52,8 +54,7 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let mut said = what_is_done(args, &files, &spans)?;
     let trimmed = write(args, &files, &spans, vehicle.as_ref(), anonymous.as_ref(), &said)?;
     said.extend(anonymous.iter().flat_map(|anonymous| anonymous.left.clone()));
-    let begun = log.times().map_or(MonoNs(0), |(begun, _)| begun);
-    tell(args, (&trimmed, begun), &spans, &said)?;
+    tell(args, (&trimmed, clock), &spans, &said)?;
     Ok(if trimmed.losses > 0 { failure::DATA_LOST } else { failure::OK })
 }
 
@@ -82,6 +83,7 @@ fn spans(
     args: &Trim,
     files: &[PathBuf],
     vehicle: Option<&VehicleConfig>,
+    clock: DiveClock,
 ) -> Result<Vec<(MonoNs, MonoNs)>, Failure> {
     if let (Some([from_m, to_m]), Some(vehicle)) = (args.chainage, vehicle) {
         let spans = when_within(files, vehicle, from_m, to_m)?;
@@ -96,10 +98,9 @@ fn spans(
     if args.from.is_none() && args.to.is_none() {
         return Ok(Vec::new());
     }
-    let mut log = DiveLog::open(files)?;
-    let first = log.next()?.map_or(MonoNs(0), |message| message.log_time);
-    let from = args.from.map_or(MonoNs(0), |from| first + from);
-    let to = args.to.map_or(MonoNs(u64::MAX), |to| first + to);
+    // Messages from before the first sensor packet have dive time zero, too.
+    let from = args.from.filter(|from| from.0 > 0).map_or(MonoNs(0), |from| clock.timestamp(from));
+    let to = args.to.map_or(MonoNs(u64::MAX), |to| clock.timestamp(to));
     if from >= to {
         return Err(Failure::Usage("trim: --from must be before --to".to_owned()));
     }
@@ -219,25 +220,23 @@ fn write(
 
 /// Error if no message of a sensor is within the requested times or chainages.
 fn nothing_kept(args: &Trim, files: &[PathBuf]) -> Result<Failure, Failure> {
-    let mut log = DiveLog::open(files)?;
-    let last = log.times().map_or(MonoNs(0), |times| times.1);
-    let first = log.next()?.map_or(last, |message| message.log_time);
+    let last = DiveLog::open(files)?.times().map_or(MonoNs(0), |times| times.1);
     let option = |name: &str, at: Option<DurNs>| at.map(|at| format!("{name} {} s", at.as_secs_f64()));
     let asked = [option("--from", args.from), option("--to", args.to)];
     let chainage = args.chainage.map(|[from_m, to_m]| format!("--chainage {from_m}..{to_m}"));
     let asked: Vec<String> = asked.into_iter().flatten().chain(chainage).collect();
     Ok(Failure::Usage(format!(
-        "trim: no sensor's message of {} is within {}; the log spans 0 s to {:.3} s after its first message",
+        "trim: no sensor's message of {} is within {}; the dive lasts from 0 s to {}",
         files::first_named(&args.logs).display(),
         asked.join(" "),
-        last.since(first).as_secs_f64()
+        seconds(last, clock_of(files)?)
     )))
 }
 
-/// Shows what was trimmed. `begun` is the beginning of the dive.
+/// Shows what was trimmed, with dive times.
 fn tell(
     args: &Trim,
-    (trimmed, begun): (&Trimmed, MonoNs),
+    (trimmed, clock): (&Trimmed, DiveClock),
     spans: &[(MonoNs, MonoNs)],
     said: &[String],
 ) -> Result<(), Failure> {
@@ -265,7 +264,7 @@ fn tell(
         say(&format!("lost     {losses} losses of the source log are stated in the new one"));
     }
     let span = span
-        .map(|(from, to)| format!(", {} to {}", seconds(from, begun), seconds(to, begun)))
+        .map(|(from, to)| format!(", {} to {}", seconds(from, clock), seconds(to, clock)))
         .unwrap_or_default();
     let results = if results > 0 { format!(" and {results} of results") } else { String::new() };
     say(&format!("kept     {messages} messages{span}; left out {cut}{results}"));

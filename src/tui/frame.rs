@@ -32,7 +32,7 @@ const NEAR: i64 = 8;
 pub(super) struct ScreenFrame {
     pub(super) vehicle: String,
     pub(super) state: LiveState,
-    /// Time since the dive's first packet.
+    /// Dive time.
     pub(super) time: DurNs,
     pub(super) stopped: Option<Stop>,
     /// Status line: place, speed, condition and action.
@@ -141,7 +141,7 @@ impl FrameBuilder {
         let (alerts, alerts_hidden) = alerts::rows(dive);
         ScreenFrame {
             vehicle: self.vehicle.clone(),
-            time: dive.view().span().map_or(DurNs(0), |(begun, _)| DurNs(state.now.since(begun).0.max(0))),
+            time: dive.view().clock().time(state.now),
             stopped,
             status: status_line(&state, profile, heads, &name),
             reason,

@@ -149,6 +149,8 @@ pub struct Journey {
     /// Samples on the wall at the end of the dive. `turned` has the samples at the moment when the vehicle turned back.
     whole: Wall,
     turned: Option<Wall>,
+    /// Time of the first packet on the log's clock, s.
+    start_s: f64,
     end_s: f64,
 }
 
@@ -168,7 +170,8 @@ impl Journey {
         }
         let turned = reached.get(back.start).map(|turned| wall_until(dive, turned.at));
         let end_s = dive.report.dive.start_s + dive.report.dive.duration_s;
-        Self { reached, back, whole: wall_until(dive, MonoNs(u64::MAX)), turned, end_s }
+        let start_s = dive.report.dive.start_s;
+        Self { reached, back, whole: wall_until(dive, MonoNs(u64::MAX)), turned, start_s, end_s }
     }
 
     /// Time at which the vehicle turned back, seconds; infinite if never.
@@ -227,8 +230,9 @@ impl Journey {
             out.or_else(|| due(&self.whole, &self.reached[on..], early_m)).map(MonoNs::as_secs_f64)
         };
         let line_m = (section.end_m - section.start_m) / f64::from(PARTS);
+        let raised_s = section.flagged_s.map(|time_s| self.start_s + time_s);
         let late_m = || {
-            let raised_s = section.flagged_s?;
+            let raised_s = raised_s?;
             let before = |reached: &&Reached| reached.at.as_secs_f64() <= raised_s;
             // If the reach or the standard deviation jumps, the flag can be raised at the next tick at the earliest.
             // Such a short delay isn't late.
@@ -242,8 +246,8 @@ impl Journey {
             due_s: first(0.0),
             may_s: first(line_m),
             end_s: self.end_s,
-            raised_s: section.flagged_s,
-            cleared_s: section.cleared_s,
+            raised_s,
+            cleared_s: section.cleared_s.map(|time_s| self.start_s + time_s),
             fails: self.whole.largest(ends[0], ends[1]).is_none_or(|circle| circle.radius_m > radius_m),
         }
     }

@@ -59,6 +59,47 @@ impl MonoNs {
     }
 }
 
+/// Clock of a dive: converts timestamps to dive time, the time that people read and type, and back.
+///
+/// Dive time is zero at the receive time of the first sensor packet that the loop takes. The operator's commands and
+/// messages to devices may come earlier; their dive time is zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct DiveClock {
+    zero: Option<MonoNs>,
+}
+
+impl DiveClock {
+    /// Creates the clock of a dive whose first sensor packet was received at `zero`; `None` before the first packet.
+    pub const fn new(zero: Option<MonoNs>) -> Self {
+        Self { zero }
+    }
+
+    /// Starts the clock with a sensor packet received at `at`, unless an earlier packet has started it.
+    pub fn start(&mut self, at: MonoNs) {
+        self.zero.get_or_insert(at);
+    }
+
+    /// Timestamp at which dive time is zero; `None` before the first packet.
+    pub fn zero(self) -> Option<MonoNs> {
+        self.zero
+    }
+
+    /// Dive time of a timestamp; never negative.
+    pub fn time(self, at: MonoNs) -> DurNs {
+        self.zero.map_or(DurNs::ZERO, |zero| at.since(zero).max(DurNs::ZERO))
+    }
+
+    /// Dive time of a timestamp in seconds.
+    pub fn seconds(self, at: MonoNs) -> f64 {
+        self.time(at).as_secs_f64()
+    }
+
+    /// Timestamp of a dive time.
+    pub fn timestamp(self, time: DurNs) -> MonoNs {
+        self.zero.unwrap_or(MonoNs(0)) + time
+    }
+}
+
 impl Add<DurNs> for MonoNs {
     type Output = Self;
 
@@ -111,6 +152,16 @@ mod tests {
         assert_eq!(MonoNs(0).since(MonoNs(u64::MAX)), DurNs(i64::MIN));
         assert_eq!(MonoNs(3) - DurNs(8), MonoNs(0));
         assert_eq!(-DurNs(i64::MIN), DurNs(i64::MAX));
+    }
+
+    #[test]
+    fn dive_time_counts_from_the_first_packet_and_is_never_negative() {
+        let mut clock = DiveClock::default();
+        assert_eq!((clock.time(MonoNs(7)), clock.timestamp(DurNs(7))), (DurNs(0), MonoNs(7)));
+        clock.start(MonoNs(5));
+        clock.start(MonoNs(3));
+        assert_eq!([3, 5, 8].map(|at| clock.time(MonoNs(at)).0), [0, 0, 3]);
+        assert_eq!(clock.timestamp(DurNs(3)), MonoNs(8));
     }
 
     #[test]

@@ -17,7 +17,7 @@ use super::result_stream::{RecordKind, ResultStream};
 use super::stage::AdviseStage;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
@@ -161,10 +161,9 @@ fn advise(
     mut stream: ResMut<'_, AdviceStream>,
 ) {
     list.0.clear();
-    let begun = placed.span().map(|(first, _)| first);
     for update in placed.updates() {
         let (at, situation) = (update.at, &update.situation);
-        let advice = advisor.advise(at, situation, begun);
+        let advice = advisor.advise(at, situation, placed.clock);
         debug_assert!(
             advice.v_max_mps.is_finite() && advice.v_max_mps >= 0.0,
             "advised {} m/s",
@@ -184,9 +183,9 @@ impl Advisor {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
-    /// Returns the advice to show at an update. `begun` is the receive time of the first packet.
-    fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
-        let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
+    /// Advice to show at an update.
+    fn advise(&mut self, at: MonoNs, situation: &Situation, clock: DiveClock) -> Advice {
+        let left = self.dive_time.map(|all| (all - clock.time(at)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
         // Heads at different places along the hull are in phase at other speeds when the vehicle goes back than
@@ -233,7 +232,6 @@ mod tests {
     use core::any::TypeId;
 
     use super::*;
-    use crate::entities::SensorHealth;
     use crate::fixtures::{armed, mount, pinged, pipe, pose, situation, task};
     use crate::messages::{Doubts, PlacedItem, Placement, Update};
     use headrace_fusion::NoFix;
@@ -286,9 +284,9 @@ mod tests {
         let left_s = |dive_s: Option<f64>, begun_s: Option<f64>| {
             let advisor = new(dive_s.map(DurNs::from_secs_f64));
             let mut adviser = Adviser::new(Part::new(), advisor, false).unwrap();
-            let health = SensorHealth { span: begun_s.map(|s| (at(s), at(s))), ..SensorHealth::default() };
+            let clock = DiveClock::new(begun_s.map(at));
             let items = placed.map(|placement| PlacedItem { event: 0, placement }).to_vec();
-            let placed = Arc::new(Placed { items, health: vec![health], ..Placed::default() });
+            let placed = Arc::new(Placed { items, clock, ..Placed::default() });
             let mut advised = Advised::default();
             for _ in 0..2 {
                 adviser.tick(&placed, &mut advised);
@@ -297,7 +295,7 @@ mod tests {
         };
         assert_eq!(left_s(Some(100.0), Some(10.0)), [Some(80.0), Some(79.8)], "entries of this tick only");
         assert_eq!(left_s(None, Some(10.0)), [None, None]);
-        assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
+        assert_eq!(left_s(Some(100.0), None), [Some(100.0); 2], "the dive hasn't begun");
     }
 
     /// The vehicle yaws by 0.01 rad/s. Two heads at opposite angles turn in 8 s, so one of them passes any place every

@@ -83,6 +83,7 @@ impl Alerter {
     /// Applies the results of the other parts for a tick that ends at `now`. Allocates: never.
     pub(super) fn tick(&mut self, placed: &Placed, found: &Found, advised: &Advised, now: MonoNs) {
         self.notices.clear();
+        self.list.clock = placed.clock;
         let (runs, commands) = (&found.runs[..], &placed.commands.0[..]);
         let (events, unread) = (&placed.events[..], &placed.unread[..]);
         let mut inputs = Inputs { runs, commands, events, unread, taken: Taken::default() };

@@ -49,13 +49,13 @@ pub enum ConsoleError {
 #[derive(Clone)]
 pub struct ConsolePort {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
-    clock: Option<Arc<DiveClock>>,
+    clock: Option<Arc<TimestampClock>>,
     /// Number of notes accepted through all console ports.
     notes: Arc<AtomicUsize>,
 }
 
 /// Clock that gives the timestamps of a dive.
-type DiveClock = dyn Fn() -> MonoNs + Send + Sync;
+type TimestampClock = dyn Fn() -> MonoNs + Send + Sync;
 
 impl ConsolePort {
     /// Hands a command to the loop, stamped with the dive's clock. The loop takes the command at the next tick.
@@ -95,7 +95,7 @@ impl ConsoleInput {
     /// Console input of a dive with this clock; `None` if the loop's port has been taken already.
     ///
     /// Without a clock, commands are stamped when they are moved into the ring.
-    pub fn new(dive: &mut Loop, clock: Option<Arc<DiveClock>>) -> Option<(Self, ConsolePort)> {
+    pub fn new(dive: &mut Loop, clock: Option<Arc<TimestampClock>>) -> Option<(Self, ConsolePort)> {
         let port = dive.take_console()?;
         let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
         let input = Self { waiting: Arc::clone(&waiting), port, time_told: MonoNs(0), called: None };

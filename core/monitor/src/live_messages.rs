@@ -151,7 +151,7 @@ impl LiveMessages {
                 }
                 tell(alert_change(*change, alert, *at, dive));
             }
-            Notice::Note(note) => tell(LiveMessage::Note(note.into())),
+            Notice::Note(note) => tell(LiveMessage::Note(NoteJson::of(note, dive.view().clock()))),
             Notice::Section { section, .. } => {
                 let sections = &dive.view().coverage().sections;
                 self.close_run_at(*section, sections, tell);

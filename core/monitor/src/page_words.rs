@@ -14,7 +14,7 @@ use crate::words::{
 };
 use headrace_coverage::{Unsure, Verdict};
 use headrace_fusion::NoFix;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_sampling::advice::Reason;
 
 /// First lines of the generated TypeScript file.
@@ -107,7 +107,8 @@ fn condition_object(condition: Condition) -> String {
 /// Words of a note without a text.
 fn note_words(voice: Option<Spoken>) -> String {
     let (by, text) = (Who::default(), NoteText::default());
-    NoteJson::from(&Note { number: 1, at: MonoNs(0), by, text, voice, chainage_m: None }).words()
+    let note = Note { number: 1, at: MonoNs(0), by, text, voice, chainage_m: None };
+    NoteJson::of(&note, DiveClock::default()).words()
 }
 
 /// TypeScript constant: an object with a word for each code.

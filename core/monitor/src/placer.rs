@@ -26,11 +26,11 @@ use super::ring::PortReader;
 use super::stage::{PlaceStage, Stage as _};
 use crate::console::packets::{Commands, Console, ConsoleCounts};
 use crate::unread::UnreadPacket;
-use decode::{Events, UnreadPackets};
+use decode::{Events, Started, UnreadPackets};
 use georeference::PlacedList;
 use headrace_fusion::Navigation;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 use navigate::{Poses, PositionedList};
 use sound_speed::SoundSpeed;
 
@@ -58,7 +58,9 @@ pub struct Placed {
     pub items: Vec<PlacedItem>,
     /// Commands of the operator, in order.
     pub(super) commands: Commands,
-    /// Fix of the vehicle at the latest advice update.
+    /// Clock of the dive.
+    pub clock: DiveClock,
+    /// Fix of the vehicle at the last advice update.
     pub vehicle: VehicleState,
     /// Traffic of each sensor so far, in the order of sources.
     pub health: Vec<SensorHealth>,
@@ -90,10 +92,9 @@ impl Placed {
         self.health.iter().map(|sensor| sensor.packets).sum()
     }
 
-    /// First and last receive time of the sensors' packets so far.
-    pub fn span(&self) -> Option<(MonoNs, MonoNs)> {
-        let spans = self.health.iter().filter_map(|sensor| sensor.span);
-        spans.reduce(|(first, last), (from, to)| (first.min(from), last.max(to)))
+    /// Latest receive time of the sensors' packets so far.
+    pub fn last_received(&self) -> Option<MonoNs> {
+        self.health.iter().filter_map(|sensor| sensor.span).map(|(_, last)| last).max()
     }
 
     /// Clears the lists of a tick, except its packets.
@@ -108,8 +109,8 @@ impl Placed {
     pub(super) fn followed_by_nothing(&self) -> Self {
         let mut poses = self.poses.clone();
         poses.next_tick();
-        let Self { vehicle, console, .. } = *self;
-        Self { vehicle, health: self.health.clone(), console, poses, ..Self::default() }
+        let Self { clock, vehicle, console, .. } = *self;
+        Self { clock, vehicle, health: self.health.clone(), console, poses, ..Self::default() }
     }
 }
 
@@ -139,7 +140,8 @@ impl Placer {
             poses.0.keep();
         }
         part.insert_state("poses", poses);
-        // During a tick, these lists are swapped with the lists of `Placed`.
+        part.insert_state("clock of the dive", Started::default());
+        // During a tick, these lists are swapped with those of `Placed`.
         part.insert_resource(Inbox::default());
         part.insert_resource(Events::default());
         part.insert_resource(UnreadPackets::default());
@@ -219,6 +221,7 @@ impl Placer {
     pub(super) fn report(&self, into: &mut Placed) {
         let world = &self.part.world;
         let entities = world.resource::<VehicleEntities>();
+        into.clock = world.resource::<Started>().clock;
         into.vehicle = world.get::<VehicleState>(entities.vehicle).copied().unwrap_or_default();
         into.health.clear();
         into.health.extend(entities.by_source.iter().filter_map(|sensor| world.get::<SensorHealth>(*sensor)));

@@ -270,7 +270,7 @@ impl Loop {
     }
 
     fn last_packet(&self) -> MonoNs {
-        self.placed.span().map_or(MonoNs(0), |(_, last)| last)
+        self.placed.last_received().unwrap_or(MonoNs(0))
     }
 
     /// Judges the sections whose verdict may still change, at the end of a dive, when no more samples will

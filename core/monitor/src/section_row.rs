@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use crate::report::spread::SpreadReport;
 use headrace_coverage::{Evidence, Section, Sections, Unsure, Verdict};
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::DiveClock;
 use headrace_geometry::tunnel::Profile;
 
 /// One section with its verdict and figures.
@@ -64,9 +64,9 @@ pub struct SectionRow {
     pub cannot_say: Option<Unsure>,
     /// Evidence for the cause of a fail; `None` unless the verdict is `fail`.
     pub cause: Option<Evidence>,
-    /// Time at which the section was flagged, seconds on the log's clock.
+    /// Dive time at which the section was flagged, seconds.
     pub flagged_s: Option<f64>,
-    /// Time at which a later pass cleared the flag.
+    /// Dive time at which a later pass cleared the flag, seconds.
     pub cleared_s: Option<f64>,
     /// Number of returns on the section's wall that were not accepted as wall.
     pub doubtful_returns: u32,
@@ -93,8 +93,13 @@ pub struct DeviationReport {
 }
 
 impl SectionRow {
-    /// Row of the section with this index, or `None` if there is no such section. `profile` is the tunnel's design.
-    pub(super) fn of(sections: &Sections, index: i64, profile: &Profile) -> Option<Self> {
+    /// Row of the section with this index, or `None` if there is no such section. It needs the tunnel's design profile
+    /// and the dive's clock.
+    pub(super) fn of(
+        sections: &Sections,
+        index: i64,
+        (profile, clock): (&Profile, DiveClock),
+    ) -> Option<Self> {
         let section = sections.get(index)?;
         let (start_m, end_m) = sections.bounds_m(index);
         let area_m2 = profile.perimeter_m() * sections.section_m();
@@ -122,8 +127,8 @@ impl SectionRow {
             not_inspected: section.not_inspected,
             cannot_say: section.unsure(),
             cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
-            flagged_s: section.flagged.map(MonoNs::as_secs_f64),
-            cleared_s: section.cleared.map(MonoNs::as_secs_f64),
+            flagged_s: section.flagged.map(|at| clock.seconds(at)),
+            cleared_s: section.cleared.map(|at| clock.seconds(at)),
             doubtful_returns: section.doubtful,
             suspect: section.suspect,
         })

@@ -18,7 +18,7 @@ use super::result_stream::ResultStream;
 use super::section_row::SectionRow;
 use super::source::SourceInfo;
 use super::surveyor::Surveyor;
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 use headrace_vehicle::Mission;
 
 /// Mission and sensors of a loop; constant after arming.
@@ -89,9 +89,14 @@ impl<'a> DiveView<'a> {
         &self.placed.health
     }
 
-    /// First and last receive time of the sensors' packets so far.
-    pub fn span(&self) -> Option<(MonoNs, MonoNs)> {
-        self.placed.span()
+    /// Clock of the dive, for the times that people read.
+    pub fn clock(&self) -> DiveClock {
+        self.placed.clock
+    }
+
+    /// Latest receive time of the sensors' packets so far.
+    pub fn last_received(&self) -> Option<MonoNs> {
+        self.placed.last_received()
     }
 
     /// Readings of the tick, in order.
@@ -113,7 +118,7 @@ impl<'a> DiveView<'a> {
 
     /// The section with this index; `None` beyond the tunnel's ends.
     pub fn section_row(&self, index: i64) -> Option<SectionRow> {
-        SectionRow::of(&self.coverage().sections, index, &self.about.mission.profile)
+        SectionRow::of(&self.coverage().sections, index, (&self.about.mission.profile, self.clock()))
     }
 
     /// Counts of pings over the whole dive.
@@ -139,7 +144,8 @@ impl<'a> DiveView<'a> {
     /// Context for the texts of the dive's alerts.
     pub fn surroundings(&self) -> TextContext<'a> {
         let About { mission, sources, descriptions } = self.about;
-        TextContext::of(sources, &mission.profile, &self.coverage().sections, descriptions)
+        let sections = &self.coverage().sections;
+        TextContext::of(sources, &mission.profile, sections, descriptions, self.clock())
     }
 
     /// Live state as of the last advice update.

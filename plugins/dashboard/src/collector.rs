@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 
 use headrace_geometry::frames::{Mount, Point3, Vec3};
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_geometry::tunnel::WallPoint;
 use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_messages::LiveMessage;
@@ -79,7 +79,7 @@ pub struct Collector {
     is_playback: bool,
     sensors: Vec<Followed>,
     rates_from: Option<MonoNs>,
-    begun: Option<MonoNs>,
+    clock: DiveClock,
     sent: Option<MonoNs>,
     /// Time of the latest tick that was played. Ticks that a seek skips don't count.
     played: Option<MonoNs>,
@@ -126,7 +126,7 @@ impl Collector {
             is_playback,
             sensors: dive.sources().iter().zip(dive.sensors()).map(followed).collect(),
             rates_from: None,
-            begun: None,
+            clock: DiveClock::default(),
             sent: None,
             played: None,
             changed: BTreeSet::new(),
@@ -164,7 +164,7 @@ impl Collector {
                 serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
             if let Some(object) = value.as_object_mut() {
                 let line = message_line(one, &dive.mission().profile, dive.head_descriptions());
-                object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
+                object.insert("t_s".to_owned(), dive.view().clock().seconds(dive.now()).into());
                 object.entry("text").or_insert_with(|| line.text().into());
             }
             self.push_told(value);
@@ -210,7 +210,7 @@ impl Collector {
     /// Handles a state of the dive that was rebuilt from the log. The wall that the dive has covered so far is sent in
     /// pieces.
     pub fn rebuilt(&mut self, dive: &Loop) {
-        self.begun = dive.view().span().map(|(first, _)| first);
+        self.clock = dive.view().clock();
         self.lacking_m = dive.view().coverage().frontier.way().map(|way| [way.from_m, way.to_m]);
         (self.back_due, self.notes_due) = (true, true);
         self.change_all(dive);
@@ -219,13 +219,15 @@ impl Collector {
     /// Collects a change of a sensor's connection.
     pub fn sensor(&mut self, id: &str, phase: &str, text: &str, at: MonoNs) {
         self.push_told(
-            json!({"type": "sensor", "t_s": at.as_secs_f64(), "id": id, "phase": phase, "text": text}),
+            json!({"type": "sensor", "t_s": self.clock.seconds(at), "id": id, "phase": phase, "text": text}),
         );
     }
 
     /// Collects a change of a recording.
     pub fn recording(&mut self, fails: bool, text: &str, at: MonoNs) {
-        self.push_told(json!({"type": "recording", "t_s": at.as_secs_f64(), "fails": fails, "text": text}));
+        self.push_told(
+            json!({"type": "recording", "t_s": self.clock.seconds(at), "fails": fails, "text": text}),
+        );
     }
 
     /// Sets the displayed text about the recordings, and whether it is an alarm; `None` if recording works.
@@ -284,7 +286,7 @@ impl Collector {
     }
 
     fn gather(&mut self, dive: &Loop) {
-        self.begun = self.begun.or_else(|| dive.view().span().map(|(first, _)| first));
+        self.clock = dive.view().clock();
         for event in dive.view().readings() {
             match &event.reading {
                 Reading::Echo(echo) => {
@@ -343,8 +345,7 @@ impl Collector {
     }
 
     fn t_ms(&self, at: MonoNs) -> u32 {
-        let since = self.begun.map_or(0, |begun| at.since(begun).0.max(0) / 1_000_000);
-        u32::try_from(since).unwrap_or(u32::MAX)
+        u32::try_from(self.clock.time(at).0 / 1_000_000).unwrap_or(u32::MAX)
     }
 
     /// Returns the number of the head with this packet source.
@@ -393,7 +394,7 @@ impl Collector {
         let news = News {
             now,
             is_skipped: self.skips,
-            begun: self.begun,
+            clock: self.clock,
             state: Box::new(dive.view().live_state_json()),
             beside: self.beside(dive),
             samples: core::mem::take(&mut self.samples),
@@ -401,7 +402,7 @@ impl Collector {
             sections: changed,
             told: core::mem::take(&mut self.told),
             notes: core::mem::take(&mut self.notes_due)
-                .then(|| dive.view().notes().iter().map(NoteJson::from).collect()),
+                .then(|| dive.view().notes().iter().map(|note| NoteJson::of(note, self.clock)).collect()),
             back: self.back(dive),
             dropped: self.dropped,
         };
@@ -502,7 +503,6 @@ impl Collector {
         let compared = self.compared.as_ref().map(Compared::json);
         Beside {
             pose,
-            begun_s: self.begun.map(MonoNs::as_secs_f64),
             depth_m: self.depth_m,
             echosounders,
             rates: rates.collect(),

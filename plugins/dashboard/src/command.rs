@@ -120,7 +120,7 @@ pub enum Play {
     End,
     /// Sets the speed as a multiple of real time; `None` plays as fast as possible.
     Speed(Option<f64>),
-    /// Seeks to this time, seconds on the log's clock.
+    /// Seeks to this time, seconds of dive time.
     Seek(f64),
 }
 
@@ -184,7 +184,7 @@ fn play(command: &str, speed: Option<f64>, to_s: Option<f64>) -> Result<Play, St
             return Err(format!("speed is {speed}; expected 0.01 to 10000, or null"));
         }
         ("seek", _, Some(to_s)) if (0.0..=1.8e10).contains(&to_s) => Play::Seek(to_s),
-        ("seek", ..) => return Err("seek needs to_s, seconds on the log's clock".to_owned()),
+        ("seek", ..) => return Err("seek needs to_s, seconds of dive time".to_owned()),
         (other, ..) => {
             return Err(format!(
                 "{other:?} isn't a command; expected pause, go, step, step_section, end, speed or seek"

@@ -1,6 +1,6 @@
 //! Messages from the loop's thread to the page's thread, passed through a bounded queue.
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_state::json::LiveStateJson;
 use serde::Serialize;
@@ -30,8 +30,8 @@ pub struct News {
     /// Whether a seek skips this tick. Only the samples of a skipped tick are used, because the state is sent after the
     /// jump.
     pub is_skipped: bool,
-    /// Time at which the dive began; `None` while unknown.
-    pub begun: Option<MonoNs>,
+    /// Clock of the dive.
+    pub clock: DiveClock,
     /// The live state at the end of the tick.
     pub state: Box<LiveStateJson>,
     /// Displayed data that isn't in the live state.
@@ -57,8 +57,6 @@ pub struct News {
 pub struct Beside {
     /// Pose of the vehicle in the cross-section.
     pub pose: Option<PoseJson>,
-    /// Time at which the dive began, seconds on the log's clock; `None` while unknown.
-    pub begun_s: Option<f64>,
     /// Depth below the water level by the latest reading of the pressure sensor, m; `None` without one.
     pub depth_m: Option<f64>,
     /// Latest pings of the echosounders.
@@ -144,10 +142,10 @@ pub struct PlaybackState {
     pub paused: bool,
     /// Speed as a multiple of real time; `None` plays as fast as possible.
     pub speed: Option<f64>,
-    /// Present position, seconds on the log's clock.
+    /// Present position, seconds of dive time.
     pub at_s: f64,
-    /// Start of the log, seconds on the log's clock.
+    /// Start of the log, seconds of dive time.
     pub from_s: f64,
-    /// End of the log, seconds on the log's clock.
+    /// End of the log, seconds of dive time.
     pub to_s: f64,
 }

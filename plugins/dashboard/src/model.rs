@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use axum::body::Bytes;
 use axum::extract::ws::Utf8Bytes;
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_state::json::LiveStateJson;
 use serde_json::{Value, json};
@@ -77,7 +77,7 @@ pub struct Model {
     instance: String,
     jumps: u32,
     seq: u64,
-    begun: Option<MonoNs>,
+    clock: DiveClock,
     sections: BTreeMap<i32, Shown>,
     changed: Vec<i32>,
     samples: Samples,
@@ -107,7 +107,7 @@ impl Model {
             instance,
             jumps: 0,
             seq: 0,
-            begun: None,
+            clock: DiveClock::default(),
             sections: BTreeMap::new(),
             changed: Vec::new(),
             samples: Samples::default(),
@@ -151,7 +151,9 @@ impl Model {
     }
 
     fn news(&mut self, news: News) -> bool {
-        self.begun = self.begun.or(news.begun);
+        if news.clock.zero().is_some() {
+            self.clock = news.clock;
+        }
         if news.is_skipped {
             let at_ms = self.ms(news.now);
             self.samples.take(at_ms, &news.samples, self.site.is_playback);
@@ -176,7 +178,7 @@ impl Model {
         }
         self.history.take(&news.state);
         if let Some(playback) = &mut self.playback {
-            playback.at_s = news.now.as_secs_f64();
+            playback.at_s = self.clock.seconds(news.now);
         }
         self.state = Some(Box::new((news.state, news.beside)));
         self.state_is_new = true;
@@ -211,7 +213,7 @@ impl Model {
         self.told_new.clear();
         self.places.clear();
         self.samples.jump(self.ms(at));
-        self.history.jump(at.as_secs_f64());
+        self.history.jump(self.clock.seconds(at));
         self.end = None;
         let seen: Vec<_> = self.samples.since(0).map(|sample| (sample.x_m, sample.seen())).collect();
         for (x_m, seen) in seen {
@@ -221,8 +223,7 @@ impl Model {
     }
 
     fn ms(&self, at: MonoNs) -> u32 {
-        let since = self.begun.map_or(0, |begun| at.since(begun).0.max(0) / 1_000_000);
-        u32::try_from(since).unwrap_or(u32::MAX)
+        u32::try_from(self.clock.time(at).0 / 1_000_000).unwrap_or(u32::MAX)
     }
 
     /// Returns the unique name of this dive. In a replay each seek gives a new name.
@@ -365,7 +366,7 @@ impl Model {
         self.places.get(place).map(|(_, count)| *count)
     }
 
-    /// Returns the start of the voice note with this id, seconds on the log's clock.
+    /// Returns the start of the voice note with this id, seconds of dive time.
     ///
     /// Returns `None` if there is no such note, or it has no recording.
     pub(crate) fn spoken_s(&self, id: u32) -> Option<f64> {
@@ -388,11 +389,17 @@ impl Model {
 
     /// Returns the first message to a viewer.
     pub fn hello(&self, may: May, tokens_needed: bool, thinned: Option<usize>) -> Value {
-        let begun_s = self.begun.map_or(0.0, MonoNs::as_secs_f64);
         let instance = self.instance();
-        let greeting = Greeting { seq: self.seq, instance: &instance, may, begun_s, tokens_needed, thinned };
+        let begun_utc_s = self.begun_utc_s();
+        let greeting =
+            Greeting { seq: self.seq, instance: &instance, may, begun_utc_s, tokens_needed, thinned };
         serde_json::to_value(self.site.hello(&greeting))
             .unwrap_or_else(|error| json!({"error": error.to_string()}))
+    }
+
+    /// Returns the UTC at which dive time is zero, seconds since 1970; `None` while unknown.
+    fn begun_utc_s(&self) -> Option<f64> {
+        self.site.utc_of_zero_s.zip(self.clock.zero()).map(|(utc_s, zero)| utc_s + zero.as_secs_f64())
     }
 
     /// Returns the live state as a message.
@@ -405,13 +412,14 @@ impl Model {
         if let Ok(Value::Object(beside)) = serde_json::to_value(beside) {
             object.extend(beside);
         }
+        object.insert("begun_utc_s".to_owned(), json!(self.begun_utc_s()));
         object.insert("playback".to_owned(), json!(self.playback));
         object.insert("ended".to_owned(), self.end.is_some().into());
         object.insert("page_dropped".to_owned(), json!(self.dropped));
         Some(value)
     }
 
-    /// Returns the time of the live state, seconds.
+    /// Returns the dive time of the live state, seconds.
     pub fn now_s(&self) -> Option<f64> {
         self.state.as_ref().map(|shown| shown.0.now_s)
     }

@@ -5,9 +5,11 @@
 
 use std::path::PathBuf;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
+use headrace_monitor::console::CONSOLE_ID;
+use headrace_monitor::ring::MAX_PACKET_BYTES;
 
-use crate::log::{DiveLog, LogError, MessageKind};
+use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
 
 /// Minimum offset between two clocks, far longer than any dive. Timestamps with smaller gaps come from one clock.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
@@ -60,6 +62,34 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
     // If two counts are equal, the clock with the earlier timestamps wins, because a monotonic clock starts at zero.
     let most = clocks.into_iter().min_by_key(|clock| (core::cmp::Reverse(clock.messages), clock.from));
     Ok(most.filter(|_| several))
+}
+
+/// Returns the dive's clock of a log, as in a replay. Its reading position stays the same.
+///
+/// The clock starts with the first packet of a sensor. Packets of a clock other than `clock` don't count.
+///
+/// Errors: the log can't be read.
+pub(crate) fn dive_clock(log: &mut DiveLog, clock: Option<Clock>) -> Result<DiveClock, LogError> {
+    let (place, mut found) = (log.place(), DiveClock::default());
+    while found.zero().is_none() {
+        let Some(LogMessage { kind, log_time, data, .. }) = log.next()? else { break };
+        let MessageKind::Raw { source } = kind else { continue };
+        let is_played = clock.is_none_or(|clock| clock.is_of(log_time)) && data.len() <= MAX_PACKET_BYTES;
+        if is_played && log.source_id(source) != Some(CONSOLE_ID) {
+            found.start(log_time);
+        }
+    }
+    log.go_to(&place)?;
+    Ok(found)
+}
+
+/// Returns the dive's clock of the log in these files.
+///
+/// Errors: the log can't be read.
+pub fn clock_of(files: &[PathBuf]) -> Result<DiveClock, LogError> {
+    let mut log = DiveLog::open(files)?;
+    let clock = of(files, log.times())?;
+    dive_clock(&mut log, clock)
 }
 
 /// Counts a message for its clock. Returns `false` if there are too many clocks.

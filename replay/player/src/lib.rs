@@ -5,7 +5,7 @@
 
 mod adviser;
 pub mod atomic_file;
-mod clocks;
+pub mod clocks;
 pub mod drive;
 pub mod effect_influence;
 pub mod log;

@@ -3,16 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::DiveClock;
 use headrace_monitor::alert_list::{NoteJson, SpokenJson};
 use headrace_monitor::console::{CONSOLE_ID, Command};
 use headrace_monitor::pilot_text::station;
 use headrace_monitor::result_stream::{RecordKind, first_record};
 use headrace_monitor::voice::{Container, Voice};
 
+use crate::clocks::clock_of;
 use crate::log::format::{read_results, stream_of};
 use crate::log::voice::decode;
 use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
+use crate::player::seconds;
 
 /// The notes in a log, including voice notes.
 #[derive(Debug, Default)]
@@ -26,8 +28,8 @@ pub struct LoggedNotes {
     pub wrong: Vec<String>,
     /// Losses of the log that was read, as text.
     pub losses: Vec<String>,
-    /// Time of the log's first message.
-    pub begun: MonoNs,
+    /// Clock of the dive.
+    pub clock: DiveClock,
     /// Metadata of the log.
     pub metadata: BTreeMap<String, String>,
 }
@@ -37,7 +39,8 @@ pub struct LoggedNotes {
 /// Errors: the log can't be read.
 pub fn notes_of(files: &[PathBuf]) -> Result<LoggedNotes, LogError> {
     let mut log = DiveLog::open(files)?;
-    let (mut found, mut places) = (LoggedNotes::default(), BTreeMap::new());
+    let clock = clock_of(files)?;
+    let (mut found, mut places) = (LoggedNotes { clock, ..LoggedNotes::default() }, BTreeMap::new());
     let console = |log: &DiveLog| {
         let number = log.header().sources.iter().position(|source| source.id == CONSOLE_ID);
         number.and_then(|number| u16::try_from(number).ok())
@@ -56,8 +59,7 @@ pub fn notes_of(files: &[PathBuf]) -> Result<LoggedNotes, LogError> {
         note.chainage_m = places.get(&note.number).copied();
         note.station = note.chainage_m.map(station);
     }
-    found.begun = log.times().map_or(MonoNs(0), |(begun, _)| begun);
-    found.losses = log.losses().iter().map(|loss| loss.in_dive_time(found.begun).to_string()).collect();
+    found.losses = log.losses().iter().map(|loss| loss.in_dive_time(clock).to_string()).collect();
     found.metadata.clone_from(&log.header().metadata);
     Ok(found)
 }
@@ -97,7 +99,7 @@ impl LoggedNotes {
         };
         self.notes.push(NoteJson {
             number: u32::try_from(self.notes.len() + 1).unwrap_or(u32::MAX),
-            at_s: message.log_time.as_secs_f64(),
+            at_s: self.clock.seconds(message.log_time),
             by: by.as_str().to_owned(),
             text,
             voice,
@@ -112,8 +114,8 @@ impl LoggedNotes {
                 self.voices.insert(id, (seconds, container, audio.len()));
             }
             Err(error) => {
-                let MonoNs(at) = message.log_time;
-                self.wrong.push(format!("the voice message at {:.3} s: {error}", at as f64 / 1e9));
+                let at = seconds(message.log_time, self.clock);
+                self.wrong.push(format!("the voice message at {at}: {error}"));
             }
         }
     }

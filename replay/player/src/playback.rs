@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
 
@@ -129,9 +129,9 @@ impl<'a> Playback<'a> {
         Ok(playback)
     }
 
-    /// Returns the receive time of the log's first packet.
-    pub fn begun(&self) -> MonoNs {
-        self.begun
+    /// Returns the dive's clock.
+    pub fn dive_clock(&self) -> DiveClock {
+        self.player.dive_clock()
     }
 
     /// Plays until [`PlaybackCommand::End`], or until the log has ended and the command channel is closed.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 use headrace_monitor::SourceInfo;
 use headrace_monitor::console::CONSOLE_ID;
 use headrace_monitor::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
@@ -30,6 +30,9 @@ pub struct Player {
     too_long: u64,
     /// The clock with the most messages, if the log has several clocks.
     clock: Option<Clock>,
+    dive_clock: DiveClock,
+    /// Whether the dive's clock has started with a packet of one of the loop's sensors.
+    is_started: bool,
     /// Messages with timestamps of another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
     /// The farthest position that playback had reached before a jump, as a message count, and the losses up to it.
@@ -54,7 +57,8 @@ impl Player {
     ///
     /// Errors: see [`DiveLog::open`].
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
-        let reader = DiveLog::open(files)?;
+        let mut reader = DiveLog::open(files)?;
+        let clock = clocks::of(files, reader.times())?;
         let ids: Vec<String> = reader.header().sources.iter().map(|source| source.id.clone()).collect();
         Ok(Self {
             sources: vec![None; ids.len()],
@@ -65,7 +69,9 @@ impl Player {
             played: 0,
             unmatched: BTreeMap::new(),
             too_long: 0,
-            clock: clocks::of(files, reader.times())?,
+            clock,
+            dive_clock: clocks::dive_clock(&mut reader, clock)?,
+            is_started: false,
             astray: BTreeMap::new(),
             farthest: (0, Vec::new()),
             reader,
@@ -129,6 +135,11 @@ impl Player {
         self.reader.files()
     }
 
+    /// Returns the dive's clock, the same as the loop's.
+    pub fn dive_clock(&self) -> DiveClock {
+        self.dive_clock
+    }
+
     /// Returns the number of messages sent to the loop so far.
     pub fn played(&self) -> u64 {
         self.played
@@ -166,8 +177,7 @@ impl Player {
     }
 
     fn loss_text(&self, loss: &Loss) -> String {
-        let begun = self.reader.times().map_or(MonoNs(0), |(begun, _)| begun);
-        loss.in_dive_time(begun).to_string()
+        loss.in_dive_time(self.dive_clock).to_string()
     }
 
     /// Returns losses and omissions so far, as text. The cut-off end of the last file is left out.
@@ -206,6 +216,10 @@ impl Player {
             if message.data.len() > MAX_PACKET_BYTES {
                 self.too_long += 1;
                 continue;
+            }
+            if !self.is_started && self.ids.get(index).is_none_or(|id| id != CONSOLE_ID) {
+                // The log may begin with a sensor that the vehicle file doesn't have.
+                (self.dive_clock, self.is_started) = (DiveClock::new(Some(message.log_time)), true);
             }
             self.bytes.clear();
             self.bytes.extend_from_slice(message.data);
@@ -263,7 +277,7 @@ impl PacketSource for Player {
     }
 }
 
-/// Formats a time for messages: seconds of the dive, which begins at `begun`.
-pub fn seconds(at: MonoNs, begun: MonoNs) -> String {
-    format!("{:.3} s", at.since(begun).as_secs_f64())
+/// Formats a time for messages, as dive time.
+pub fn seconds(at: MonoNs, clock: DiveClock) -> String {
+    format!("{:.3} s", clock.seconds(at))
 }

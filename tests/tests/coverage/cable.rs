@@ -80,7 +80,7 @@ fn doubted_after_s(stuck: &Stuck) -> Option<f64> {
         doubted = doubted.or_else(|| dive.view().placed().items.iter().find_map(doubted_at));
     };
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut note).unwrap();
-    let began = dive.view().span().unwrap().0;
+    let began = dive.view().clock().zero().unwrap();
     doubted.map(|at| at.since(began).as_secs_f64() - stuck.from_s)
 }
 

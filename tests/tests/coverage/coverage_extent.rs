@@ -67,8 +67,8 @@ fn left_s(section: &SectionRow, behind_m: f64) -> f64 {
 }
 
 /// Delay of a section's flag after [`left_s`], seconds.
-fn late_s(report: &Report, section: &SectionRow, behind_m: f64) -> f64 {
-    section.flagged_s.unwrap() - report.dive.start_s - left_s(section, behind_m)
+fn late_s(section: &SectionRow, behind_m: f64) -> f64 {
+    section.flagged_s.unwrap() - left_s(section, behind_m)
 }
 
 #[test]
@@ -82,9 +82,9 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     assert!(dark.len() > 16);
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
-        let late_s = late_s(&report, section, HEAD_M);
-        // A flag may be early, because a circle that is centred on the section's start may exceed the target and is
-        // left first. The upper limit allows for one update and the position margin.
+        let late_s = late_s(section, HEAD_M);
+        // The upper limit allows for one update and the position margin. The flag may be raised as soon as the
+        // section's start is left, because a circle centred there may exceed the target.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.go_back.iter().map(|back| back.from_m).fold(0.0, f64::max);
@@ -187,9 +187,9 @@ fn flags_wait_only_for_live_heads() {
     assert!(inner.len() > 10);
     for section in inner {
         fails_by_silence(section, &[1, 2, 3]);
-        // The flag waits only for the front head that still works. This head leaves the section ten seconds before the
-        // silent aft heads.
-        let late_s = late_s(&report, section, -HEAD_M);
+        // The flag waits only for the live front head. This head leaves the section ten seconds before the silent aft
+        // heads.
+        let late_s = late_s(section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
     // One of the four heads is silent, but the vehicle is slow enough for the remaining three.
@@ -274,7 +274,7 @@ fn sections_unseen_because_of_silent_heads_fail_at_once() {
                 "{what}: {}",
                 section.start_m
             );
-            let end_s = report.dive.start_s + report.dive.duration_s;
+            let end_s = report.dive.duration_s;
             assert!(section.flagged_s.unwrap() < end_s - 1e-6, "{what}: {} only at the end", section.start_m);
             dark += 1;
         }
@@ -361,14 +361,13 @@ fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainag
         let report = steady(20.0, &format!("{noise}{}", silence("\"tether\"", span)));
         accounted_for(span, &report);
         let [gap] = &report.position_gaps[..] else { panic!("{span}: {:?}", report.position_gaps) };
-        let begun_s = report.dive.start_s;
-        let true_m = |at_s: f64| START_M + SPEED_MPS * (at_s - begun_s);
+        let true_m = |at_s: f64| START_M + SPEED_MPS * at_s;
         let end_s = if is_over { 120.0 } else { 20.0 / SPEED_MPS };
-        // When the counter works again, its reading is first compared with the estimate. Then there is a fix again.
-        let late_s = gap.to_s - begun_s - end_s;
+        // When the counter is back, its reading is compared with the estimate before there is a fix.
+        let late_s = gap.to_s - end_s;
         assert!((-2.0..15.0).contains(&late_s) && gap.is_over == is_over, "{span}: {gap:?}");
-        assert!((60.0..100.0).contains(&(gap.from_s - begun_s)), "{span}: {gap:?}");
-        // Each of the four heads sends 50 pings per second.
+        assert!((60.0..100.0).contains(&gap.from_s), "{span}: {gap:?}");
+        // 50 pings per second of each of the four heads.
         let pings = 200.0 * (gap.to_s - gap.from_s);
         assert!((gap.pings as f64 - pings).abs() < 0.05 * pings, "{span}: {gap:?}");
         let (from_m, to_m) = (gap.from_m.unwrap(), gap.to_m.unwrap());

@@ -4,6 +4,7 @@
 
 mod alerts;
 mod determinism;
+mod dive_time;
 #[cfg(target_os = "linux")]
 mod faults;
 mod foreign_log;

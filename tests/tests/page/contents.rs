@@ -323,7 +323,7 @@ fn other_programs_can_read_widgets_state_schema_and_metrics() {
     }
     let (_, schema) = serving.ask("GET", "/schema.json", &[], "");
     let schema: Value = serde_json::from_str(schema.split("\r\n\r\n").nth(1).unwrap()).unwrap();
-    assert_eq!(schema["title"], "headrace feed, version 2");
+    assert_eq!(schema["title"], "headrace feed, version 3");
     let (_, figures) = serving.ask("GET", "/metrics", &[], "");
     assert!(figures.contains("\nheadrace_page_viewers 1\n"), "{figures}");
     assert!(figures.contains("\nheadrace_page_dropped_samples_total 0\n"), "{figures}");

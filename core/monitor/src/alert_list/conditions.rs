@@ -72,7 +72,7 @@ impl AlertList {
         self.take_unsure(beat, to);
         self.take_observations(beat, to);
         self.take_sensors(at, state, to);
-        self.take_left(at, state, begun, to);
+        self.take_left(at, state, to);
         self.take_recording(at, to);
         self.take_stall(at, to);
     }
@@ -82,9 +82,8 @@ impl AlertList {
     /// `state` is the live state of the last advice update, with `now` set to `at`.
     pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
         self.take_sensors(at, state, to);
-        // The dive's time runs from the first advice update, not from the start of the program.
-        if let Some(begun) = self.begun {
-            self.take_left(at, state, begun, to);
+        if self.begun.is_some() {
+            self.take_left(at, state, to);
         }
         self.take_recording(at, to);
         self.take_stall(at, to);
@@ -271,10 +270,9 @@ impl AlertList {
     }
 
     /// Checks the remaining cable, time and charge.
-    fn take_left(&mut self, at: MonoNs, state: &LiveState, begun: MonoNs, to: &mut Telling<'_>) {
+    fn take_left(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
         let cable = self.cable_left_m(state.chainage_m).zip(self.limits.cable_m);
-        let time = self.limits.dive_time.map(DurNs::as_secs_f64);
-        let time = time.map(|all_s| (all_s - at.since(begun).as_secs_f64(), all_s));
+        let time = self.time_left_s(at).zip(self.limits.dive_time.map(DurNs::as_secs_f64));
         let battery = self.battery_pct.map(|pct| (pct, 100.0));
         self.observe_left(at, ListKind::CableLeft, cable, CABLE_PCT, to);
         self.observe_left(at, ListKind::TimeLeft, time, TIME_PCT, to);
@@ -310,8 +308,7 @@ impl AlertList {
 
     /// Remaining dive time, seconds; `None` if the dive's duration is unlimited.
     pub(super) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
-        let all = self.limits.dive_time?;
-        Some((all - self.begun.map_or(DurNs(0), |begun| at.since(begun))).as_secs_f64())
+        Some((self.limits.dive_time? - self.clock.time(at)).as_secs_f64())
     }
 
     fn is_active(&self, kind: ListKind, source: Option<SourceId>) -> bool {

@@ -15,7 +15,7 @@ use crate::observations::Occurrences;
 use crate::pilot_text::station;
 use crate::source::SourceInfo;
 use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 
 /// Maximum number of alerts in the JSON list.
 pub const MOST_SHOWN: usize = 64;
@@ -39,15 +39,15 @@ pub struct ListedAlertJson {
     pub advice: String,
     /// State: `active`, `rectified` or `cleared`.
     pub state: AlertState,
-    /// Time at which the alert was first raised, seconds on the log's clock.
+    /// Dive time at which the alert was first raised, seconds.
     pub since_s: f64,
-    /// Time at which the alert's condition ceased to hold, seconds on the log's clock.
+    /// Dive time at which the alert's condition ceased to hold, seconds.
     pub rectified_s: Option<f64>,
-    /// Time at which the alert ended, seconds on the log's clock.
+    /// Dive time at which the alert ended, seconds.
     pub cleared_s: Option<f64>,
     /// Acknowledgement of the alert, if any.
     pub acknowledged: Option<AcknowledgedJson>,
-    /// Time until which the alert's sound is silenced, seconds on the log's clock.
+    /// Dive time until which the alert's sound is silenced, seconds.
     pub silenced_until_s: Option<f64>,
     /// Whether the alert's sound is on now.
     pub sounds: bool,
@@ -103,7 +103,7 @@ pub struct SettingJson {
 pub struct AcknowledgedJson {
     /// Person or device that acknowledged the alert.
     pub by: String,
-    /// Time of the acknowledgement, seconds on the log's clock.
+    /// Dive time of the acknowledgement, seconds.
     pub at_s: f64,
 }
 
@@ -140,7 +140,7 @@ pub struct LeftJson {
 pub struct NoteJson {
     /// Number of the note, from 1.
     pub number: u32,
-    /// Time of the note, seconds on the log's clock.
+    /// Dive time of the note, seconds.
     pub at_s: f64,
     /// Author of the note.
     pub by: String,
@@ -175,11 +175,12 @@ impl NoteJson {
     }
 }
 
-impl From<&Note> for NoteJson {
-    fn from(note: &Note) -> Self {
+impl NoteJson {
+    /// The note as JSON.
+    pub fn of(note: &Note, clock: DiveClock) -> Self {
         Self {
             number: note.number,
-            at_s: note.at.as_secs_f64(),
+            at_s: clock.seconds(note.at),
             by: note.by.as_str().to_owned(),
             text: note.text.as_str().to_owned(),
             voice: note.voice.map(|Spoken { id, seconds }| SpokenJson {
@@ -223,7 +224,7 @@ impl ListedAlert {
     /// The alert as JSON, with its state at time `now`.
     pub fn json(&self, around: &TextContext<'_>, now: MonoNs) -> ListedAlertJson {
         let (from_m, to_m) = self.bounds_m(around.section_m);
-        let seconds = |at: Option<MonoNs>| at.map(MonoNs::as_secs_f64);
+        let seconds = |at: Option<MonoNs>| at.map(|at| around.clock.seconds(at));
         let at_most_mps = match self.figures {
             Figures::Missed(causes, _, mps) => Some(causes.again_mps(mps)),
             Figures::Advice(figures) => Some(figures.v_max_mps),
@@ -239,12 +240,13 @@ impl ListedAlert {
             text: self.text(around),
             advice: self.advice(around),
             state: self.state,
-            since_s: self.since.as_secs_f64(),
+            since_s: around.clock.seconds(self.since),
             rectified_s: seconds(self.rectified),
             cleared_s: seconds(self.cleared),
-            acknowledged: self
-                .acknowledged
-                .map(|by| AcknowledgedJson { by: by.by.as_str().to_owned(), at_s: by.at.as_secs_f64() }),
+            acknowledged: self.acknowledged.map(|by| AcknowledgedJson {
+                by: by.by.as_str().to_owned(),
+                at_s: around.clock.seconds(by.at),
+            }),
             silenced_until_s: seconds(self.silenced_until),
             sounds: self.sounds(now),
             needs_acknowledgement: self.needs_acknowledgement(),

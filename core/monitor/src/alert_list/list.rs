@@ -7,7 +7,7 @@ use super::alert::ListedAlert;
 use super::timer::{self, Timer};
 use headrace_coverage::Stretch;
 use headrace_geometry::snapshot::stateful;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_vehicle::{AlertTiming, LimitsConfig};
 
 /// Maximum number of alerts kept. Beyond this number the oldest cleared alerts are dropped, and neighbouring
@@ -40,6 +40,8 @@ pub struct AlertList {
     pub(super) by_run: Vec<u32>,
     /// Timers that raise and end alerts, by situation.
     pub(super) timers: Vec<Timer>,
+    /// Clock of the dive, from which the remaining dive time is found.
+    pub(crate) clock: DiveClock,
     /// Time of the first advice update.
     pub(super) begun: Option<MonoNs>,
     /// Record of the data and positions that have arrived so far.
@@ -57,7 +59,7 @@ pub struct AlertList {
 }
 
 stateful!(AlertList {
-    state: raised, dropped, begun, had, v_max_mps, x_m, recording_fails, stalled, battery_pct;
+    state: raised, dropped, clock, begun, had, v_max_mps, x_m, recording_fails, stalled, battery_pct;
     lists: alerts, by_run;
     slots: timers;
     fixed: timing, limits;
@@ -75,6 +77,7 @@ impl AlertList {
             dropped: 0,
             by_run: Vec::with_capacity(sections),
             timers: vec![Timer::default(); timer::COUNT],
+            clock: DiveClock::default(),
             begun: None,
             had: Had::default(),
             v_max_mps: 0.0,

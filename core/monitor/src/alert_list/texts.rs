@@ -13,6 +13,7 @@ use crate::source::SourceInfo;
 use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
 use crate::words::{withheld_action, withheld_text};
 use headrace_coverage::{Sections, Stretch};
+use headrace_geometry::time::DiveClock;
 use headrace_geometry::tunnel::Profile;
 
 /// Properties of the dive that the alert texts need.
@@ -28,6 +29,8 @@ pub struct TextContext<'a> {
     pub sections: &'a Sections,
     /// Names of the heads, and the alternative settings that could be advised.
     pub heads: &'a HeadDescriptions,
+    /// Clock of the dive.
+    pub clock: DiveClock,
 }
 
 impl<'a> TextContext<'a> {
@@ -37,8 +40,9 @@ impl<'a> TextContext<'a> {
         profile: &'a Profile,
         sections: &'a Sections,
         heads: &'a HeadDescriptions,
+        clock: DiveClock,
     ) -> Self {
-        Self { sources, profile, section_m: sections.section_m(), sections, heads }
+        Self { sources, profile, section_m: sections.section_m(), sections, heads, clock }
     }
 
     fn unsure(&self, stretch: &Stretch) -> UnsureStretch {

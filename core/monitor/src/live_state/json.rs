@@ -13,16 +13,16 @@ use crate::alert_list::TextContext;
 use crate::alert_list::{AlertCountsJson, LeftJson, ListedAlertJson};
 use crate::pilot_text::{gain_text, station};
 use headrace_coverage::Metres;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::DurNs;
 
 /// The live state as JSON. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LiveStateJson {
     /// Version of this schema.
     pub version: u32,
-    /// Time of publication, seconds on the log's clock.
+    /// Dive time of publication, seconds.
     pub now_s: f64,
-    /// Time of the advice update that made the state; `None` before the first update.
+    /// Dive time of the advice update that made the state, seconds; `None` before the first update.
     pub at_s: Option<f64>,
     /// Age of the state at publication, seconds.
     pub age_s: Option<f64>,
@@ -169,7 +169,7 @@ impl LiveState {
     /// The live state as JSON, with the alerts of the same dive. See
     /// [`DiveView::live_state_json`](crate::view::DiveView::live_state_json).
     pub fn json(&self, around: &TextContext<'_>, alerts: &AlertList) -> LiveStateJson {
-        let TextContext { sources, section_m, .. } = *around;
+        let TextContext { sources, section_m, clock, .. } = *around;
         let (shown, alerts_hidden) = alerts.shown();
         let condition = self.condition();
         let advice = self.advice.as_ref();
@@ -180,8 +180,8 @@ impl LiveState {
         let pass_sd_m = Some(self.pass_sd_m).filter(|_| has_position);
         LiveStateJson {
             version: LIVE_STATE_VERSION,
-            now_s: self.now.as_secs_f64(),
-            at_s: self.at.map(MonoNs::as_secs_f64),
+            now_s: clock.seconds(self.now),
+            at_s: self.at.map(|at| clock.seconds(at)),
             age_s: self.age().map(DurNs::as_secs_f64),
             old: self.is_old(),
             condition: condition.as_str(),

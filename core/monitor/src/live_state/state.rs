@@ -18,7 +18,7 @@ use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_sensor::withheld::WithheldReason;
 
 /// Version of the live state and of its JSON.
-pub const LIVE_STATE_VERSION: u32 = 3;
+pub const LIVE_STATE_VERSION: u32 = 4;
 /// Age above which data is shown as stale. It equals the maximum time between readings of a head that isn't
 /// silent.
 pub const OLD_AFTER: DurNs = DurNs(2_000_000_000);

@@ -9,6 +9,8 @@ use crate::entities::{SensorDecoder, SensorHealth, VehicleEntities};
 use crate::merge::{Inbox, MAX_TICK_PACKETS};
 use crate::messages::Event;
 use crate::unread::UnreadPacket;
+use headrace_geometry::snapshot::stateful;
+use headrace_geometry::time::DiveClock;
 use headrace_sensor::withheld::WithheldReason;
 
 /// Readings of this tick, in order.
@@ -19,11 +21,20 @@ pub(super) struct Events(pub(super) Vec<Event>);
 #[derive(Debug, Default, Resource)]
 pub(super) struct UnreadPackets(pub(super) Vec<UnreadPacket>);
 
-/// Readings of this tick, and its packets without a reading.
+/// Clock of the dive. It starts with the first packet of a sensor.
+#[derive(Debug, Default, Resource)]
+pub(super) struct Started {
+    pub(super) clock: DiveClock,
+}
+
+stateful!(Started { state: clock; });
+
+/// Readings of this tick, its packets without a reading, and the dive's clock.
 #[derive(SystemParam)]
 pub(super) struct Outcomes<'w> {
     events: ResMut<'w, Events>,
     unread: ResMut<'w, UnreadPackets>,
+    started: ResMut<'w, Started>,
 }
 
 /// The operator's input, as a source of commands.
@@ -41,7 +52,7 @@ pub(super) fn decode(
     mut outcomes: Outcomes<'_>,
     mut operator: Operator<'_>,
 ) {
-    let Outcomes { events, unread } = &mut outcomes;
+    let Outcomes { events, unread, started } = &mut outcomes;
     events.0.clear();
     unread.0.clear();
     operator.commands.0.clear();
@@ -56,6 +67,7 @@ pub(super) fn decode(
         let sensor = entities.of_source(source).and_then(|entity| sensors.get_mut(entity).ok());
         debug_assert!(sensor.is_some(), "source {} of a packet has no decoder", source.0);
         let Some((mut decoder, mut health)) = sensor else { continue };
+        started.clock.start(packet.received);
         decoder.0.decode(packet, &mut |mut decoded| {
             sound_speed.pass(source, &mut decoded);
             events.0.push(Event {

@@ -3,13 +3,14 @@
 use serde::Serialize;
 
 use crate::advice_log::AdviceEntry;
+use headrace_geometry::time::DiveClock;
 use headrace_sampling::advice::{Alternative, Left};
 use headrace_sampling::margin::Margins;
 
 /// Speed advice at one time of the dive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AdviceReport {
-    /// Time of the advice, seconds on the log's clock.
+    /// Dive time of the advice, seconds.
     pub at_s: f64,
     /// Chainage of the vehicle, m.
     pub chainage_m: Option<f64>,
@@ -69,10 +70,10 @@ pub struct AlternativeReport {
     pub suffices: Option<bool>,
 }
 
-pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
+pub(super) fn advice_report(entry: &AdviceEntry, clock: DiveClock) -> AdviceReport {
     let (left, others) = (entry.advice.left, entry.advice.alternatives.iter().flatten());
     AdviceReport {
-        at_s: entry.at.as_secs_f64(),
+        at_s: clock.seconds(entry.at),
         chainage_m: entry.chainage_m,
         speed_mps: entry.speed_mps,
         v_max_mps: entry.advice.v_max_mps,

@@ -36,7 +36,7 @@ pub use unsure::NoVerdictReport;
 pub use wall::{SuggestedOpeningReport, WallStretchReport};
 
 /// Version of the report's JSON schema.
-pub const REPORT_VERSION: u32 = 9;
+pub const REPORT_VERSION: u32 = 10;
 
 /// A whole report. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -141,7 +141,8 @@ pub struct PartReport {
 pub struct DiveReport {
     /// Time from the first to the last packet, seconds.
     pub duration_s: f64,
-    /// Time of the first packet on the log's clock, seconds.
+    /// Time of the first packet on the log's clock, seconds. All other times of the report are dive times: seconds since
+    /// this packet.
     pub start_s: f64,
     /// Smallest chainage reached by any head, m.
     pub from_m: Option<f64>,
@@ -238,7 +239,7 @@ pub struct ConsoleReport {
 impl Report {
     /// Creates the report of a loop's results so far.
     pub fn of(dive: &Loop) -> Self {
-        let (coverage, log) = (dive.view().coverage(), dive.advice_log());
+        let (coverage, log, clock) = (dive.view().coverage(), dive.advice_log(), dive.view().clock());
         let sections = &coverage.sections;
         let way = || sections.sections_of(coverage.frontier.way());
         let report = Self {
@@ -271,10 +272,10 @@ impl Report {
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
             alert_list: listed(dive),
             alerts_dropped: dive.view().alert_list().dropped(),
-            notes: dive.view().notes().iter().map(NoteJson::from).collect(),
+            notes: dive.view().notes().iter().map(|note| NoteJson::of(note, clock)).collect(),
             notes_dropped: dive.view().notes().dropped(),
             console: console_report(dive.view().console_counts()),
-            advice: log.entries.iter().map(advice::advice_report).collect(),
+            advice: log.entries.iter().map(|entry| advice::advice_report(entry, clock)).collect(),
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive),
             smoothing: None,
@@ -320,7 +321,7 @@ impl SummaryReport {
 /// Alerts that the list still holds at the end of the dive, in their state at that time.
 fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
     let around = dive.view().surroundings();
-    let now = dive.view().span().map_or(MonoNs(0), |(_, last)| last);
+    let now = dive.view().last_received().unwrap_or(MonoNs(0));
     dive.view().alert_list().iter().map(|alert| alert.json(&around, now)).collect()
 }
 
@@ -338,10 +339,10 @@ fn dive_report(dive: &Loop) -> DiveReport {
     let (coverage, tally) = (dive.view().coverage(), dive.view().tally());
     let [sound_speed_least_mps, sound_speed_most_mps] = dive.sound_speeds_mps();
     let swept = coverage.frontier.swept();
-    let (first, last) = dive.view().span().unwrap_or((MonoNs(0), MonoNs(0)));
+    let (clock, last) = (dive.view().clock(), dive.view().last_received());
     DiveReport {
-        duration_s: last.since(first).as_secs_f64(),
-        start_s: first.as_secs_f64(),
+        duration_s: last.map_or(0.0, |last| clock.seconds(last)),
+        start_s: clock.zero().unwrap_or(MonoNs(0)).as_secs_f64(),
         from_m: swept.map(|reach| reach.from_m),
         to_m: swept.map(|reach| reach.to_m),
         distance_m: swept.map_or(0.0, |reach| reach.to_m - reach.from_m),

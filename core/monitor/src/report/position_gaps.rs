@@ -8,9 +8,9 @@ use crate::surveyor::PositionGap;
 /// A stretch of the dive in which the heads pinged without a position for at least five seconds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PositionGapReport {
-    /// Beginning of the gap, seconds on the log's clock.
+    /// Beginning of the gap, seconds of dive time.
     pub from_s: f64,
-    /// End of the gap, seconds on the log's clock.
+    /// End of the gap, seconds of dive time.
     pub to_s: f64,
     /// Number of pings without a position.
     pub pings: u64,
@@ -31,8 +31,8 @@ pub(super) fn position_gaps(dive: &Loop) -> Vec<PositionGapReport> {
     let report = |gap: &PositionGap| {
         let ends_m = gap.from_m.zip(gap.to_m);
         PositionGapReport {
-            from_s: gap.span[0].as_secs_f64(),
-            to_s: gap.span[1].as_secs_f64(),
+            from_s: view.clock().seconds(gap.span[0]),
+            to_s: view.clock().seconds(gap.span[1]),
             pings: gap.pings,
             from_m: gap.from_m,
             to_m: gap.to_m.map(|to_m| if gap.is_over { to_m } else { to_m.clamp(0.0, end_m) }),

@@ -6,7 +6,6 @@ use crate::pilot_text::CauseFigures;
 use crate::run::Loop;
 use crate::source::SourceInfo;
 use headrace_coverage::{Action, Again, Cause, Run, RunId, Runs, Sections, Verdict};
-use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
 /// A missed stretch: neighbouring sections that are flagged as missed.
@@ -36,9 +35,9 @@ pub struct RunReport {
     pub hole_x_m: f64,
     /// Clock position of the hole's centre, looking along the tunnel.
     pub hole_clock: String,
-    /// Time at which the stretch was first flagged, seconds on the log's clock.
+    /// Dive time at which the stretch was first flagged, seconds.
     pub raised_s: f64,
-    /// Time at which the stretch was cleared or merged into another stretch, seconds on the log's clock; `None` before.
+    /// Dive time at which the stretch was cleared or merged into another one, seconds; `None` before.
     pub cleared_s: Option<f64>,
     /// Number of the stretch into which this stretch was merged.
     pub merged_into: Option<u32>,
@@ -72,7 +71,7 @@ pub struct ReturnReport {
 
 pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
     let (sections, profile) = (&dive.view().coverage().sections, &dive.mission().profile);
-    let heads = head_ids(dive);
+    let (heads, clock) = (head_ids(dive), dive.view().clock());
     let bounds = |run: &Run| (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
     (0..)
         .zip(sections.runs().all())
@@ -92,8 +91,8 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
                 hole_m: hole.diameter_m,
                 hole_x_m: hole.x_m,
                 hole_clock: profile.clock(hole.arc_m),
-                raised_s: run.raised.as_secs_f64(),
-                cleared_s: run.cleared.map(MonoNs::as_secs_f64),
+                raised_s: clock.seconds(run.raised),
+                cleared_s: run.cleared.map(|at| clock.seconds(at)),
                 merged_into: run.merged_into.map(|id| id.0),
             }
         })

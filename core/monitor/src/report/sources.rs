@@ -115,7 +115,7 @@ fn no_reading_text(packets: u64, withheld: u64, reason: Option<WithheldReason>) 
 }
 
 pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
-    let end = dive.view().span().map_or(MonoNs(0), |(_, last)| last);
+    let end = dive.view().last_received().unwrap_or(MonoNs(0));
     let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld()).zip(dive.decoder_clocks());
     dive.sources()
         .iter()

@@ -449,7 +449,7 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
     let passed_s = |chainage_m: f64| {
         let moment = |k: u32| START + DurNs::from_secs_f64(f64::from(k) * MOMENT_S);
         let last = math::floor_to_i64(end_s / MOMENT_S).try_into().unwrap_or(0);
-        (0..=last).map(moment).find(|at| scenery.chainage_m(*at) >= chainage_m).map(MonoNs::as_secs_f64)
+        (0..=last).map(moment).find(|at| scenery.chainage_m(*at) >= chainage_m).map(|at| at.since(START).as_secs_f64())
     };
     let delays: Vec<f64> = dive
         .sections

@@ -53,12 +53,12 @@ pub(crate) fn runs_table<'a>() -> Table<Run<'a>> {
             ),
             Column(
                 "raised_s",
-                "Time of its first flag, s on the log's clock",
+                "Time of its first flag, s of dive time",
                 Get::Number(|row| Some(row.run.raised_s)),
             ),
             Column(
                 "cleared_s",
-                "Time since which none of its sections fails, s on the log's clock",
+                "Time since which none of its sections fails, s of dive time",
                 Get::Number(|row| row.run.cleared_s),
             ),
             Column(

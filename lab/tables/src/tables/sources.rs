@@ -99,22 +99,22 @@ fn life_columns() -> Vec<Column<ListedAlertJson>> {
         Column("state", "`active`, `rectified` or `cleared`", Get::Text(state)),
         Column(
             "since_s",
-            "Time at which it was raised first, s on the log's clock",
+            "Time at which it was raised first, s of dive time",
             Get::Number(|row| Some(row.since_s)),
         ),
         Column(
             "rectified_s",
-            "Time at which its situation ended, s on the log's clock",
+            "Time at which its situation ended, s of dive time",
             Get::Number(|row| row.rectified_s),
         ),
         Column(
             "cleared_s",
-            "Time at which it was cleared, s on the log's clock",
+            "Time at which it was cleared, s of dive time",
             Get::Number(|row| row.cleared_s),
         ),
         Column(
             "acknowledged_s",
-            "Time of its acknowledgement, s on the log's clock",
+            "Time of its acknowledgement, s of dive time",
             Get::Number(|row| Some(row.acknowledged.as_ref()?.at_s)),
         ),
         Column(

@@ -1,7 +1,6 @@
 // A mock dive in the feed's format: a horseshoe of 3 m radius, four heads in phase shift, missed and undecided stretches.
 
 export const TARGET_M = 0.5, SECTION_M = 0.25, RADIUS_M = 3, HEADS = 4, TURN_S = 4, PINGS = 72;
-export const BEGUN_S = 100;
 export const CAUSES = ["too_fast", "angular_step", "missing_returns", "out_of_range", "occluded", "off_axis", "phase",
   "head_stalled", "head_silent", "position_lost", "not_passed", "unknown"];
 export const WHYS = ["not_inspected", "position", "several_stretches", "doubtful_returns", "distrusted_head",
@@ -108,10 +107,10 @@ export function pings(from_s, to_s, xOf, heads) {
   return out;
 }
 
-export function samplesFrame(list, begun_s, seq = 0) {
+export function samplesFrame(list, seq = 0) {
   return frame(2, list.length, 20, (view, at, n) => {
     const sample = list[n];
-    view.setUint32(at, Math.max(0, Math.round((sample.t_s - begun_s) * 1000)), true);
+    view.setUint32(at, Math.max(0, Math.round(sample.t_s * 1000)), true);
     view.setFloat32(at + 4, sample.x_m, true);
     view.setFloat32(at + 8, sample.outcome === 2 ? NaN : sample.y_m, true);
     view.setFloat32(at + 12, sample.outcome === 2 ? NaN : sample.z_m, true);
@@ -122,13 +121,13 @@ export function samplesFrame(list, begun_s, seq = 0) {
 }
 
 /** Samples between two chainages of the trajectory so far: 0.2 m/s, and 0.6 m/s where it was too fast. */
-export function samplesBetween(from_m, to_m, begun_s, most = 200_000) {
+export function samplesBetween(from_m, to_m, most = 200_000) {
   const list = [];
   for (let metre = Math.floor(from_m); metre < to_m; metre += 1) {
     const speed = kindAt(metre + 0.5) === "fast" ? 0.6 : 0.2;
     const t0 = metre / 0.2;
     for (const ping of pings(t0, t0 + 1 / speed, (t) => metre + (t - t0) * speed, [0, 1, 2, 3])) {
-      if (ping.x_m >= from_m && ping.x_m < to_m) list.push({ ...ping, t_s: begun_s + ping.t_s });
+      if (ping.x_m >= from_m && ping.x_m < to_m) list.push(ping);
     }
   }
   const nth = Math.ceil(list.length / most);

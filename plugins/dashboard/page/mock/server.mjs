@@ -4,7 +4,7 @@ import { existsSync, readFileSync } from "node:fs";
 import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { WebSocketServer } from "ws";
-import { SECTION_M, samplesBetween, samplesFrame, sectionsFrame, BEGUN_S } from "./dive.mjs";
+import { SECTION_M, samplesBetween, samplesFrame, sectionsFrame } from "./dive.mjs";
 import { World } from "./world.mjs";
 
 const DIST = fileURLToPath(new URL("../dist/", import.meta.url));
@@ -33,8 +33,8 @@ export async function serve(options = {}) {
     client.send(JSON.stringify({ type: "notes", list: world.notes, seq }));
     client.send(JSON.stringify({ ...world.history(), seq }));
     for (let from = 0; from < to; from += 4096) client.send(sectionsFrame(from, Math.min(to, from + 4096), world.at_m, seq));
-    const recent = samplesBetween(Math.max(0, world.at_m - 2), world.at_m, BEGUN_S);
-    client.send(samplesFrame(recent, BEGUN_S, seq));
+    const recent = samplesBetween(Math.max(0, world.at_m - 2), world.at_m);
+    client.send(samplesFrame(recent, seq));
     client.send(JSON.stringify({ ...world.back(), seq }));
     client.send(JSON.stringify({ ...world.state(), seq }));
     client.send(JSON.stringify({ type: "ready", seq }));
@@ -44,7 +44,7 @@ export async function serve(options = {}) {
     if (ended) return;
     const list = world.step(TICK_MS / 1000);
     for (const change of world.changes.splice(0)) send(change);
-    if (list.length > 0) send(samplesFrame(list, BEGUN_S));
+    if (list.length > 0) send(samplesFrame(list));
     const to = sectionsNow(), from = Math.max(0, Math.min(sectionsTo, to) - 8);
     if (to > from) send(sectionsFrame(from, to, world.at_m, 0));
     sectionsTo = to;
@@ -57,7 +57,7 @@ export async function serve(options = {}) {
     if (command === "pause") world.playback.paused = true;
     else if (command === "go") world.playback.paused = false;
     else if (command === "speed") world.playback.speed = speed;
-    else if (command === "seek") { world.t_s = to_s; world.at_m = Math.min(world.length_m, Math.max(1, (to_s - BEGUN_S) * 0.2)); sectionsTo = 0; }
+    else if (command === "seek") { world.t_s = to_s; world.at_m = Math.min(world.length_m, Math.max(1, to_s * 0.2)); sectionsTo = 0; }
     else { world.playback.paused = false; world.step(command === "step" ? 0.2 : 1.3); world.playback.paused = true; }
     send(world.state());
     return null;
@@ -130,7 +130,7 @@ export async function serve(options = {}) {
       if (!allowed(request)) return answer(401, "text/plain", "a token is needed");
       if (url.pathname === "/state.json") return answer(200, "application/json", JSON.stringify(world.state()));
       const from = Math.max(0, Number(url.searchParams.get("from_m"))), to = Math.min(world.at_m, Number(url.searchParams.get("to_m")));
-      return answer(200, "application/octet-stream", samplesFrame(samplesBetween(from, to, BEGUN_S), BEGUN_S, seq));
+      return answer(200, "application/octet-stream", samplesFrame(samplesBetween(from, to), seq));
     }
     if (url.pathname.startsWith("/voice/")) {
       const id = Number(url.pathname.slice("/voice/".length));

@@ -8,8 +8,8 @@ const SENSORS = [
   { id: "echo_up", plugin: "ping1d", kind: "echosounder" }, { id: "echo_left", plugin: "ping1d", kind: "echosounder" },
   { id: "echo_right", plugin: "ping1d", kind: "echosounder" }, { id: "depth", plugin: "bar100", kind: "depth" },
 ];
-/** UTC of the log's zero: 2026-08-30 06:00:00. */
-const UTC_OF_ZERO_S = Date.UTC(2026, 7, 30, 6) / 1000;
+/** UTC at which the dive begins: 2026-08-30 06:00:00. */
+const BEGUN_UTC_S = Date.UTC(2026, 7, 30, 6) / 1000;
 const station = (m) => `${Math.floor(m / 1000)}+${(m % 1000).toFixed(2).padStart(6, "0")}`;
 /** Speeds as the program writes them. */
 const speedText = (v) => v.toFixed(Math.abs(v) < 0.1 ? 3 : 2);
@@ -18,7 +18,7 @@ const round = (x, n = 4) => Math.round(x * 10 ** n) / 10 ** n;
 export class World {
   constructor({ length_m = 7000, at_m = 6990, mode = "demo", instance = "mock-1" } = {}) {
     Object.assign(this, { length_m, at_m, mode, instance });
-    this.t_s = dive.BEGUN_S + at_m / 0.2;
+    this.t_s = at_m / 0.2;
     this.speed_mps = 0.18;
     this.v_max_mps = 0.24;
     this.condition = "good";
@@ -45,8 +45,8 @@ export class World {
       vehicle: "mock", target_m: dive.TARGET_M, section_m: dive.SECTION_M, confidence_sd: 2, length_m: this.length_m,
       perimeter_m: dive.PERIMETER_M, profile: dive.PROFILE, clock_arc_m: dive.CLOCK_ARC_M,
       heads: SENSORS.slice(0, 4).map(({ id }, source) => ({ id, source, hidden_deg: source < 2 ? [[100, 125]] : [[235, 260]] })),
-      sensors: SENSORS, may: { operate: this.mode !== "replay", playback: this.mode !== "live" }, begun_s: dive.BEGUN_S, utc_of_zero_s: UTC_OF_ZERO_S,
-      causes: dive.CAUSES, whys: dive.WHYS, span_s: this.mode === "replay" ? [dive.BEGUN_S, dive.BEGUN_S + this.length_m / 0.2] : null,
+      sensors: SENSORS, may: { operate: this.mode !== "replay", playback: this.mode !== "live" }, begun_utc_s: BEGUN_UTC_S,
+      causes: dive.CAUSES, whys: dive.WHYS, span_s: this.mode === "replay" ? [0, this.length_m / 0.2] : null,
       tokens_needed: false };
   }
 
@@ -54,7 +54,7 @@ export class World {
   seedAlerts() {
     for (let k = Math.max(0, Math.floor(this.at_m / 137) - 4); k * 137 + 18.25 < this.at_m - 1; k += 1) {
       const alert = this.missed(k * 137 + 12);
-      alert.since_s = dive.BEGUN_S + alert.to_m / 0.2;
+      alert.since_s = alert.to_m / 0.2;
       alert.acknowledged = { by: "AB", at_s: alert.since_s + 6 };
     }
   }
@@ -155,8 +155,7 @@ export class World {
       }
     }
     const heads = [0, 1, 2, 3].filter((head) => !this.dead.has(SENSORS[head].id));
-    return dive.pings(from_s - dive.BEGUN_S, this.t_s - dive.BEGUN_S, (t) => from_m + (t - (from_s - dive.BEGUN_S)) * speed, heads)
-      .map((ping) => ({ ...ping, t_s: ping.t_s + dive.BEGUN_S }));
+    return dive.pings(from_s, this.t_s, (t) => from_m + (t - from_s) * speed, heads);
   }
 
   state() {
@@ -179,13 +178,13 @@ export class World {
       cannot_say: null,
       alert_counts: { unacknowledged: this.alerts.filter((a) => a.needs_acknowledgement && !a.acknowledged).length, active: this.alerts.length },
       alert_list: this.alerts.slice(-64), alerts_hidden: Math.max(0, this.alerts.length - 64),
-      left: { cable_m: round(7400 - x, 1), time_s: Math.max(0, 40_000 - (this.t_s - dive.BEGUN_S)), battery_pct: 63 },
+      left: { cable_m: round(7400 - x, 1), time_s: Math.max(0, 40_000 - this.t_s), battery_pct: 63 },
       pose: none ? null : { y_m: 0.3 * Math.sin(this.t_s / 5), z_m: 3 + 0.2 * Math.cos(this.t_s / 6), roll_deg: 3 * Math.sin(this.t_s / 3), pitch_deg: 1.2, yaw_deg: yaw },
       echosounders: ["up", "left", "right"].map((side, n) => ({ id: `echo_${side}`, range_m: [3, 2.8, 3.2][n], age_s: age(`echo_${side}`),
         from: [0.3 * Math.sin(this.t_s / 5), 3], to: [[0.1, 5.99], [2.99, 2.9], [-2.99, 3.1]][n] })),
       rates: SENSORS.map(({ id }, n) => ({ id, hz: this.dead.has(id) ? 0 : n < 4 ? 18 : [10, 50, 20, 20, 20, 5][n - 4] })),
       recording: this.recording,
-      playback: this.playback ? { ...this.playback, at_s: round(this.t_s), from_s: dive.BEGUN_S, to_s: dive.BEGUN_S + this.length_m / 0.2 } : null,
+      playback: this.playback ? { ...this.playback, at_s: round(this.t_s), from_s: 0, to_s: this.length_m / 0.2 } : null,
       ...this.texts(v, missed), ...this.over };
   }
 

@@ -5,7 +5,7 @@ import { readFileSync } from "node:fs";
 import { deflateRawSync } from "node:zlib";
 import { createServer } from "node:http";
 import { serve } from "../mock/server.mjs";
-import { samplesBetween, samplesFrame, sectionsFrame, BEGUN_S } from "../mock/dive.mjs";
+import { samplesBetween, samplesFrame, sectionsFrame } from "../mock/dive.mjs";
 import { World } from "../mock/world.mjs";
 import { MICROPHONE, browser, open, withoutWebGl } from "./browser.mjs";
 
@@ -645,7 +645,7 @@ describe("exported dive", () => {
     const text = (message) => add(0, Buffer.from(JSON.stringify(message)));
     text({ ...world.hello(), mode: "file", thinned: 1200 });
     add(1, sectionsFrame(0, 240, world.at_m, 0));
-    add(1, samplesFrame(samplesBetween(0, 60, BEGUN_S), BEGUN_S));
+    add(1, samplesFrame(samplesBetween(0, 60)));
     text({ type: "alerts", list: [{ ...world.missed(40), acknowledged: { by: "AB", at_s: 1 } }] });
     text({ type: "notes", list: [{ number: 1, at_s: 300, by: "AB", text: "rubble", chainage_m: 20, station: "0+020" }] });
     text(world.history());

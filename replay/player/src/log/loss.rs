@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 use serde::{Deserialize, Serialize};
 
 use super::limits::LATEST;
@@ -284,10 +284,10 @@ impl LossKind {
 }
 
 impl Loss {
-    /// Returns the loss with times counted from `begun`, the beginning of the log.
+    /// The same loss with dive times.
     #[must_use]
-    pub fn in_dive_time(&self, begun: MonoNs) -> Self {
-        let dive_time = |at: MonoNs| MonoNs(at.0.saturating_sub(begun.0));
+    pub fn in_dive_time(&self, clock: DiveClock) -> Self {
+        let dive_time = |at: MonoNs| MonoNs(0) + clock.time(at);
         Self { from: self.from.map(dive_time), to: self.to.map(dive_time), ..self.clone() }
     }
 

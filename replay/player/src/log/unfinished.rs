@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DiveClock, MonoNs};
 
 use super::backlog::Tally;
 use super::dive_log::DiveLog;
@@ -62,10 +62,9 @@ impl Interrupted {
         Loss { kind, offset: 0, bytes: 0, from: Some(recording.last), to: Some(*to) }
     }
 
-    /// Returns the text of the loss, with times of the dive.
-    pub fn loss_text(&self) -> String {
-        let begun = self.recording.span.map_or(MonoNs(0), |(begun, _)| begun);
-        self.loss().in_dive_time(begun).to_string()
+    /// Returns the text of the loss, with dive times.
+    pub fn loss_text(&self, clock: DiveClock) -> String {
+        self.loss().in_dive_time(clock).to_string()
     }
 }
 

@@ -80,13 +80,12 @@ export function seekFile(at_s: number): void {
   const state = stateAt(dive, entry);
   if (!state) return;
   const from_s = dive.t_s[0] ?? 0;
-  const begun_s = store.hello?.begun_s ?? 0;
-  const upTo_ms = ((dive.t_s[entry] ?? 0) - begun_s) * 1000;
+  const upTo_ms = (dive.t_s[entry] ?? 0) * 1000;
   store.turns.clear();
   store.turns.take(chosen(dive, (view, at) => {
     const t_ms = view.getUint32(at, true);
     return t_ms <= upTo_ms && t_ms > upTo_ms - TURNS_MS;
-  }), begun_s);
+  }));
   store.topics.samples.changed();
   store.end = isLast(dive, entry) ? dive.end : null;
   store.take({ ...state, playback: { paused: true, speed: null, at_s: dive.t_s[entry] ?? 0, from_s, to_s: dive.t_s.at(-1) ?? 0 } });

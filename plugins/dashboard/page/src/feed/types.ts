@@ -17,7 +17,7 @@ export interface Hello {
   length_m: number | null; perimeter_m: number; profile: [number, number][]; clock_arc_m: number[];
   heads: Head[]; sensors: { id: string; plugin: string; kind: string }[];
   may: { operate: boolean; playback: boolean };
-  begun_s: number; utc_of_zero_s: number | null; causes: string[]; whys: string[];
+  begun_utc_s: number | null; causes: string[]; whys: string[];
   span_s: [number, number] | null; tokens_needed: boolean; thinned?: number | null;
 }
 
@@ -56,8 +56,8 @@ export interface State {
   ended?: boolean;
   alert_list?: Alert[]; alerts_hidden?: number;
   left?: { cable_m: number | null; time_s: number | null; battery_pct: number | null } | null;
-  /** Time at which the dive began. The hello of a page that was opened before states 0. */
-  begun_s?: number | null;
+  /** UTC at which the dive began. The hello of a page that was opened before states null. */
+  begun_utc_s?: number | null;
   pose?: { y_m: number; z_m: number; roll_deg: number; pitch_deg: number; yaw_deg: number } | null;
   echosounders?: Echosounder[];
   rates?: { id: string; hz: number }[];

@@ -3,7 +3,7 @@ import { seekFile, send, stepFile } from "../feed/client";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { hasEnded } from "../store/age";
-import { diveTime } from "../text/times";
+import { clock } from "../text/format";
 import { Time } from "../ui/Time";
 
 const SPEEDS: (number | null)[] = [0.25, 0.5, 1, 2, 4, 8, 16, 64, null];
@@ -59,7 +59,7 @@ export function Replay() {
       <button type="button" disabled={off} onClick={play.step} title="Step (.)">{file ? "+1 s" : "Step"}</button>
       <button type="button" disabled={off} onClick={play.section} title="Step by a section (,)">{file ? "+10 s" : "Section"}</button>
       <input type="range" min={from_s} max={Math.max(to_s, from_s + 0.1)} step="any" value={at_s} disabled={off} aria-label="Time of the dive"
-        aria-valuetext={`${diveTime(store.hello, at_s)} of ${diveTime(store.hello, to_s)}`} onChange={(event) => play.to(Number(event.currentTarget.value))}
+        aria-valuetext={`${clock(at_s)} of ${clock(to_s)}`} onChange={(event) => play.to(Number(event.currentTarget.value))}
         onInput={(event) => file && play.to(Number(event.currentTarget.value))} />
       <span class="at"><Time at_s={at_s} /> / <Time at_s={to_s} /></span>
       {file && !hasEnded(store) ? <span class="count">wall and alerts: state at the end</span> : null}

@@ -4,8 +4,8 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { prefsTopic } from "../store/prefs";
 import { store } from "../store/store";
-import { figure } from "../text/format";
-import { diveTime, utcOf } from "../text/times";
+import { clock, figure } from "../text/format";
+import { utcOf } from "../text/times";
 import { useSize } from "../ui/canvas";
 import { colour } from "../ui/colours";
 
@@ -15,7 +15,7 @@ function options(width: number, height: number): uPlot.Options {
     width, height, legend: { show: false }, cursor: { show: false }, padding: [6, 18, 0, 0],
     scales: { x: { time: false }, y: { range: (_, __, most) => [0, Math.max(0.1, (Number.isFinite(most) ? most : 0) * 1.15)] } },
     axes: [
-      { ...axis, size: 22, values: (_, ticks) => ticks.map((t) => diveTime(store.hello, t)) },
+      { ...axis, size: 22, values: (_, ticks) => ticks.map((t) => clock(t)) },
       { ...axis, size: 40, values: (_, ticks) => ticks.map((v) => figure(v, 2)) },
     ],
     series: [
@@ -43,7 +43,7 @@ export function History() {
   const hover = (event: PointerEvent): void => {
     if (!plot.current || !box.current) return;
     const at_s = plot.current.posToVal(event.clientX - plot.current.over.getBoundingClientRect().left, "x");
-    box.current.title = [diveTime(store.hello, at_s), utcOf(store.hello, at_s)].filter((part) => part !== "").join(", ");
+    box.current.title = [clock(at_s), utcOf(store.hello, at_s)].filter((part) => part !== "").join(", ");
   };
   const box = useSize<HTMLDivElement>(({ width, height }) => plot.current?.setSize({ width: Math.max(width, 50), height: Math.max(height, 40) }));
   useEffect(() => {

@@ -104,7 +104,7 @@ export class Store {
       this.sections.take(frame);
       this.topics.sections.changed();
     } else {
-      this.turns.take(frame, this.hello?.begun_s ?? 0);
+      this.turns.take(frame);
       this.sampleListeners.forEach((listener) => listener(frame));
       this.topics.samples.changed();
     }
@@ -147,7 +147,7 @@ export class Store {
     this.state = state;
     this.state_ms = performance.now();
     // A page that was open before the dive's first data learns only now when the dive began.
-    if (this.hello && state.begun_s) this.hello.begun_s = state.begun_s;
+    if (this.hello && state.begun_utc_s) this.hello.begun_utc_s = state.begun_utc_s;
     if (state.alerts_hidden !== undefined && state.alerts_hidden !== this.alertsHidden) {
       this.alertsHidden = state.alerts_hidden;
       this.topics.alerts.changed();
@@ -158,6 +158,7 @@ export class Store {
       this.end = null;
       if (state.alert_list) this.takeAlerts({ list: state.alert_list });
     } else if (this.link.phase === "file" && state.alert_list) this.takeAlerts({ list: state.alert_list });
+    else this.renewAlerts(state.alert_list ?? []);
     this.topics.state.changed();
     this.grow(state);
   }
@@ -185,6 +186,14 @@ export class Store {
     for (const alert of list) {
       if (!before.has(alert.number)) this.alertListeners.forEach((listener) => listener(alert, "listed"));
     }
+  }
+
+  /** Takes the figures of known alerts from a state: they also change without an `alert_change`. */
+  private renewAlerts(list: Alert[]): void {
+    const differs = (alert: Alert): boolean => JSON.stringify(this.alerts.get(alert.number)) !== JSON.stringify(alert);
+    const changed = list.filter((alert) => this.alerts.has(alert.number) && differs(alert));
+    for (const alert of changed) this.alerts.set(alert.number, alert);
+    if (changed.length > 0) this.topics.alerts.changed();
   }
 
   private takeAlertChange({ change, alert }: { change: string; alert: Alert }): void {

@@ -53,13 +53,13 @@ export class Turns {
     this.heads = [];
   }
 
-  take(frame: Frame, begun_s: number): void {
+  take(frame: Frame): void {
     const { view, count } = frame;
     for (let at = 0; at < count * SAMPLE_BYTES; at += SAMPLE_BYTES) {
       const head = view.getUint8(at + 18);
       while (this.heads.length <= head) this.heads.push(new HeadTurns());
       this.heads[head]?.take({
-        t_s: begun_s + view.getUint32(at, true) / 1000,
+        t_s: view.getUint32(at, true) / 1000,
         x_m: view.getFloat32(at + 4, true),
         y_m: view.getFloat32(at + 8, true),
         z_m: view.getFloat32(at + 12, true),

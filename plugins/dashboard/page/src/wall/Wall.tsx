@@ -78,7 +78,7 @@ class Painter {
   }
 
   live(frame: Parameters<SampleWindow["take"]>[0]): void {
-    this.window.take(frame, 0);
+    this.window.take(frame);
   }
 
   stripView(): View {
@@ -153,15 +153,15 @@ class Painter {
     if (!store.ready) return null;
     this.window.round = this.round;
     this.window.seam = widest_m / 2 / hello.perimeter_m;
-    this.window.want(from, to, way, 0);
+    this.window.want(from, to, way);
     if (!this.window.covers(Math.max(from, way[0]), Math.min(to, way[1]))) return null;
     this.turns.fill(Infinity);
     store.turns.heads.forEach((head, at) => {
       const first = head.present[0];
-      if (first && at < 16) this.turns[at] = first.t_s - hello.begun_s - 0.0005;
+      if (first && at < 16) this.turns[at] = first.t_s - 0.0005;
     });
     // Live samples may arrive shortly before their state.
-    const now_s = store.link.phase === "file" ? (store.state?.now_s ?? 0) - hello.begun_s : 1e9;
+    const now_s = store.link.phase === "file" ? (store.state?.now_s ?? 0) : 1e9;
     return { samples: this.window, now_s, radius_m: target_m / 2, perimeter_m: hello.perimeter_m, turn_t_s: this.turns };
   }
 

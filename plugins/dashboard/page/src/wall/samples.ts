@@ -49,7 +49,7 @@ export class SampleWindow {
   }
 
   /** Loads the samples between two chainages. `way` is the range of chainages that has samples. */
-  want(from_m: number, to_m: number, way: [number, number], begun_s: number): void {
+  want(from_m: number, to_m: number, way: [number, number]): void {
     const from = Math.max(from_m, way[0]), to = Math.min(to_m, way[1]);
     if (!(to > from) || this.covers(from, to)) return;
     if (this.thinned && from_m >= this.from_m && to_m <= this.to_m && to_m - from_m > (this.to_m - this.from_m) * 0.4) return;
@@ -69,7 +69,7 @@ export class SampleWindow {
         this.asked = null;
         this.stale = false;
         this.thinned = oneOf > 1;
-        this.fill(frame, wantFrom, wantTo, way, begun_s);
+        this.fill(frame, wantFrom, wantTo, way);
         this.changed();
       },
       () => {
@@ -79,20 +79,20 @@ export class SampleWindow {
     );
   }
 
-  private fill(frame: Frame, from_m: number, to_m: number, way: [number, number], begun_s: number): void {
+  private fill(frame: Frame, from_m: number, to_m: number, way: [number, number]): void {
     this.origin_m = Math.round((from_m + to_m) / 2);
     // Beyond the ends of the coverage extent, all samples are live ones, so the window is open-ended there.
     this.from_m = from_m <= way[0] ? -Infinity : from_m;
     this.to_m = to_m >= way[1] ? Infinity : to_m;
     this.count = this.uploaded = 0;
-    this.add(frame, begun_s);
+    this.add(frame);
   }
 
   /** Adds live samples within the window. */
-  take(frame: Frame, begun_s: number): void {
+  take(frame: Frame): void {
     if (Number.isNaN(this.from_m)) return;
     if (frame.count > WHOLE_LIVE) this.stale = true;
-    this.add(frame, begun_s);
+    this.add(frame);
   }
 
   private put(x: number, down: number, t_s: number, kind: number): void {
@@ -101,7 +101,7 @@ export class SampleWindow {
     this.count += 1;
   }
 
-  private add(frame: Frame, begun_s: number): void {
+  private add(frame: Frame): void {
     const { view, count } = frame;
     if (this.count + count > CAPACITY) {
       this.clear();
@@ -111,7 +111,7 @@ export class SampleWindow {
       const x = view.getFloat32(at + 4, true);
       if (!(x >= this.from_m && x <= this.to_m)) continue;
       const down = downOf(this.round, view.getUint16(at + 16, true) / 65536);
-      const t_s = begun_s + view.getUint32(at, true) / 1000;
+      const t_s = view.getUint32(at, true) / 1000;
       const kind = Math.min(view.getUint8(at + 18), 15) + 16 * view.getUint8(at + 19);
       this.put(x - this.origin_m, down, t_s, kind);
       if (down < this.seam) this.put(x - this.origin_m, down + 1, t_s, kind);
