@@ -309,7 +309,7 @@ impl AlertList {
     }
 
     /// Remaining dive time, seconds; `None` if the dive's duration is unlimited.
-    pub(super) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
+    pub(crate) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
         let all = self.limits.dive_time?;
         Some((all - self.begun.map_or(DurNs(0), |begun| at.since(begun))).as_secs_f64())
     }
