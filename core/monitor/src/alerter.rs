@@ -5,6 +5,8 @@ use super::adviser::Advised;
 use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};
 use super::console::command::Command;
 use super::console::packets::ReceivedCommand;
+use super::dive_plan::planner::{Now, PlanSettings, Planner};
+use super::dive_plan::route::StepKind;
 use super::live_state::{LiveState, PositionDoubt, PositionState, source_bits};
 use super::merge::MAX_TICK_PACKETS;
 use super::messages::{Doubts, Event, Notice, PlacedItem, Placement, Standing, Update};
@@ -43,6 +45,7 @@ pub struct Alerter {
     pub(super) notices: Vec<Notice>,
     /// Sources of the heads, by number.
     heads: Vec<SourceId>,
+    planner: Planner,
 }
 
 impl Alerter {
@@ -53,8 +56,8 @@ impl Alerter {
         list: AlertList,
         state: &LiveState,
         heads: Vec<SourceId>,
-        runs: usize,
-        keeps_results: bool,
+        plan: PlanSettings,
+        (runs, keeps_results): (usize, bool),
     ) -> Self {
         let (mut states, mut changes) = (ResultStream::default(), ResultStream::default());
         if keeps_results {
@@ -71,6 +74,7 @@ impl Alerter {
             changes,
             notices,
             heads,
+            planner: Planner::new(plan),
         }
     }
 
@@ -156,10 +160,21 @@ impl Alerter {
         if self.state.position == PositionState::Ok {
             self.state.sure_v_max_mps = self.state.v_max_mps();
         }
+        self.plan(*at, situation, standing);
         digest(&mut self.states, *at, situation, &self.state);
         let as_of = LiveState { now: *at, ..self.state };
         let Doubts { setting, unverified_mounts, .. } = *doubts;
         self.take_beat(&Beat { at: *at, state: &as_of, setting, unverified_mounts });
+    }
+
+    /// Plans the rest of the dive. While the vehicle goes back, its destination is that of the plan.
+    fn plan(&mut self, at: MonoNs, situation: &Situation, standing: &Standing) {
+        let v_max_mps = self.state.v_max_mps().filter(|_| self.state.position == PositionState::Ok);
+        let now = Now { at, situation, v_max_mps, left_s: self.list.time_left_s(at) };
+        self.state.plan = self.planner.update(&now, &standing.missed, self.state.plan);
+        let next = self.state.plan.and_then(|plan| plan.steps.first().copied().flatten());
+        let back = next.filter(|step| step.kind == StepKind::Go && step.to_m < step.from_m);
+        self.state.back_to_m = self.state.back_to_m.map(|to_m| back.map_or(to_m, |step| step.to_m));
     }
 
     pub(super) fn save(&self, to: &mut Saver) {
@@ -169,6 +184,8 @@ impl Alerter {
         self.notes.save(to);
         to.part("live state");
         self.state.save(to);
+        to.part("plan");
+        self.planner.save(to);
         to.part("streams of the alerter");
         to.value(&self.without_effect);
         self.states.save(to);
@@ -182,6 +199,8 @@ impl Alerter {
         self.notes.restore(from)?;
         from.part("live state")?;
         self.state.restore(from)?;
+        from.part("plan")?;
+        self.planner.restore(from)?;
         from.part("streams of the alerter")?;
         self.without_effect = from.value()?;
         self.states.restore(from)?;

@@ -9,6 +9,7 @@ use super::alert_list::AlertList;
 use super::alerter::Alerter;
 use super::app::App;
 use super::console::Console;
+use super::dive_plan::planner::PlanSettings;
 use super::entities::{
     Head, HeadClassifier, HeadEntities, HeadFrontier, HeadSpecification, HeadSweep, HiddenAngles, LossCount,
     MeasuredMotion, Mounted, Navigator, VehicleEntities, VehicleState,
@@ -46,6 +47,8 @@ const ROOM_BEYOND_M: f64 = 25.0;
 const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 40_000_000.0;
+/// Usual speed of a vehicle that is not inspecting, m/s.
+const TRANSIT_MPS: f64 = 0.2;
 
 impl App {
     /// Allocates all memory of the loop and makes it ready to run. No tick allocates or locks afterwards.
@@ -79,8 +82,8 @@ impl App {
         placer.insert_state("speed of sound", sound_speed);
         let placer = Placer::new(placer, readers, keeps_results)?;
         let live = live_state(&mission, &head_sources, sources.len(), reach_m);
-        let alerter =
-            Alerter::new(list, &live, head_sources, surveyor.found().runs.capacity(), keeps_results);
+        let room = (surveyor.found().runs.capacity(), keeps_results);
+        let alerter = Alerter::new(list, &live, head_sources, plan_settings(&mission, reach_m), room);
         let about = About { mission, sources, descriptions };
         Ok(Loop::new(about, Parts { placer, surveyor, adviser, alerter }, outlets, ports))
     }
@@ -160,6 +163,16 @@ fn plan(placer: &mut World, mission: &Mission) -> Plan {
         layout: mission.layout,
         planned_speed_mps: mission.planned_speed_mps,
         other: other_settings::of_heads(placer, &mission.profile, mission.target.max_hole_m),
+    }
+}
+
+fn plan_settings(mission: &Mission, heads_reach_m: f64) -> PlanSettings {
+    let Mission { limits, length_m, planned_speed_mps, target, .. } = mission;
+    PlanSettings {
+        end_m: limits.cable_m.map_or(*length_m, |cable_m| cable_m.min(*length_m)),
+        transit_mps: limits.transit_mps.unwrap_or(TRANSIT_MPS),
+        planned_mps: *planned_speed_mps,
+        run_up_m: heads_reach_m + target.max_hole_m,
     }
 }
 

@@ -33,6 +33,7 @@ mod arm;
 pub mod byte_ring;
 pub mod console;
 pub mod digest;
+pub mod dive_plan;
 pub mod entities;
 mod error;
 pub mod feed;

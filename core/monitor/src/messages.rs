@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::advice_log::AdviceEntry;
 use super::notes::Note;
 use crate::alert_list::alert::{AlertChange, ListedAlert};
+use crate::dive_plan::missed::MissedList;
 use crate::live_state::state::ActiveObservations;
 use headrace_coverage::{Judgement, Loss, Metres, Reach, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
@@ -158,6 +159,8 @@ pub struct Standing {
     /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
     /// way there.
     pub back_to_m: Option<f64>,
+    /// Missed stretches, from which the plan for the rest of the dive is made.
+    pub(crate) missed: MissedList,
     /// Observations about the dive that hold at the advice update.
     pub(crate) observations: ActiveObservations,
 }

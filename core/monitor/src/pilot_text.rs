@@ -205,7 +205,7 @@ pub fn actions_text(
 }
 
 /// Text of an action that follows another action in a sentence.
-fn short_text(action: Action, heads: &HeadDescriptions) -> String {
+pub(crate) fn short_text(action: Action, heads: &HeadDescriptions) -> String {
     let text = match action {
         Action::Slower => "slower",
         Action::FinerMode => return format!("in {}", heads.finer_mode()),

@@ -124,6 +124,8 @@ pub struct LimitsConfig {
     pub cable_m: Option<f64>,
     /// Maximum duration of the dive.
     pub dive_time: Option<DurNs>,
+    /// Speed of the vehicle while it is not inspecting, m/s.
+    pub transit_mps: Option<f64>,
 }
 
 impl LimitsConfig {
@@ -133,8 +135,10 @@ impl LimitsConfig {
     pub(super) fn parse(section: &Section<'_>) -> Result<Self, ConfigError> {
         let cable_m = section.number("cable_m", 1.0..=100_000.0)?;
         let dive_min = section.number("dive_min", 1.0..=60_000.0)?;
+        let transit_mps = section.number("transit_mps", 0.01..=5.0)?;
         section.finish()?;
-        Ok(Self { cable_m, dive_time: dive_min.map(|min| DurNs::from_secs_f64(min * 60.0)) })
+        let dive_time = dive_min.map(|min| DurNs::from_secs_f64(min * 60.0));
+        Ok(Self { cable_m, dive_time, transit_mps })
     }
 }
 
@@ -174,8 +178,8 @@ mod tests {
         };
         let dive_time = Some(DurNs(5_400_000_000_000));
         assert_eq!(
-            limits("cable_m = 300\ndive_min = 90"),
-            Ok(LimitsConfig { cable_m: Some(300.0), dive_time })
+            limits("cable_m = 300\ndive_min = 90\ntransit_mps = 0.3"),
+            Ok(LimitsConfig { cable_m: Some(300.0), dive_time, transit_mps: Some(0.3) })
         );
         assert_eq!(limits(""), Ok(LimitsConfig::default()));
         assert!(limits("cable_m = 0").is_err() && limits("dive_min = \"90\"").is_err());

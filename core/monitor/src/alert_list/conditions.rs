@@ -307,7 +307,7 @@ impl AlertList {
     }
 
     /// Remaining dive time, seconds; `None` if the dive's duration is unlimited.
-    pub(super) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
+    pub(crate) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
         Some((self.limits.dive_time? - self.clock.time(at)).as_secs_f64())
     }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::advice_log::AdviceEntry;
+use crate::dive_plan::missed::MissedList;
 use crate::fixtures::{advice, situation};
 use crate::messages::Doubts;
 use headrace_coverage::{
@@ -15,6 +16,8 @@ use headrace_sensor::reading::Reading;
 use headrace_vehicle::{AlertTiming, LimitsConfig};
 
 const AT: MonoNs = MonoNs(9_000_000_000);
+const SETTINGS: PlanSettings =
+    PlanSettings { end_m: 100.0, transit_mps: 0.2, planned_mps: 0.1, run_up_m: 0.5 };
 
 /// Live state after an advice update with this position error between passes.
 ///
@@ -36,13 +39,15 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
         unsure: None,
         passed: false,
         back_to_m: None,
+        missed: MissedList::default(),
         observations: [None; crate::observations::MOST_OBSERVATIONS],
     };
     let found = Found { standings: vec![standing], runs: Vec::new(), notices: Vec::new() };
     let entry = AdviceEntry { at: AT, chainage_m: None, speed_mps: 0.07, advice: advice(&situation) };
     let advised = Advised { entries: vec![entry], ..Advised::default() };
     let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
-    let mut alerter = Alerter::new(list, &LiveState::new(Target::new(0.5), 0, 0), Vec::new(), 0, false);
+    let live = LiveState::new(Target::new(0.5), 0, 0);
+    let mut alerter = Alerter::new(list, &live, Vec::new(), SETTINGS, (0, false));
     alerter.tick(&placed, &found, &advised, MonoNs(9_050_000_000));
     alerter.state
 }
@@ -120,7 +125,13 @@ impl Bench {
         let command = Command::Acknowledge { alert: 0, by: crate::console::Who::default() };
         let list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100);
         Self {
-            alerter: Alerter::new(list, &LiveState::new(Target::new(0.5), 0, 3), Vec::new(), 1, false),
+            alerter: Alerter::new(
+                list,
+                &LiveState::new(Target::new(0.5), 0, 3),
+                Vec::new(),
+                SETTINGS,
+                (1, false),
+            ),
             run,
             command: ReceivedCommand { before: command_before, before_unread: 0, at: NOW, command },
             events: (0..10).map(event).collect(),

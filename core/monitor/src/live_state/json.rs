@@ -11,6 +11,8 @@ use super::texts::SpeedTexts;
 use crate::alert_list::AlertList;
 use crate::alert_list::TextContext;
 use crate::alert_list::{AlertCountsJson, LeftJson, ListedAlertJson};
+use crate::dive_plan::route::{DivePlan, DiveStep, Roll, StepKind};
+use crate::dive_plan::texts::{fits_text, step_text};
 use crate::pilot_text::{gain_text, station};
 use headrace_coverage::Metres;
 use headrace_geometry::time::DurNs;
@@ -42,6 +44,8 @@ pub struct LiveStateJson {
     pub speeds: SpeedTexts,
     /// Text about missed stretches, the same on all screens; `None` if there are none.
     pub outstanding: Option<String>,
+    /// Plan for the rest of the dive; `None` without a position or without missed stretches.
+    pub plan: Option<PlanJson>,
     /// Reason that limits the speed; `None` before the first advice.
     pub reason: Option<&'static str>,
     /// Margins of speed and turn, the part of the target that position errors use up, and the share of lost
@@ -65,6 +69,70 @@ pub struct LiveStateJson {
     pub alert_list: Vec<ListedAlertJson>,
     /// Number of live alerts that have no room in `alert_list`.
     pub alerts_hidden: usize,
+}
+
+/// Plan for the rest of the dive.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlanJson {
+    /// The next steps, at most three.
+    pub steps: Vec<PlanStepJson>,
+    /// Number of all steps.
+    pub step_count: u16,
+    /// Text about the time that the plan takes, the same on all screens.
+    pub fits: String,
+    /// Whether all missed stretches and the tunnel ahead fit into the remaining time.
+    pub all_fits: bool,
+    /// Time to the end of the dive at the portal, seconds.
+    pub takes_s: f64,
+    /// Missed length for which the remaining time is too short, m.
+    pub stays_missed_m: f64,
+    /// Length of tunnel ahead for which the remaining time is too short, m.
+    pub stays_ahead_m: f64,
+}
+
+/// Step of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlanStepJson {
+    /// Kind of the step: `go`, `inspect`, `go_on` or `home`.
+    pub kind: StepKind,
+    /// Instruction, the same on all screens.
+    pub text: String,
+    /// Chainage at which the step begins, m.
+    pub from_m: f64,
+    /// Chainage at which the step ends, m.
+    pub to_m: f64,
+    /// Largest speed, m/s; `None` for any speed, or if no speed is known to meet the target.
+    pub at_most_mps: Option<f64>,
+    /// Roll of the vehicle: `level`, `left` or `right`.
+    pub roll: Roll,
+    /// Number of the missed stretch; `None` for other steps.
+    pub run: Option<u32>,
+    /// Time from now to the end of the step, seconds.
+    pub ends_s: f64,
+}
+
+impl PlanJson {
+    fn of(plan: &DivePlan, around: &TextContext<'_>) -> Self {
+        let step = |step: &DiveStep| PlanStepJson {
+            kind: step.kind,
+            text: step_text(step, around.heads),
+            from_m: step.from_m,
+            to_m: step.to_m,
+            at_most_mps: step.at_most_mps,
+            roll: step.roll,
+            run: step.run.map(|run| run.0),
+            ends_s: step.ends_s,
+        };
+        Self {
+            steps: plan.steps.iter().flatten().map(step).collect(),
+            step_count: plan.step_count,
+            fits: fits_text(plan),
+            all_fits: plan.all_fits(),
+            takes_s: plan.takes_s,
+            stays_missed_m: plan.stays_missed_m,
+            stays_ahead_m: plan.stays_ahead_m,
+        }
+    }
 }
 
 /// Position of the vehicle.
@@ -191,6 +259,7 @@ impl LiveState {
             v_max_mps: self.v_max_mps(),
             speeds: self.speed_texts(),
             outstanding: self.outstanding_text(),
+            plan: self.plan.map(|plan| PlanJson::of(&plan, around)),
             reason: advice.map(|advice| advice.reason.as_str()),
             margins: MarginsJson {
                 speed_mps: less(self.v_max_mps(), self.speed_mps.map(f64::abs)),

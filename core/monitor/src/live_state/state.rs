@@ -4,6 +4,7 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::speed_band::SpeedBand;
+use crate::dive_plan::route::DivePlan;
 use crate::observations::{MOST_OBSERVATIONS, ObservedKind, Occurrences};
 use crate::unread::{UnreadPacket, UnreadSpan, WithheldReadings};
 use headrace_coverage::{Metres, Stretch};
@@ -175,6 +176,8 @@ pub struct LiveState {
     /// Chainage to which the vehicle goes back for a missed stretch, m; `None` unless the vehicle is on the
     /// way there.
     pub back_to_m: Option<f64>,
+    /// Plan for the rest of the dive; `None` without a position or without missed stretches.
+    pub plan: Option<DivePlan>,
     /// Observations about the dive that apply at present.
     pub(crate) observations: ActiveObservations,
     /// Bitmask of the sources that are profiling heads.
@@ -194,7 +197,7 @@ pub struct LiveState {
 }
 
 stateful!(LiveState {
-    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, last_band, advice, sure_v_max_mps, metres, missed_from_m, unsure, passed, back_to_m, observations, turning, deaf, hung;
+    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, last_band, advice, sure_v_max_mps, metres, missed_from_m, unsure, passed, back_to_m, plan, observations, turning, deaf, hung;
     slots: heard, unread;
     fixed: target, length_m, heads_reach_m, heads, sources;
 });
@@ -222,6 +225,7 @@ impl LiveState {
             unsure: None,
             passed: false,
             back_to_m: None,
+            plan: None,
             observations: [None; MOST_OBSERVATIONS],
             heads,
             turning: 0,

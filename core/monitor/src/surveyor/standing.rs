@@ -4,6 +4,7 @@ use bevy_ecs::prelude::{Query, Res};
 
 use super::classify::{Class, Classified};
 use super::survey::{Cursor, Outputs};
+use crate::dive_plan::missed::MissedList;
 use crate::entities::{Head, HeadFrontier, Mounted};
 use crate::live_state::state::ASTERN_MPS;
 use crate::live_state::{ActiveObservation, ActiveObservations};
@@ -44,6 +45,7 @@ pub(super) fn report_standing(
         unsure: coverage.unsure,
         passed: is_passed(&coverage, &heads, &update.situation),
         back_to_m: back_to_m(&coverage.sections, &update.situation),
+        missed: MissedList::of(&coverage.sections),
         observations: active(update.at, &outputs.observations, &update.doubts, &|source, kind| {
             let mut heads = heads.iter().filter(|(_, mounted, _)| mounted.source == source);
             let why = |head: &Head| distrusted.get(head.0).copied().flatten();

@@ -174,6 +174,29 @@ describe("one truth", () => {
     }, { init: withoutWebGl, width, height }));
   }
 
+  for (const [width, height] of [[1280, 800], [390, 844]]) {
+    it(`shows the next three steps of the plan, the first one largest, at ${width} px`, () => on({}, async ({ mock, page }) => {
+      const step = (text, from_m, to_m) => ({ text, from_m, to_m });
+      const steps = [step("back to 0+008.2 at any speed", 20, 8.2), step("inspect 0+008.2 to 0+018.8 at most 0.092 m/s", 8.2, 18.8),
+        step("go on from 0+020.0 at most 0.10 m/s", 20, 60)];
+      mock.control({ world: { legs, over: { plan: { steps, fits: "fits in the 1 h 20 min left", all_fits: true } } } });
+      const shown = page.locator(".back .steps .leg");
+      await shown.nth(2).filter({ hasText: "3. go on from 0+020.0 at most 0.10 m/s" }).waitFor();
+      assert.equal(await shown.count(), 3);
+      assert.equal(await page.locator(".back .count").innerText(), "fits in the 1 h 20 min left");
+      const sizes = await shown.evaluateAll((all) => all.map((each) => Number.parseFloat(getComputedStyle(each).fontSize)));
+      assert.ok(sizes[0] >= 18 && sizes[0] > sizes[1], `${sizes}`);
+      assert.deepEqual(await fits(page, ".back .leg, .back .panel-head"), []);
+      const last = await page.locator(".back").evaluate((panel) => panel.getBoundingClientRect().bottom - panel.querySelector("li:last-child").getBoundingClientRect().bottom);
+      assert.ok(last >= 0, `all steps are visible: ${last}`);
+      mock.control({ world: { legs, over: { plan: { steps: steps.slice(0, 1), fits: "not all fits: 3.5 m missed would remain", all_fits: false } } } });
+      await page.locator(".back .count.bad", { hasText: "3.5 m missed would remain" }).waitFor();
+      // Without a position there is no plan, and the stretches are listed.
+      mock.control({ world: { legs, over: { plan: null } } });
+      await page.locator(".back .leg", { hasText: "0+016.3" }).waitFor();
+    }, { init: withoutWebGl, width, height }));
+  }
+
   it("shows dive time with UTC, depth and heading", () => on({ at_m: 60 }, async ({ mock, page }) => {
     mock.control({ world: { over: { pose: { y_m: 0, z_m: 3, roll_deg: 1, pitch_deg: 2, yaw_deg: -1.26 } } } });
     await page.locator(".heading", { hasText: "heading 1.3° right" }).waitFor();

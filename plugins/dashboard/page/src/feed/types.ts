@@ -44,6 +44,8 @@ export interface State {
   speeds?: Speeds;
   /** Missed sections that are still to be passed, as text. */
   outstanding?: string | null;
+  /** Plan for the rest of the dive. */
+  plan?: Plan | null;
   /** Depth below the water level. */
   depth_m?: number | null;
   turn: Turn | null;
@@ -86,6 +88,10 @@ export interface Note {
   /** Set for a voice note. `seconds` is null if the log has no recording of it. */
   voice?: { id: number; seconds: number | null } | null;
 }
+/** The next three steps, and whether the plan fits into the remaining time. */
+export interface Plan { steps: Step[]; fits: string; all_fits: boolean }
+export interface Step { text: string; from_m: number; to_m: number }
+
 /** A stretch is passed again as far as `back_to_m`, so that all heads pass it. */
 export interface Leg { from_m: number; to_m: number; back_to_m?: number; at_most_mps: number | null; why: string }
 /** `time_s` is null if a leg has no speed. */

@@ -1,4 +1,5 @@
 // Lengths by verdict, the remaining length, and directions for going back to missed stretches.
+import type { Step } from "../feed/types";
 import { hasEnded, metresOf } from "../store/age";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
@@ -65,16 +66,28 @@ function Left() {
   );
 }
 
+/** The next steps of the plan for the rest of the dive. */
+function Steps({ steps }: { steps: Step[] }) {
+  return (
+    <ol class="steps" tabIndex={0} aria-label="The next steps">
+      {steps.map(({ text, from_m, to_m }, n) => (
+        <li key={n} class={n === 0 ? "now" : ""}><button type="button" class="leg" onClick={() => actions.goTo((from_m + to_m) / 2, 30)}>{n + 1}. {text}</button></li>
+      ))}
+    </ol>
+  );
+}
+
 export function Back() {
   useTopics(store.topics.back, store.topics.state);
   // A file has the way back only for the end of the dive.
   const known = store.link.phase !== "file" || hasEnded(store);
   const { legs, way_m, time_s } = known ? store.back : { legs: [], way_m: 0, time_s: 0 };
-  const totals = legs.length === 0 ? [] : [legs.length > 1 ? `${legs.length} stretches` : null, metres(way_m), time_s === null ? null : span(time_s)];
+  const plan = hasEnded(store) ? null : store.state?.plan ?? null;
+  const totals = plan !== null ? [plan.fits] : legs.length === 0 ? [] : [legs.length > 1 ? `${legs.length} stretches` : null, metres(way_m), time_s === null ? null : span(time_s)];
   return (
     <section class="panel back" aria-label="The way back">
-      <div class="panel-head"><h2>Way back</h2><span class="count">{totals.filter((part) => part !== null).join(", ")}</span></div>
-      {legs.length === 0 ? <p class="none">{known ? "nothing to go back for" : "a file has this list only for the end of the dive"}</p> : (
+      <div class="panel-head"><h2>Way back</h2><span class={plan?.all_fits === false ? "count bad" : "count"}>{totals.filter((part) => part !== null).join(", ")}</span></div>
+      {plan !== null ? <Steps steps={plan.steps} /> : legs.length === 0 ? <p class="none">{known ? "nothing to go back for" : "a file has this list only for the end of the dive"}</p> : (
         <ol tabIndex={0} aria-label="Stretches to pass again, in order">
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
