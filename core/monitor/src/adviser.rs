@@ -17,8 +17,8 @@ use super::result_stream::{RecordKind, ResultStream};
 use super::stage::AdviseStage;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
-use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
-use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy, ReturningHeads};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
@@ -76,10 +76,11 @@ pub(super) struct Advisor {
     advisor: advice::Advisor,
     dive_time: Option<DurNs>,
     looks: Looks,
+    returning: ReturningHeads,
     hysteresis: Hysteresis,
 }
 
-stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
+stateful!(Advisor { state: advisor, looks, returning, hysteresis; fixed: dive_time; });
 
 impl Adviser {
     /// Creates the adviser. `keeps_results` says whether its stream keeps the contents of each tick.
@@ -180,20 +181,22 @@ fn advise(
 impl Advisor {
     /// Creates the state of the advisor. Allocates: at startup, all memory of the advisor.
     pub(super) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
-        Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
+        let (looks, returning) = (Looks::default(), ReturningHeads::default());
+        Self { advisor, dive_time, looks, returning, hysteresis: Hysteresis::new(target_m) }
     }
 
     /// Advice to show at an update.
     fn advise(&mut self, at: MonoNs, situation: &Situation, clock: DiveClock) -> Advice {
         let left = self.dive_time.map(|all| (all - clock.time(at)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
+        let situation = &self.returning.left_out(at, situation);
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
         // Heads at different places along the hull are in phase at other speeds when the vehicle goes back than
         // when it goes forward. Advice from before the reversal is no longer valid.
         if self.advisor.is_astern() != was_astern {
             self.hysteresis.forget();
         }
-        self.hysteresis.show(at, advice)
+        self.hysteresis.show(at, Phasing::of(situation).in_step(), advice)
     }
 }
 

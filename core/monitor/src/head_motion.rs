@@ -22,6 +22,10 @@ const LONG_STEP: f64 = 1.5;
 const ELSEWHERE_STEPS: f64 = 10.0;
 const ELSEWHERE_RATES: f64 = 4.0;
 
+/// Relative difference between the angle of a step and the angle expected at the turn rate, above which a head that has
+/// changed its step turns at another rate. Pings that arrive up to 5 ms early or late differ less.
+const ANOTHER_RATE: f64 = 0.3;
+
 /// Duration of a stall or silence after which the measurement of the turn rate restarts.
 const STANDING: DurNs = DurNs(1_000_000_000);
 
@@ -113,6 +117,9 @@ impl MeasuredMotion {
             self.from_turning_point = true;
         }
         if (size - self.last_step_rad.abs()).abs() < SAME_ANGLE_RAD {
+            if self.has_another_rate(size, at.since(last)) {
+                self.anchors = [Some((last, self.turned_rad)), None];
+            }
             self.step_rad = Some(size);
         }
         self.last_step_rad = step;
@@ -144,6 +151,18 @@ impl MeasuredMotion {
     fn stands_after_s(&self) -> f64 {
         let ping_period_s = self.step_rad.zip(self.rate_radps()).map(|(step, rate)| step / rate.abs());
         ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)
+    }
+
+    /// Whether a repeated step of another size shows that the head turns at another rate than before, such as after its
+    /// way back to its program.
+    ///
+    /// Steps over missing pings are longer, too, but take longer.
+    fn has_another_rate(&self, size_rad: f64, after: DurNs) -> bool {
+        let is_other_step =
+            self.step_rad.is_some_and(|step_rad| (size_rad - step_rad).abs() > SAME_ANGLE_RAD);
+        let turned_rad = self.rate_radps().map(|rate_radps| (rate_radps * after.as_secs_f64()).abs());
+        let is_other_rate = |turned_rad: f64| (size_rad - turned_rad).abs() > ANOTHER_RATE * size_rad;
+        is_other_step && turned_rad.is_some_and(is_other_rate)
     }
 
     /// Keeps the two anchors of the rate measurement half a turn apart. The older anchor thus lies between
@@ -209,6 +228,25 @@ mod tests {
             track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * (k - 400) as f64));
         }
         assert!((track.rate_radps().unwrap() - f64::to_radians(45.0)).abs() < 1e-9);
+    }
+
+    /// The head takes coarse steps on its way to its program, and then turns as programmed.
+    #[test]
+    fn turn_rate_is_known_soon_after_a_head_has_been_homed() {
+        let mut track = MeasuredMotion::default();
+        let (mut at, mut angle_deg) = (MonoNs(0), 0.0_f64);
+        let mut turn = |pings: u32, ping_ms: i64, step_deg: f64| {
+            for _ in 0..pings {
+                (at, angle_deg) = (at + DurNs::from_millis(ping_ms), angle_deg + step_deg);
+                track.ping(at, angle_deg.to_radians());
+            }
+            track.rate_radps().unwrap().to_degrees()
+        };
+        assert!((turn(1000, 20, 0.9) - 45.0).abs() < 1e-9);
+        assert!((turn(50, 15, 2.4) - 160.0).abs() < 1.0, "homing");
+        assert!((turn(10, 20, 0.9) - 45.0).abs() < 0.5, "on the program");
+        // Pings are lost, so each step is twice as long, but so is its time.
+        assert!((turn(200, 40, 1.8) - 45.0).abs() < 0.5);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod answer;
 mod hysteresis;
 mod intervals;
+mod returning;
 mod ring_cache;
 mod search;
 
@@ -28,6 +29,7 @@ use ring_cache::AdvisedHead;
 
 pub use answer::{Advice, Alternative, Anew, Left, MAX_MODES, ModeName, Reason, Remedy};
 pub use hysteresis::Hysteresis;
+pub use returning::ReturningHeads;
 pub use ring_cache::Looks;
 pub use search::SPEED_MARGIN;
 

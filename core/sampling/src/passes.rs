@@ -62,6 +62,8 @@ impl Situation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passes {
     heads: HeadSet,
+    /// Heads whose phases are known, in [`Pattern::Turning`].
+    in_step: HeadSet,
     /// Turn period of each head, seconds.
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
@@ -75,9 +77,10 @@ pub struct Passes {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Pattern {
-    /// All heads rotate continuously, in one sense and at one rate.
+    /// Two or more heads, or the only head, rotate continuously, in one sense and at one rate: they are in step.
     ///
-    /// The value of each head is the phase of its passes, as a share of the vehicle's advance per turn, in [0, 1).
+    /// The value of each such head is the phase of its passes, as a share of the vehicle's advance per turn, in
+    /// [0, 1). A head out of step, such as one that is on its way back to its program, adds only its own passes.
     Turning([f64; MAX_HEADS]),
     /// Each head sweeps a sector back and forth.
     Sectors {
@@ -86,7 +89,7 @@ enum Pattern {
         /// Unevenness of two heads' passes at the end that their sectors share, as in [`Passes::uneven_ends`].
         uneven: f64,
     },
-    /// Heads turn in opposite senses or at different rates.
+    /// No two heads turn in one sense and at one rate.
     ///
     /// Passes come at uneven times, and only the passes of a single head are predictable.
     Loose,
@@ -109,6 +112,7 @@ pub struct HeadPasses {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Phasing {
     heads: HeadSet,
+    in_step: HeadSet,
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
     ahead_m: [f64; MAX_HEADS],
@@ -127,6 +131,7 @@ impl Phasing {
         let attitude = situation.pose.map_or_else(Rot::identity, |pose| pose.attitude);
         let ahead =
             motions.map(|motion| motion.map_or(Some(0.0), |motion| ahead_m(&attitude, &motion.mount)));
+        let (in_step, phases) = phases(motions);
         let pattern = match situation.layout {
             HeadLayout::SectorOffset => {
                 let share_rad = TAU / situation.configured.max(1) as f64;
@@ -137,10 +142,12 @@ impl Phasing {
                 Pattern::Sectors { sweep_s, uneven: AT_ONCE }
             }
             HeadLayout::PhaseShift if ahead.iter().any(Option::is_none) => Pattern::Loose,
-            HeadLayout::PhaseShift => phases(motions).map_or(Pattern::Loose, Pattern::Turning),
+            HeadLayout::PhaseShift if in_step.len() < heads.len().min(2) => Pattern::Loose,
+            HeadLayout::PhaseShift => Pattern::Turning(phases),
         };
         Self {
             heads,
+            in_step: if situation.layout == HeadLayout::PhaseShift { in_step } else { heads },
             turns_s: motions.map(|motion| motion.map_or(0.0, |motion| motion.turn_period_s())),
             pattern,
             ahead_m: ahead.map(Option::unwrap_or_default),
@@ -185,9 +192,9 @@ impl Phasing {
 
     /// Largest distance along the tunnel between the planes in which the heads meet the wall, m.
     ///
-    /// Heads that are not phased with each other are also included.
+    /// Heads in sectors are also included.
     fn spread_m(&self) -> f64 {
-        let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
+        let ahead_m = || self.in_step.iter().filter_map(|head| self.ahead_m.get(head)).copied();
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
     }
 
@@ -201,13 +208,13 @@ impl Phasing {
             return 0.0;
         }
         let ahead_m = |head: usize| self.ahead_m.get(head).copied().unwrap_or_default();
-        let mut before = self.heads.iter().last();
+        let mut before = self.in_step.iter().last();
         let mut sum_m = 0.0;
-        for head in self.heads.iter() {
+        for head in self.in_step.iter() {
             sum_m += before.map_or(0.0, |before| (ahead_m(head) - ahead_m(before)).abs());
             before = Some(head);
         }
-        let share = sum_m / (apart_m * self.heads.len() as f64);
+        let share = sum_m / (apart_m * self.in_step.len() as f64);
         debug_assert!((0.0..=1.0 + ROUNDING).contains(&share), "neighbours are within all heads: {share}");
         share
     }
@@ -233,13 +240,13 @@ impl Phasing {
 
     /// Returns the first pass of each head from now on.
     ///
-    /// Empty unless all heads turn continuously, in one sense and at one rate.
+    /// Only heads in step are included. Empty for heads in sectors, and if no heads are in step.
     pub fn first_passes(&self) -> impl Iterator<Item = HeadPasses> {
         let phases = if let Pattern::Turning(phases) = &self.pattern { Some(phases) } else { None };
         phases.into_iter().flat_map(|phases| {
             let figures =
                 |head: usize| Some((*phases.get(head)?, *self.turns_s.get(head)?, *self.ahead_m.get(head)?));
-            self.heads.iter().filter_map(move |head| {
+            self.in_step.iter().filter_map(move |head| {
                 let (phase, turn_s, ahead_m) = figures(head)?;
                 (turn_s > 0.0).then_some(HeadPasses { head, first_s: phase * turn_s, turn_s, ahead_m })
             })
@@ -255,7 +262,7 @@ impl Phasing {
     /// neighbouring heads at that end depends on the speed.
     /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn at(&self, speed_mps: f64) -> Passes {
-        let Self { heads, turns_s, mut pattern, ahead_m, legs } = *self;
+        let Self { heads, in_step, turns_s, mut pattern, ahead_m, legs } = *self;
         let at_rest = speed_mps.abs() <= AT_REST_MPS;
         if let Pattern::Turning(phases) = &mut pattern {
             for ((phase, ahead_m), turn_s) in phases.iter_mut().zip(ahead_m).zip(turns_s) {
@@ -270,31 +277,44 @@ impl Phasing {
         {
             *uneven = sectors::uneven(&legs, &ahead_m.map(|ahead_m| ahead_m / (speed_mps * *sweep_s)));
         }
-        Passes { heads, turns_s, pattern, parallax_s: 0.0, at_rest, lossy: false }
+        Passes { heads, in_step, turns_s, pattern, parallax_s: 0.0, at_rest, lossy: false }
+    }
+
+    /// Returns the largest set of heads in step, or all heads in sectors.
+    pub fn in_step(&self) -> HeadSet {
+        self.in_step
     }
 }
 
-/// Angle through which each head turns until it next passes the vertical, as a share of a turn.
-///
-/// `None` for heads with opposite senses or different rates.
-fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]> {
-    let turning = || motions.iter().flatten();
-    let turns_s = || turning().map(HeadMotion::turn_period_s);
-    let (longest_s, shortest_s) = (turns_s().fold(0.0, f64::max), turns_s().fold(f64::INFINITY, f64::min));
-    if longest_s - shortest_s > SAME_TURN * shortest_s {
-        return None;
-    }
-    // If the body-frame angles of all heads fall, they are mirrored, so that all angles grow.
-    let mirror = if turning().all(|motion| body_rate(motion) < 0.0) { -1.0 } else { 1.0 };
+/// Largest set of heads that turn in one sense and at one rate, and the angle through which each of them turns until it
+/// next passes the vertical, as a share of a turn.
+fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> (HeadSet, [f64; MAX_HEADS]) {
+    let in_step_with = |first: &HeadMotion| {
+        let (sense, turn_s) = (body_rate(first).signum(), first.turn_period_s());
+        let is_in_step = |motion: &HeadMotion| {
+            let longer_s = motion.turn_period_s() - turn_s;
+            sense * body_rate(motion) > 0.0 && (0.0..=SAME_TURN * turn_s).contains(&longer_s)
+        };
+        let in_step =
+            motions.iter().enumerate().filter(|(_, motion)| motion.as_ref().is_some_and(is_in_step));
+        in_step.fold(HeadSet::default(), |set, (head, _)| set.with(head))
+    };
+    // Of equally large sets, the slowest counts, because a head on its way back to its program is fast.
+    let sets = motions.iter().flatten().map(|first| (in_step_with(first), first.turn_period_s()));
+    let (in_step, _) = sets.fold((HeadSet::default(), 0.0), |most, set| {
+        if (set.0.len(), set.1) > (most.0.len(), most.1) { set } else { most }
+    });
+    // If the body-frame angles of the heads fall, they are mirrored, so that all angles grow.
+    let growing = |(head, motion): (usize, &Option<HeadMotion>)| Some((head, (*motion)?));
+    let turning = || motions.iter().enumerate().filter_map(growing).filter(|(head, _)| in_step.has(*head));
+    let mirror = if turning().all(|(_, motion)| body_rate(&motion) < 0.0) { -1.0 } else { 1.0 };
     let mut phases = [0.0; MAX_HEADS];
-    for (motion, phase) in motions.iter().zip(&mut phases) {
-        let Some(motion) = motion else { continue };
-        if mirror * body_rate(motion) <= 0.0 {
-            return None;
+    for (head, motion) in turning() {
+        if let Some(phase) = phases.get_mut(head) {
+            *phase = math::wrap(-mirror * body_sign(&motion) * motion.angle_rad, TAU) / TAU;
         }
-        *phase = math::wrap(-mirror * body_sign(motion) * motion.angle_rad, TAU) / TAU;
     }
-    Some(phases)
+    (in_step, phases)
 }
 
 /// Chainage at which a head's scan plane meets the wall, relative to the vehicle's origin, m.
@@ -335,8 +355,7 @@ impl Passes {
     /// The angles from the heads to one place on the wall differ by up to `parallax_rad`.
     #[must_use]
     pub fn beside(self, parallax_rad: f64) -> Self {
-        let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
-        Self { parallax_s: parallax_rad / TAU * turn_s, ..self }
+        Self { parallax_s: parallax_rad / TAU * self.turn_s(), ..self }
     }
 
     /// Returns these passes with or without extra passes for lost returns; see [`super::losses`].
@@ -358,7 +377,7 @@ impl Passes {
     pub fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         let (passing, turn_s) = match self.pattern {
             Pattern::Turning(_) => {
-                (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
+                (seen_by.iter().filter(|head| self.in_step.has(*head)).count(), self.turn_s())
             }
             // A sweep there and back passes a place twice. At a sector's end, these two passes follow each other
             // immediately.
@@ -393,7 +412,7 @@ impl Passes {
         }
         let in_step = heads.iter().all(|head| (turn_s(head) / turn_s(first) - 1.0).abs() < IN_STEP);
         let pattern = if in_step { Pattern::Turning(phases) } else { Pattern::Loose };
-        Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
+        Ok(Self { heads, in_step: heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
     /// Creates the passes of heads that sweep sectors, as if started by a schedule for the present speed.
@@ -406,7 +425,8 @@ impl Passes {
             return Err(SamplingError::HeadCount { heads: 0 });
         }
         let pattern = Pattern::Sectors { sweep_s, uneven: 0.0 };
-        Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false, lossy: false })
+        let turns_s = [0.0; MAX_HEADS];
+        Ok(Self { heads, in_step: heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
     /// Returns the set of heads whose passes these are.
@@ -420,22 +440,30 @@ impl Passes {
     pub fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
         let passing = || seen_by.iter().filter(|head| self.heads.has(*head));
         passing().next()?;
-        let turns_s = || passing().filter_map(|head| self.turns_s.get(head)).copied();
+        let turn_s = |head: usize| self.turns_s.get(head).copied();
         Some(match &self.pattern {
             Pattern::Sectors { sweep_s, .. } => *sweep_s,
-            Pattern::Loose => turns_s().fold(f64::INFINITY, f64::min),
+            Pattern::Loose => passing().filter_map(turn_s).fold(f64::INFINITY, f64::min),
             Pattern::Turning(phases) => {
-                let mut known = [0.0; MAX_HEADS];
-                let mut count = 0;
-                for (slot, head) in known.iter_mut().zip(passing()) {
+                let (mut known, mut count, mut longest_s) = ([0.0; MAX_HEADS], 0, 0.0_f64);
+                let in_step = passing().filter(|head| self.in_step.has(*head));
+                for (slot, head) in known.iter_mut().zip(in_step) {
                     *slot = phases.get(head).copied().unwrap_or_default();
+                    longest_s = longest_s.max(turn_s(head).unwrap_or_default());
                     count += 1;
                 }
                 let beside_s = if count > 1 { self.parallax_s } else { 0.0 };
-                turns_s().fold(0.0, f64::max) * largest_gap(known.get_mut(..count).unwrap_or_default())
-                    + beside_s
+                let together = known.get_mut(..count).filter(|known| !known.is_empty());
+                let together_s = together.map(|known| longest_s * largest_gap(known) + beside_s);
+                self.alone_s(seen_by).min(together_s.unwrap_or(f64::INFINITY))
             }
         })
+    }
+
+    /// Returns the shortest turn period of the heads `seen_by` that are out of step, s; infinite if there are none.
+    fn alone_s(&self, seen_by: HeadSet) -> f64 {
+        let alone = seen_by.iter().filter(|head| self.heads.has(*head) && !self.in_step.has(*head));
+        alone.filter_map(|head| self.turns_s.get(head)).copied().fold(f64::INFINITY, f64::min)
     }
 
     /// Largest unevenness of passes by two neighbouring heads at the end that their sectors share.
@@ -450,9 +478,9 @@ impl Passes {
         }
     }
 
-    /// Returns the longest turn period of a head, seconds.
+    /// Returns the longest turn period of a head in step, seconds.
     pub fn turn_s(&self) -> f64 {
-        self.turns_s.into_iter().fold(0.0, f64::max)
+        self.in_step.iter().filter_map(|head| self.turns_s.get(head)).copied().fold(0.0, f64::max)
     }
 
     /// Returns these passes with evenly phased heads and without parallax. Heads that are not phased with each other
@@ -460,18 +488,19 @@ impl Passes {
     #[must_use]
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
-            Pattern::Turning(_) => Self::evenly_phased(self.heads, |_| self.turn_s()).ok(),
+            Pattern::Turning(_) => Self::evenly_phased(self.in_step, |_| self.turn_s()).ok(),
             Pattern::Sectors { sweep_s, .. } => Self::in_sectors(self.heads, sweep_s).ok(),
             Pattern::Loose => None,
         };
-        even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
+        Self { parallax_s: 0.0, pattern: even.map_or(self.pattern, |even| even.pattern), ..*self }
     }
 
     /// Returns the longest time between passes of all heads with even phases, seconds; zero without a head.
     pub fn even_gap_s(&self) -> f64 {
-        let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
-            Pattern::Turning(_) => turn_s / self.heads.len().max(1) as f64,
+            Pattern::Turning(_) => {
+                self.alone_s(self.heads).min(self.turn_s() / self.in_step.len().max(1) as f64)
+            }
             Pattern::Sectors { .. } | Pattern::Loose => self.gap_s(self.heads).unwrap_or(0.0),
         }
     }
@@ -489,8 +518,8 @@ impl Passes {
             return errors;
         }
         let late = |head: usize| phases.get(head).map(|phase| phase - scheduled_phase(head, scheduled));
-        let Some(first) = self.heads.iter().next().and_then(late) else { return errors };
-        for (head, error) in errors.iter_mut().enumerate().filter(|(head, _)| self.heads.has(*head)) {
+        let Some(first) = self.in_step.iter().next().and_then(late) else { return errors };
+        for (head, error) in errors.iter_mut().enumerate().filter(|(head, _)| self.in_step.has(*head)) {
             *error = late(head).map(|here| math::wrap_signed(here - first, 1.0) * TAU);
         }
         errors

@@ -5,6 +5,7 @@
 
 mod advice;
 mod calm;
+mod head_return;
 mod ideal_table;
 mod interleave;
 mod oracle;

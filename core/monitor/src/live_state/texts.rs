@@ -86,7 +86,10 @@ impl LiveState {
         advice.phase_error_rad.filter(|error_rad| error_rad.abs() >= IN_PHASE_RAD)?;
         let in_phase_mps = advice.anew.map(|anew| anew.planned_speed_mps);
         let in_phase_mps = in_phase_mps.filter(|mps| *mps > PHASE_GAIN * limit_mps)?;
-        Some(format!("heads out of phase: {} once they are in phase", limit_text(in_phase_mps)))
+        // The driver keeps the heads at their start phases, so only other start phases help.
+        let (decimals, steps) = speed_steps(in_phase_mps);
+        let planned = limit_steps(in_phase_mps, steps) / steps;
+        Some(format!("heads out of phase: set planned_speed_mps to {planned:.decimals$} and restart"))
     }
 
     /// Number of a sensor's withheld readings, with the reason; `None` unless they make it useless.
@@ -154,7 +157,7 @@ mod tests {
         };
         let texts = [text(0.094, None, &state), text(0.094, Some(0.092), &state), text(0.065, None, &state)];
         let [out, rising, fits] = texts;
-        assert_eq!(out.as_deref(), Some("heads out of phase: 0.094 m/s once they are in phase"));
+        assert_eq!(out.as_deref(), Some("heads out of phase: set planned_speed_mps to 0.094 and restart"));
         assert_eq!(rising.as_deref(), Some("limit rises to 0.092 m/s in a few seconds"));
         assert_eq!(fits, None);
         // A head that does not turn is the cause itself.

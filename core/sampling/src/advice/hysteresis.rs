@@ -2,6 +2,7 @@
 
 use super::answer::{Advice, Reason};
 use super::search::SPEED_MARGIN;
+use crate::head::{HeadSet, MAX_HEADS};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
@@ -12,6 +13,10 @@ const HOLD: DurNs = DurNs(1_000_000_000);
 /// The higher speed must exceed the displayed speed by [`RISES_BY`]: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
+/// Time since a head's last return within which another return of this head does not raise the displayed speed early.
+///
+/// A head that falls silent again and again would make the display flicker.
+const RETURNS_AFTER: DurNs = DurNs(60_000_000_000);
 /// A lower advised speed is displayed at once if it is lower than the displayed speed by this share.
 ///
 /// Smaller differences are within half of the speed margin.
@@ -33,7 +38,8 @@ const MAYBE_BEYOND: f64 = 0.03;
 /// The most restrictive advice has the most severe reason and, for equal reasons, the lowest speed. A more severe
 /// reason appears at once; a less severe reason appears after a second. A speed that is lower than the displayed speed
 /// by 0.5 % appears at once. If all speeds of ten seconds are higher than the displayed speed by 3 %, the lowest of
-/// them appears. Smaller changes do not appear. Before the first advice with a speed, or with the reason why no speed
+/// them appears. Smaller changes do not appear. After a head has returned, one second is enough: the higher speed has a
+/// known cause, and a lower speed would not fill the gap that the head has left. Before the first advice with a speed, or with the reason why no speed
 /// meets the target, nothing is filtered.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
@@ -47,9 +53,17 @@ pub struct Hysteresis {
     shown: Option<(MonoNs, f64)>,
     /// Time since which all advised speeds exceed the displayed speed, and the lowest of the advised speeds, m/s.
     rising: Option<(MonoNs, f64)>,
+    /// Heads in step at the latest advice, and all heads that have ever been in step.
+    in_step: HeadSet,
+    known: HeadSet,
+    /// Heads that have returned since the displayed speed last rose, and the time at which the last of them returned.
+    returned: HeadSet,
+    returned_at: MonoNs,
+    /// Time at which the return of each head last raised the displayed speed.
+    raised: [Option<MonoNs>; MAX_HEADS],
 }
 
-stateful!(Hysteresis { state: held, next, begun, will_exceed, may_exceed, shown, rising; fixed: target_m; });
+stateful!(Hysteresis { state: held, next, begun, will_exceed, may_exceed, shown, rising, in_step, known, returned, returned_at, raised; fixed: target_m; });
 
 impl Hysteresis {
     /// Creates the hysteresis filter for a target T, m.
@@ -63,18 +77,26 @@ impl Hysteresis {
             may_exceed: false,
             shown: None,
             rising: None,
+            in_step: HeadSet::default(),
+            known: HeadSet::default(),
+            returned: HeadSet::default(),
+            returned_at: MonoNs(0),
+            raised: [None; MAX_HEADS],
         }
     }
 
     /// Resets the filter after the vehicle has reversed its direction, because other speeds then apply.
     pub fn forget(&mut self) {
-        *self = Self::new(self.target_m);
+        let Self { in_step, known, raised, target_m, .. } = *self;
+        *self = Self { in_step, known, raised, ..Self::new(target_m) };
     }
 
-    /// Processes the advice at a timestamp of data time and returns the advice to display.
+    /// Processes the advice at a timestamp of data time and returns the advice to display. The advice counts the passes
+    /// of the heads `in_step` together.
     ///
     /// Allocates: never.
-    pub fn show(&mut self, at: MonoNs, advice: Advice) -> Advice {
+    pub fn show(&mut self, at: MonoNs, in_step: HeadSet, advice: Advice) -> Advice {
+        self.note_returned(at, in_step);
         if !self.begun {
             self.begun = matches!(advice.reason, Reason::HelixPitch | Reason::AngularStep);
             self.held = [None; HELD];
@@ -103,6 +125,24 @@ impl Hysteresis {
         shown
     }
 
+    /// Records heads that have returned to those in step since the latest advice.
+    fn note_returned(&mut self, at: MonoNs, in_step: HeadSet) {
+        let is_rare = |head: &usize| {
+            let raised = self.raised.get(*head).copied().flatten();
+            raised.is_none_or(|raised| at.since(raised).0 > RETURNS_AFTER.0)
+        };
+        let is_back = |head: &usize| self.known.has(*head) && !self.in_step.has(*head);
+        let returned = in_step.iter().filter(is_back).filter(is_rare);
+        let returned = returned.fold(HeadSet::default(), HeadSet::with);
+        if !returned.is_empty() {
+            self.returned_at = at;
+        } else if at.since(self.returned_at).0 > RISES_AFTER.0 {
+            self.returned = HeadSet::default();
+        }
+        self.returned = self.returned.union(returned);
+        (self.in_step, self.known) = (in_step, self.known.union(in_step));
+    }
+
     /// Returns the speed to display, m/s; `speed_mps` is the lowest advised speed of the last second.
     fn steadied_mps(&mut self, at: MonoNs, speed_mps: f64, is_speed: bool) -> f64 {
         let before = self.shown.filter(|(then, _)| at.since(*then).0.abs() <= HOLD.0);
@@ -115,7 +155,8 @@ impl Hysteresis {
             Some((since, least_mps)) => (since, least_mps.min(speed_mps)),
             None => (at, speed_mps),
         });
-        let risen = self.rising.filter(|(since, _)| at.since(*since).0 >= RISES_AFTER.0);
+        let rises_after = if self.returned.is_empty() { RISES_AFTER } else { DurNs(0) };
+        let risen = self.rising.filter(|(since, _)| at.since(*since).0 >= rises_after.0);
         let shown_mps = match risen {
             _ if falls => speed_mps,
             Some((_, least_mps)) => least_mps,
@@ -127,6 +168,11 @@ impl Hysteresis {
         );
         if risen.is_some() {
             self.rising = None;
+            for (_, raised) in self.raised.iter_mut().enumerate().filter(|(head, _)| self.returned.has(*head))
+            {
+                *raised = Some(at);
+            }
+            self.returned = HeadSet::default();
         }
         self.shown = Some((at, shown_mps));
         shown_mps
@@ -170,7 +216,7 @@ mod tests {
         let mut at = MonoNs(3_000_000_000);
         let mut show = |advice| {
             at = at + BEAT;
-            steady.show(at, advice)
+            steady.show(at, HeadSet::default(), advice)
         };
         of.into_iter().map(&mut show).collect()
     }
@@ -179,7 +225,7 @@ mod tests {
     fn higher_advised_speed_is_displayed_at_once_after_a_reset() {
         let mut steady = Hysteresis::new(TARGET_M);
         let show = |steady: &mut Hysteresis, k: u64, mps: f64| {
-            steady.show(MonoNs(3_000_000_000 + k * 200_000_000), speed(mps)).v_max_mps
+            steady.show(MonoNs(3_000_000_000 + k * 200_000_000), HeadSet::default(), speed(mps)).v_max_mps
         };
         for k in 0..20 {
             show(&mut steady, k, 0.1);
@@ -225,6 +271,39 @@ mod tests {
             (&[None; 6][..], &[Some(0.2); 50][..], None)
         );
         assert_eq!(speeds[66..], [0.2; 15]);
+    }
+
+    /// Times (s) at which the displayed speed changes while the second of two heads is in step only in some seconds.
+    fn changes_s(is_in_step: impl Fn(u32) -> bool) -> Vec<f64> {
+        let mut steady = Hysteresis::new(TARGET_M);
+        let (mut last, mut changes) = (None, Vec::new());
+        for k in 0..1000_u32 {
+            let both = is_in_step(k / 5);
+            let in_step = HeadSet::first(if both { 2 } else { 1 });
+            let advice = speed(if both { 0.2 } else { 0.1 });
+            let at = MonoNs(3_000_000_000 + u64::from(k) * 200_000_000);
+            let now_mps = steady.show(at, in_step, advice).v_max_mps;
+            if last.is_some_and(|last: f64| (last - now_mps).abs() > 1e-12) {
+                changes.push(0.2 * f64::from(k));
+            }
+            last = Some(now_mps);
+        }
+        changes
+    }
+
+    #[test]
+    fn higher_speed_is_displayed_a_second_after_a_head_has_returned() {
+        let near = |found: &[f64], expected: &[f64]| {
+            found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.21)
+        };
+        let once = changes_s(|second| !(50..70).contains(&second));
+        assert!(near(&once, &[50.0, 71.0]), "{once:?}");
+        // The head falls silent for the second time within a minute after its return.
+        let twice = changes_s(|second| !(50..70).contains(&second) && !(90..100).contains(&second));
+        assert!(near(&twice, &[50.0, 71.0, 90.0, 111.0]), "{twice:?}");
+        // A head that is silent in 3 of 8 seconds raises the displayed speed once a minute.
+        let often = changes_s(|second| second < 50 || second % 8 >= 3);
+        assert!(near(&often, &[50.0, 52.0, 56.0, 116.0, 120.0, 180.0, 184.0]), "{often:?}");
     }
 
     #[test]
@@ -281,7 +360,10 @@ mod tests {
     #[test]
     fn advice_pause_of_more_than_1_s_resets_the_hysteresis() {
         let mut steady = Hysteresis::new(TARGET_M);
-        steady.show(MonoNs(0), speed(0.1));
-        assert!((steady.show(MonoNs(1_200_000_000), speed(0.2)).v_max_mps - 0.2).abs() < 1e-12);
+        steady.show(MonoNs(0), HeadSet::default(), speed(0.1));
+        assert!(
+            (steady.show(MonoNs(1_200_000_000), HeadSet::default(), speed(0.2)).v_max_mps - 0.2).abs()
+                < 1e-12
+        );
     }
 }

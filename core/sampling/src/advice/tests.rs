@@ -1,3 +1,5 @@
+mod silence;
+
 use super::*;
 use crate::fixtures;
 use crate::head::{Basis, Turn};

@@ -143,6 +143,35 @@ fn heads_with_unequal_turn_periods_count_as_the_fastest_head_alone() {
     assert!((all(&planned) - 8.0).abs() < 1e-12);
 }
 
+/// The fourth of four heads is on its way back to its program. The other three are in step.
+#[test]
+fn head_out_of_step_adds_only_its_own_passes() {
+    let mut returning = situation(&[0.0, 90.0, 180.0, 270.0], &[0.5, 0.5, -0.5, -0.5]);
+    let three = Situation {
+        heads: {
+            let mut heads = returning.heads;
+            heads[3] = None;
+            heads
+        },
+        ..returning
+    };
+    let three = Phasing::of(&three).at(0.2);
+    for turn_s in [2.0, 21.6, -8.0] {
+        returning.heads[3].as_mut().unwrap().rate_radps = TAU / turn_s;
+        let phasing = Phasing::of(&returning);
+        assert_eq!(phasing.in_step(), HeadSet::first(3), "{turn_s}");
+        let passes = phasing.at(0.2);
+        assert!((all(&passes) - all(&three).min(turn_s.abs())).abs() < 1e-9, "{turn_s}: {}", all(&passes));
+        let last = HeadSet::default().with(3);
+        assert!((passes.gap_s(last).unwrap() - turn_s.abs()).abs() < 1e-9);
+        assert!((passes.even_gap_s() - (8.0_f64 / 3.0).min(turn_s.abs())).abs() < 1e-9);
+        assert_eq!(passes.phase_errors_rad(4)[3], None);
+        assert_eq!(phasing.first_passes().count(), 3);
+    }
+    returning.heads[3].as_mut().unwrap().rate_radps = TAU / 8.1;
+    assert_eq!(Phasing::of(&returning).in_step(), HeadSet::first(4), "within 2 %");
+}
+
 #[test]
 fn measured_sector_is_ignored_in_a_phase_shift_layout() {
     let mut jerked = situation(&[0.0, 180.0], &[0.0, 0.0]);
