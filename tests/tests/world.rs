@@ -127,8 +127,16 @@ fn line_stall(lines: std::ops::Range<usize>, ms: i64) -> Vec<Fault> {
     lines.map(|line| Fault::Cable(line, Window { what: CableFault::Held, from, to })).collect()
 }
 
+/// Alerts and causes that a stall may have, because heads are not asked: after 2 s, they are silent. In 5 s, the vehicle
+/// drives nearly as far as the target.
+fn may_be_raised(kind: &str, ms: i64) -> bool {
+    matches!(kind, "position_doubtful" | "cannot_say")
+        || ms >= 2000 && matches!(kind, "sensor_silent" | "sensor_stalled" | "no_sonar")
+        || ms >= 5000 && matches!(kind, "missed" | "head_silent" | "head_stalled" | "position_lost")
+}
+
 /// Properties that a stall broke, as text. Without a stall, the dive raises the alerts `usual`.
-fn broken_by_stall(lived: &DiveResult, usual: &[&str]) -> Vec<String> {
+fn broken_by_stall(lived: &DiveResult, usual: &[&str], ms: i64) -> Vec<String> {
     let mut broken = Vec::new();
     let mut last: Option<Position> = None;
     for position in &lived.positions {
@@ -149,8 +157,13 @@ fn broken_by_stall(lived: &DiveResult, usual: &[&str]) -> Vec<String> {
         }
         last = Some(*position);
     }
-    broken
-        .extend(lived.alerts.iter().filter(|kind| !usual.contains(kind)).map(|kind| format!("alert {kind}")));
+    broken.extend(
+        lived
+            .alerts
+            .iter()
+            .filter(|kind| !usual.contains(kind) && !may_be_raised(kind, ms))
+            .map(|kind| format!("alert {kind}")),
+    );
     broken
 }
 
@@ -162,13 +175,12 @@ fn stalls_of_the_computer_and_of_lines_do_not_change_speed_or_chainage() {
         let usual = lived(&[]);
         assert!(usual.positions.iter().any(|position| position.is_sure), "{:?}", usual.positions.last());
         for ms in STALLS_MS {
-            let mut stalls = vec![("computer".to_owned(), computer_stall(ms))];
-            stalls.push(("all lines".to_owned(), line_stall(0..SENSOR_COUNT, ms)));
-            stalls.extend(
-                (0..SENSOR_COUNT).map(|line| (format!("line {line}"), line_stall(line..line + 1, ms))),
-            );
+            let of_line = |line: usize| (format!("line {line}"), line_stall(line..line + 1, ms));
+            let all_lines = ("all lines".to_owned(), line_stall(0..SENSOR_COUNT, ms));
+            let stalls = [("computer".to_owned(), computer_stall(ms)), all_lines];
+            let stalls = stalls.into_iter().chain((0..SENSOR_COUNT).map(of_line));
             for (what, faults) in stalls {
-                let broken = broken_by_stall(&lived(&faults), &usual.alerts);
+                let broken = broken_by_stall(&lived(&faults), &usual.alerts, ms);
                 if !broken.is_empty() {
                     failed.push(format!(
                         "seed {seed}, {what} for {ms} ms: {} broken, e.g. {:#?}",

@@ -18,6 +18,8 @@ const LONGEST: DurNs = DurNs::from_millis(8_000);
 const UNUSUAL: f64 = 3.0;
 const LEAST_MESSAGES: f64 = 2.0;
 const LEAST_SHARE: f64 = 0.1;
+/// Share of the usual data from which on no data are missing. The usual period is inexact.
+const COMPLETE: f64 = 0.9;
 /// Number of reads after which the usual gap is known, and number of reads over which it is averaged.
 const KNOWN_AFTER: u32 = 8;
 const AVERAGED: f64 = 16.0;
@@ -96,10 +98,10 @@ impl ReadTimes {
         if !is_late && messages < LEAST_MESSAGES.max(LEAST_SHARE * gap_ns / self.gap_ns.max(1.0)) {
             return None;
         }
-        let even_ns = gap_ns / messages.max(1.0);
-        // If the program was late, the system may have dropped the newest data, and the device may have waited for an
-        // answer. Then the data are from the beginning of the gap.
-        let step_ns = if is_late { even_ns.min(self.gap_ns) } else { even_ns };
+        // If the program was late, the system may have dropped the newest data, or the device may have waited to be
+        // asked. Then the data are from the beginning of the gap.
+        let is_short = messages * self.gap_ns < COMPLETE * gap_ns;
+        let step_ns = if is_late && is_short { self.gap_ns } else { gap_ns / messages.max(1.0) };
         Some(Spread { after, now, step_ns, bytes: self.bytes.max(1.0) })
     }
 }
@@ -146,8 +148,8 @@ mod tests {
     fn messages_of_a_burst_have_the_times_of_the_devices_period() {
         let mut times = device();
         assert!(times.may_be_burst(at_ms(1220), true) && times.may_be_burst(at_ms(1220), false));
-        let spread = times.take_waiting(at_ms(1220), 40, true).unwrap();
-        assert_eq!(times_ms(&spread, 4), [1050, 1100, 1150, 1200]);
+        let spread = times.take_waiting(at_ms(1204), 40, true).unwrap();
+        assert_eq!(times_ms(&spread, 4), [1051, 1102, 1153, 1204]);
         // The system has dropped the newest two of the four messages.
         let spread = device().take_waiting(at_ms(1220), 20, true).unwrap();
         assert_eq!(times_ms(&spread, 2), [1050, 1100]);

@@ -15,7 +15,7 @@ pub struct DiveResult {
     pub consumed: Vec<Consumed>,
     /// Positions at the advice updates, in order; after each tick, the latest.
     pub positions: Vec<Position>,
-    /// Kinds of all alerts of the dive.
+    /// Kinds of all alerts of the dive, and causes of missed stretches.
     pub alerts: Vec<&'static str>,
     /// Digest of the results.
     pub digest: u64,

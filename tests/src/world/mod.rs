@@ -23,9 +23,11 @@ use std::time::Duration;
 
 use headrace::InRecordings;
 use headrace_config::Document;
+use headrace_coverage::{Cause, Causes};
 use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
+use headrace_monitor::alert_list::{Figures, ListedAlert};
 use headrace_monitor::live_state::PositionState;
 use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
@@ -276,7 +278,7 @@ impl World {
             plan,
             consumed,
             positions,
-            alerts: dive.view().alert_list().iter().map(|alert| alert.kind.as_str()).collect(),
+            alerts: dive.view().alert_list().iter().flat_map(words).collect(),
         }
     }
 
@@ -577,6 +579,15 @@ fn position(dive: &Loop) -> Option<Position> {
         speed_mps,
         is_sure: state.position == PositionState::Ok,
     })
+}
+
+/// Kind of an alert, and causes of a missed stretch.
+fn words(alert: &ListedAlert) -> Vec<&'static str> {
+    let causes = match &alert.figures {
+        Figures::Missed(figures, ..) => figures.causes,
+        _ => Causes::default(),
+    };
+    [alert.kind.as_str()].into_iter().chain(causes.iter().map(Cause::as_str)).collect()
 }
 
 fn note(dive: &Loop, consumed: &mut Vec<Consumed>) {
