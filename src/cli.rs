@@ -39,10 +39,10 @@ pub(crate) const KEYS: &str =
 
 /// Commands of `emulate`.
 pub(crate) const FAULT_COMMANDS: &str = "unplug ID, plug ID, stall ID, resume ID, delay ID TIME, restart ID, freeze, \
-     release, end or quit";
+     release, hold TIME, end or quit";
 /// Keys of `emulate`.
-pub(crate) const FAULT_KEYS: &str =
-    "up and down choose a device, u unplug, s stall, d delay, r restart, f freeze the cable count, q quit";
+pub(crate) const FAULT_KEYS: &str = "up and down choose a device, u unplug, s stall, d delay, r restart, f freeze the \
+     cable count, b hold back all data for 1.3 s, q quit";
 
 fn emulate_help() -> String {
     format!(

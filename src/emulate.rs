@@ -32,6 +32,9 @@ const WAIT_NS: u32 = 1_000_000;
 /// Delays of a device's data, in the order in which a key selects them.
 const DELAYS: [DurNs; 3] = [DurNs(500_000_000), DurNs(2_000_000_000), DurNs(10_000_000_000)];
 
+/// Time for which a key holds back the data of all devices.
+const HELD: DurNs = DurNs(1_300_000_000);
+
 /// Runs `headrace emulate`.
 pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     let (name, text) = (args.scene.display().to_string(), files::read(&args.scene)?);
@@ -277,6 +280,7 @@ impl Rehearsal<'_> {
             Key::Character('d') => Change::Delay(next_delay(stand.delay)),
             Key::Character('r') => Change::Restart,
             Key::Character('f') => return self.obey(Order::Freeze(!self.is_frozen)),
+            Key::Character('b') => return self.obey(Order::Hold(HELD)),
             // Ctrl-C and Ctrl-D also end the rehearsal.
             Key::Character('q' | 'Q' | '\x03' | '\x04') => return self.obey(Order::End),
             Key::Character('?' | 'h') => return say_keys(),
@@ -298,6 +302,11 @@ impl Rehearsal<'_> {
                 for number in counters {
                     tell(self.stands.get(number).map_or("", |stand| stand.id.as_str()), told);
                 }
+            }
+            Order::Hold(duration) => {
+                let until = self.now() + duration;
+                self.stands.iter_mut().for_each(|stand| stand.hold(until));
+                tell("all devices", &format!("data held back for {} s", duration.as_secs_f64()));
             }
             Order::Device(number, change) => {
                 let now = self.now();

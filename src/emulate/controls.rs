@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::keyboard::{self, Keyboard};
 use crate::output::say;
 
-/// Longest delay of a device's data. Later data would no longer belong to the rehearsal.
+/// Longest delay of data. Later data would no longer belong to the rehearsal.
 const MAX_DELAY: DurNs = DurNs(60_000_000_000);
 
 /// Input from the person who runs the rehearsal.
@@ -43,6 +43,9 @@ pub(super) enum Order {
     Device(usize, Change),
     /// Freezes the cable counters, or releases them.
     Freeze(bool),
+    /// Holds back the data of all devices for this duration, and then sends them at once, as after a stall of the
+    /// computer.
+    Hold(DurNs),
     End,
 }
 
@@ -91,22 +94,21 @@ pub(super) fn order(line: &str, ids: &[&str]) -> Result<Order, String> {
             format!("{:?}: no device {id:?}; expected one of: {}", line.trim(), ids.join(", "))
         })
     };
+    let duration = |text: &str| match time(text)? {
+        duration if duration > MAX_DELAY => Err(format!("{:?}: a delay must be at most 60s", line.trim())),
+        duration => Ok(duration),
+    };
     let change = match *words.as_slice() {
         ["end" | "quit"] => return Ok(Order::End),
         ["freeze"] => return Ok(Order::Freeze(true)),
         ["release"] => return Ok(Order::Freeze(false)),
+        ["hold", text] => return duration(text).map(Order::Hold),
         ["unplug", id] => (id, Change::Unplug),
         ["plug", id] => (id, Change::Plug),
         ["stall", id] => (id, Change::Stall),
         ["resume", id] => (id, Change::Resume),
         ["restart", id] => (id, Change::Restart),
-        ["delay", id, text] => {
-            let delay = time(text)?;
-            if delay > MAX_DELAY {
-                return Err(format!("{:?}: a delay must be at most 60s", line.trim()));
-            }
-            (id, Change::Delay(delay))
-        }
+        ["delay", id, text] => (id, Change::Delay(duration(text)?)),
         _ => return Err(format!("{:?} isn't a command; expected one of: {FAULT_COMMANDS}", line.trim())),
     };
     Ok(Order::Device(device(change.0)?, change.1))
@@ -122,10 +124,19 @@ mod tests {
         assert_eq!(order(" unplug tether "), Ok(Order::Device(1, Change::Unplug)));
         assert_eq!(order("delay imu 0.5s"), Ok(Order::Device(0, Change::Delay(DurNs(500_000_000)))));
         assert_eq!(order("freeze"), Ok(Order::Freeze(true)));
+        assert_eq!(order("hold 1.3s"), Ok(Order::Hold(DurNs(1_300_000_000))));
         assert_eq!(order("quit"), Ok(Order::End));
-        for line in
-            ["", "stall", "stall imu tether", "delay imu", "delay imu 61s", "delay imu soon", "freeze imu"]
-        {
+        for line in [
+            "",
+            "stall",
+            "stall imu tether",
+            "delay imu",
+            "delay imu 61s",
+            "delay imu soon",
+            "freeze imu",
+            "hold",
+            "hold 61s",
+        ] {
             assert!(order(line).is_err(), "{line:?}");
         }
         insta::assert_snapshot!(order("plug dvl").unwrap_err(), @r#""plug dvl": no device "dvl"; expected one of: imu, tether"#);

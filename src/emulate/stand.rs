@@ -29,6 +29,8 @@ pub(super) struct Stand {
     descriptor: Vec<u8>,
     pub(super) is_stalled: bool,
     pub(super) delay: DurNs,
+    /// Time until which all messages are held back.
+    held_until: MonoNs,
     /// Delayed messages, with the times at which they are due.
     late: VecDeque<(MonoNs, Vec<u8>)>,
     /// Time at which a restarted device is on again.
@@ -55,6 +57,7 @@ impl Stand {
             descriptor: descriptor.unwrap_or_default(),
             is_stalled: false,
             delay: DurNs(0),
+            held_until: MonoNs(0),
             late: VecDeque::new(),
             on_at: None,
         }
@@ -87,7 +90,7 @@ impl Stand {
             return Ok(());
         }
         // A message never overtakes an earlier one.
-        let due = self.late.back().map_or(now, |(due, _)| *due).max(now + self.delay);
+        let due = self.late.back().map_or(now, |(due, _)| *due).max(now + self.delay).max(self.held_until);
         if due > now {
             self.late.push_back((due, bytes.to_vec()));
             return Ok(());
@@ -96,10 +99,18 @@ impl Stand {
         self.port.as_mut().map_or(Ok(()), |port| port.write(bytes))
     }
 
+    /// Holds back all messages until this time.
+    pub(super) fn hold(&mut self, until: MonoNs) {
+        self.held_until = until;
+    }
+
     /// Sends the delayed messages that are due.
     ///
     /// Errors: the port has failed.
     pub(super) fn send_late(&mut self, now: MonoNs) -> io::Result<()> {
+        if now < self.held_until {
+            return Ok(());
+        }
         while let Some((_, bytes)) = self.late.pop_front_if(|(due, _)| *due <= now) {
             if let Some(port) = &mut self.port {
                 port.write(&bytes)?;

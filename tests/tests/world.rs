@@ -4,11 +4,14 @@
 
 use std::collections::BTreeMap;
 
+use headrace_geometry::time::DurNs;
 use headrace_tests::Folder;
 use headrace_tests::world::fewest::fewest;
 use headrace_tests::world::invariants::broken;
-use headrace_tests::world::plan::Fault;
-use headrace_tests::world::{DiveResult, Sabotage, World, seeds};
+use headrace_tests::world::plan::{BEGIN, CableFault, Fault, MachineFault, Window};
+use headrace_tests::world::{
+    DiveResult, Position, SENSOR_COUNT, Sabotage, TRUE_SPEED_MPS, World, seeds, true_chainage_m,
+};
 
 /// Default seeds of the simulated worlds.
 const SEEDS: std::ops::Range<u64> = 0..300;
@@ -16,8 +19,16 @@ const SEEDS: std::ops::Range<u64> = 0..300;
 /// detect the sabotage.
 const ENOUGH: u64 = 200;
 
-/// Runs a dive in the world of a seed, with all or some of the world's faults. Returns the invariants that the dive
-/// breaks, and its results.
+/// Durations of stalls, ms, and the time at which they begin.
+const STALLS_MS: [i64; 6] = [100, 250, 500, 1300, 2500, 5000];
+const STALL_BEGINS: DurNs = DurNs::from_millis(5_000);
+/// Largest error of the estimated speed while the position counts as reliable, m/s.
+const SPEED_ERROR_MPS: f64 = 0.05;
+/// Largest error of the chainage, and largest error of its change between two updates, in standard deviations plus m.
+const SDS: f64 = 3.0;
+const ROUNDED_M: f64 = 0.01;
+
+/// Runs a dive in the world of a seed, with all or some of its faults; returns its broken invariants and its results.
 fn lived(
     folder: &Folder,
     seed: u64,
@@ -102,4 +113,84 @@ fn blocked_terminal_does_not_change_results() {
         let bytes = |lived: &DiveResult| lived.left.iter().map(|file| file.bytes.len()).sum::<usize>();
         assert_eq!(bytes(&taken), bytes(&stood), "seed {seed}");
     }
+}
+
+/// Faults of a computer that stalls for some milliseconds.
+fn computer_stall(ms: i64) -> Vec<Fault> {
+    let (from, to) = (BEGIN + STALL_BEGINS, BEGIN + STALL_BEGINS + DurNs::from_millis(ms));
+    let all = [MachineFault::PortsStall, MachineFault::LoopStalls, MachineFault::RecorderStalls];
+    all.map(|what| Fault::Machine(Window { what, from, to })).to_vec()
+}
+
+/// Faults of lines that hold back all data for some milliseconds.
+fn line_stall(lines: std::ops::Range<usize>, ms: i64) -> Vec<Fault> {
+    let (from, to) = (BEGIN + STALL_BEGINS, BEGIN + STALL_BEGINS + DurNs::from_millis(ms));
+    lines.map(|line| Fault::Cable(line, Window { what: CableFault::Held, from, to })).collect()
+}
+
+/// Alerts and causes that a stall may have, because heads are not asked: after 2 s, they are silent. In 5 s, the vehicle
+/// drives nearly as far as the target.
+fn may_be_raised(kind: &str, ms: i64) -> bool {
+    matches!(kind, "position_doubtful" | "cannot_say")
+        || ms >= 2000 && matches!(kind, "sensor_silent" | "sensor_stalled" | "no_sonar")
+        || ms >= 5000 && matches!(kind, "missed" | "head_silent" | "head_stalled" | "position_lost")
+}
+
+/// Properties that a stall broke, as text. Without a stall, the dive raises the alerts `usual`.
+fn broken_by_stall(lived: &DiveResult, usual: &[&str], ms: i64) -> Vec<String> {
+    let mut broken = Vec::new();
+    let mut last: Option<Position> = None;
+    for position in &lived.positions {
+        let Position { at, chainage_m, sd_m, speed_mps, is_sure } = *position;
+        let off_m = chainage_m - true_chainage_m(at);
+        let of = |what: &str| {
+            format!("{:.2} s: {what}: {position:?}, off by {off_m:.3} m", at.since(BEGIN).as_secs_f64())
+        };
+        if is_sure && (speed_mps - TRUE_SPEED_MPS).abs() > SPEED_ERROR_MPS {
+            broken.push(of("speed"));
+        }
+        if off_m.abs() > SDS * sd_m + ROUNDED_M {
+            broken.push(of("chainage"));
+        }
+        let step_m = last.map_or(0.0, |last| off_m - (last.chainage_m - true_chainage_m(last.at)));
+        if step_m.abs() > SDS * sd_m + ROUNDED_M {
+            broken.push(of("step of the chainage"));
+        }
+        last = Some(*position);
+    }
+    broken.extend(
+        lived
+            .alerts
+            .iter()
+            .filter(|kind| !usual.contains(kind) && !may_be_raised(kind, ms))
+            .map(|kind| format!("alert {kind}")),
+    );
+    broken
+}
+
+#[test]
+fn stalls_of_the_computer_and_of_lines_do_not_change_speed_or_chainage() {
+    let mut failed = Vec::new();
+    for seed in 0..5 {
+        let lived = |faults: &[Fault]| World::with(seed, None, Some(faults)).live();
+        let usual = lived(&[]);
+        assert!(usual.positions.iter().any(|position| position.is_sure), "{:?}", usual.positions.last());
+        for ms in STALLS_MS {
+            let of_line = |line: usize| (format!("line {line}"), line_stall(line..line + 1, ms));
+            let all_lines = ("all lines".to_owned(), line_stall(0..SENSOR_COUNT, ms));
+            let stalls = [("computer".to_owned(), computer_stall(ms)), all_lines];
+            let stalls = stalls.into_iter().chain((0..SENSOR_COUNT).map(of_line));
+            for (what, faults) in stalls {
+                let broken = broken_by_stall(&lived(&faults), &usual.alerts, ms);
+                if !broken.is_empty() {
+                    failed.push(format!(
+                        "seed {seed}, {what} for {ms} ms: {} broken, e.g. {:#?}",
+                        broken.len(),
+                        &broken[..broken.len().min(3)]
+                    ));
+                }
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
 }

@@ -16,6 +16,7 @@ use super::missing_samples::MissingSample;
 use super::passage::{Drive, Passage};
 use super::store::SampleStore;
 use headrace_geometry::math;
+use headrace_sampling::head::HeadSet;
 use headrace_sampling::losses::{LossRate, MOST_PASSES, Sampled};
 use headrace_sampling::spacing;
 use trial::Trial;
@@ -90,10 +91,25 @@ pub fn explain<'a>(
         t_y_m: drive.t_y_m,
         middle_t_y_m: drive.middle_t_y_m,
         swing_m: drive.swing_m,
-        silent_heads: seen.silent,
+        silent_heads: silent_heads(case, &seen, causes, store.perimeter_m()),
     };
     debug_assert!(evidence.is_consistent(), "causes and figures of a fail agree: {evidence:?}");
     evidence
+}
+
+/// Heads that were silent. If silence is a cause, these include the heads whose missing samples lie in the hole.
+///
+/// A head that was silent for a moment only was still near its last place, and does not count as silent otherwise.
+fn silent_heads(case: &Case<'_>, seen: &Seen, causes: Causes, perimeter_m: f64) -> HeadSet {
+    if !causes.has(Cause::HeadSilent) {
+        return seen.silent;
+    }
+    let Case { hole, lacks, .. } = *case;
+    let [from_m, to_m] = [-0.5, 0.5].map(|side| hole.x_m + side * hole.diameter_m);
+    let is_silent = |lack: &&MissingSample| lack.why.has(Cause::HeadSilent);
+    let in_hole = |lack: &&MissingSample| is_in(hole, hole.diameter_m, perimeter_m, lack);
+    let lacking = lacks.between(from_m, to_m).filter(is_silent).filter(in_hole);
+    lacking.fold(seen.silent, |heads, lack| heads.with(usize::from(lack.head)))
 }
 
 /// Factors that were present when the section was passed.

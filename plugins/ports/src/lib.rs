@@ -4,6 +4,7 @@
 //! line. Also contains device discovery, diagnosis and probing. Drivers are in the device crates and do no I/O; see
 //! [`headrace_sensor::driver`].
 
+mod backlog;
 mod clock;
 mod device_end;
 mod diagnosis;
@@ -19,6 +20,7 @@ mod supervisor;
 pub mod uhid;
 mod wake;
 
+pub use backlog::LateData;
 pub use clock::{ahead, clock_anchor, now, of_wall, set_ahead};
 pub use device_end::{EmulatedPort, wait_for_any};
 pub use discover::can::is_interface_up;

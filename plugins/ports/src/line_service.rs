@@ -13,8 +13,9 @@ use std::time::Duration;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::ring::{MAX_PACKET_BYTES, Port};
 use headrace_sensor::connect::{Connect, ConnectError};
-use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
+use headrace_sensor::driver::{Carrier, DeviceHealth, Driver, Wire};
 
+use crate::backlog::{LateData, ReadTimes, Spread};
 use crate::clock;
 use crate::diagnosis;
 use crate::host::Host;
@@ -33,6 +34,10 @@ const LOOK: Duration = Duration::from_millis(50);
 const STANDING_PERIOD: DurNs = DurNs::from_millis(500);
 /// The reconnect backoff is reset if the line was open for at least this time and delivered a frame.
 const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
+/// The program read a line late if a read ended this long after it was to end.
+const OVERSLEPT: DurNs = DurNs::from_millis(50);
+/// Maximum number of bytes that are read at once after a stall.
+const MOST_WAITING: usize = 1 << 20;
 /// Keep-alive interval on an idle connection.
 const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 
@@ -70,6 +75,8 @@ pub struct Common {
     pub board: StatusQueue,
     /// Wakes the loop after packets have arrived.
     pub waker: Waker,
+    /// Tells the loop that a line has read late data.
+    pub late_data: LateData,
     /// Receives all messages sent to devices, and counts of dropped packets.
     pub record: Option<Arc<dyn LineRecord>>,
 }
@@ -101,6 +108,9 @@ struct OpenLine {
     /// Time of the next health check of the devices (`look_at`), and of the next keep-alive (`knock_at`).
     look_at: MonoNs,
     knock_at: MonoNs,
+    /// Time at which the latest read ended, and the usual times of reads.
+    read_at: MonoNs,
+    times: ReadTimes,
 }
 
 /// A sensor with its connection state.
@@ -283,6 +293,8 @@ impl LineService {
                 opened,
                 look_at: opened + STANDING_PERIOD,
                 knock_at: opened + KNOCK_PERIOD,
+                read_at: self.common.host.now(),
+                times: ReadTimes::default(),
             }),
             Err(error) => self.ended(opened, Err(error)),
         }
@@ -360,17 +372,9 @@ impl LineService {
 
     /// Waits once for bytes, and serves the drivers.
     fn serve(&mut self, open: &mut OpenLine) -> io::Result<Served> {
+        self.read(open)?;
         let OpenLine { line, look_at, knock_at, .. } = open;
         let line = line.as_mut();
-        let mut buffer = [0; READ_BYTES];
-        let wait = self.wait_for(self.common.host.now());
-        let devices = &self.devices;
-        let is_valid = |bytes: &[u8]| devices.iter().any(|device| device.attached.driver.accepts(bytes));
-        if let Some((received, count)) = line.read_device(wait, &mut buffer, &mut self.senders, &is_valid)? {
-            let bytes = buffer.get(..count).unwrap_or_default();
-            self.heard(line, received, bytes)?;
-            *knock_at = received + KNOCK_PERIOD;
-        }
         self.wake(line)?;
         let now = self.common.host.now();
         if now >= *knock_at {
@@ -387,6 +391,99 @@ impl LineService {
             }
         }
         Ok(Served::Open)
+    }
+
+    /// Waits once for bytes, and passes them to the drivers. After a stall, passes on all bytes that waited.
+    fn read(&mut self, open: &mut OpenLine) -> io::Result<()> {
+        let wait = self.wait_for(self.common.host.now());
+        let mut buffer = [0; READ_BYTES];
+        let mut read = self.read_once(open.line.as_mut(), wait, &mut buffer)?;
+        let now = self.common.host.now();
+        let planned = DurNs(i64::try_from(wait.as_nanos()).unwrap_or(i64::MAX));
+        let late = now.since(core::mem::replace(&mut open.read_at, now)) - planned;
+        let is_late = late > OVERSLEPT;
+        if is_late {
+            for device in &mut self.devices {
+                // Devices that the program did not ask are not silent.
+                device.last_bytes = (device.last_bytes + late).min(now);
+                device.last_frame = (device.last_frame + late).min(now);
+            }
+            // A signal may have ended the wait. Drivers must take waiting bytes before they give up an answer.
+            if read.is_none() {
+                read = self.read_once(open.line.as_mut(), Duration::ZERO, &mut buffer)?;
+            }
+        }
+        let Some((received, count)) = read else { return Ok(()) };
+        open.knock_at = now + KNOCK_PERIOD;
+        let bytes = buffer.get(..count).unwrap_or_default();
+        if open.times.may_be_burst(received, is_late) {
+            return self.read_waiting(open, (received, bytes), is_late);
+        }
+        open.times.take(received, count);
+        self.heard(open.line.as_mut(), received, bytes)
+    }
+
+    /// Reads all bytes that wait after those of a first read. If they arrived late, they get the times at which they
+    /// would have arrived.
+    fn read_waiting(&mut self, open: &mut OpenLine, first: (MonoNs, &[u8]), is_late: bool) -> io::Result<()> {
+        let line = open.line.as_mut();
+        let mut parts = vec![(first.0, first.1.to_vec())];
+        let (mut total, mut buffer) = (first.1.len(), [0; READ_BYTES]);
+        let mut ended = Ok(());
+        while total < MOST_WAITING {
+            match self.read_once(line, Duration::ZERO, &mut buffer) {
+                Ok(None) => break,
+                Ok(Some((received, count))) => {
+                    total += count;
+                    parts.push((received, buffer.get(..count).unwrap_or_default().to_vec()));
+                }
+                // The bytes read before the connection was lost still count.
+                Err(error) => {
+                    ended = Err(error);
+                    break;
+                }
+            }
+        }
+        let now = self.common.host.now();
+        let Some(spread) = open.times.take_waiting(now, total, is_late) else {
+            parts.iter().try_for_each(|(received, bytes)| self.heard(line, *received, bytes))?;
+            return ended;
+        };
+        tracing::debug!(bytes = total, is_late, "data arrived late in a burst");
+        self.common.late_data.found(now);
+        self.heard_late(line, &parts, &spread)?;
+        ended
+    }
+
+    /// Passes late data to the drivers, a byte stream in short parts.
+    fn heard_late(
+        &mut self,
+        line: &mut dyn Line,
+        parts: &[(MonoNs, Vec<u8>)],
+        spread: &Spread,
+    ) -> io::Result<()> {
+        let is_stream = |connect: &Connect| matches!(connect.carrier(), Carrier::Serial | Carrier::Tcp);
+        let is_stream = self.connect.as_ref().is_ok_and(is_stream);
+        let mut before = 0;
+        for (_, bytes) in parts {
+            let part_bytes = if is_stream { spread.part_bytes() } else { bytes.len().max(1) };
+            for part in bytes.chunks(part_bytes) {
+                self.heard(line, spread.at(before), part)?;
+                before += part.len();
+            }
+        }
+        Ok(())
+    }
+
+    fn read_once(
+        &mut self,
+        line: &mut dyn Line,
+        wait: Duration,
+        into: &mut [u8; READ_BYTES],
+    ) -> io::Result<Option<(MonoNs, usize)>> {
+        let devices = &self.devices;
+        let is_valid = |bytes: &[u8]| devices.iter().any(|device| device.attached.driver.accepts(bytes));
+        line.read_device(wait, into, &mut self.senders, &is_valid)
     }
 
     /// Reports to [`LineRecord`] how many packets were dropped since the previous report.

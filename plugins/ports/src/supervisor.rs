@@ -8,13 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::{self, Feed};
 use headrace_monitor::ring::Port;
 use headrace_monitor::run::Loop;
 use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::Driver;
 
+use crate::backlog::LateData;
 use crate::clock;
 use crate::host::RealHost;
 use crate::line_service::{Attached, Common, LineRecord, LineService};
@@ -25,6 +26,10 @@ use crate::wake::{self, Waker};
 const BOARD: usize = 256;
 /// Longest time between two ticks of the loop while no input arrives.
 const PERIOD: Duration = Duration::from_millis(20);
+/// Time between two ticks after which the lines may have late data.
+const STALLED: DurNs = DurNs::from_millis(100);
+/// Longest time for which the loop waits until all lines have read their late data.
+const LONGEST_SETTLING: DurNs = DurNs::from_millis(200);
 /// Pause while the loop waits for a slow output.
 const BEHIND: Duration = Duration::from_millis(1);
 
@@ -47,6 +52,7 @@ pub struct Supervisor {
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
     stopping: Arc<AtomicBool>,
     board: StatusQueue,
+    late_data: LateData,
     /// Makes the type not `Send`: the loop must run on this thread, because the lines wake this thread.
     on_this_thread: PhantomData<*const ()>,
 }
@@ -62,10 +68,18 @@ impl Supervisor {
         let board = StatusQueue::new(BOARD);
         let waker = Waker::of_this_thread();
         let host = Arc::new(RealHost);
-        let common = Common { host, stopping: Arc::clone(&stopping), board: board.clone(), waker, record };
+        let late_data = LateData::default();
+        let common = Common {
+            host,
+            stopping: Arc::clone(&stopping),
+            board: board.clone(),
+            waker,
+            late_data: late_data.clone(),
+            record,
+        };
         let sensors = connections.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
         let mut supervisor =
-            Self { sensors, threads: Vec::new(), stopping, board, on_this_thread: PhantomData };
+            Self { sensors, threads: Vec::new(), stopping, board, late_data, on_this_thread: PhantomData };
         let mut before = Vec::new();
         for (name, connect, attached) in lines(connections) {
             let service = LineService::new(connect.clone(), before.clone(), attached, common.clone());
@@ -83,7 +97,8 @@ impl Supervisor {
 
     /// Runs the loop until `ended` returns true. A tick runs when packets arrive, or after the loop period.
     pub fn run(&self, dive: &mut Loop, ended: &dyn Fn() -> bool, after_tick: &mut dyn FnMut(&Loop)) {
-        let Ok(()) = feed::drive(dive, &mut LiveFeed { ended }, after_tick);
+        let mut feed = LiveFeed { ended, late_data: &self.late_data, ticked: clock::now() };
+        let Ok(()) = feed::drive(dive, &mut feed, after_tick);
     }
 
     /// Stops all threads and drains the rings. Returns each sensor's line history, in the order of the sensors.
@@ -123,6 +138,9 @@ fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce(
 /// Live feed of a loop. The threads of the lines fill the rings.
 struct LiveFeed<'a> {
     ended: &'a dyn Fn() -> bool,
+    late_data: &'a LateData,
+    /// Time at which the latest tick began.
+    ticked: MonoNs,
 }
 
 impl Feed for LiveFeed<'_> {
@@ -133,7 +151,17 @@ impl Feed for LiveFeed<'_> {
             return Ok(None);
         }
         wake::sleep::<wake::System>(PERIOD);
-        Ok(Some(clock::now()))
+        let woken = clock::now();
+        if woken.since(self.ticked) > STALLED {
+            self.late_data.found(woken);
+        }
+        let mut now = woken;
+        while self.late_data.is_recent(now) && now.since(woken) < LONGEST_SETTLING {
+            pause();
+            now = clock::now();
+        }
+        self.ticked = now;
+        Ok(Some(now))
     }
 
     fn pause(&mut self) {

@@ -179,8 +179,16 @@ impl Device {
     }
 }
 
-/// Passes received bytes to a device and lets it measure. The vehicle moves at 0.2 m/s along the axis of a pipe with
-/// a radius of 3 m.
+/// Speed of the vehicle, m/s.
+pub const TRUE_SPEED_MPS: f64 = 0.2;
+
+/// Chainage of the vehicle, m.
+pub fn true_chainage_m(at: MonoNs) -> f64 {
+    5.0 + TRUE_SPEED_MPS * at.since(MonoNs(0)).as_secs_f64()
+}
+
+/// Passes received bytes to a device and lets it measure. The vehicle moves along the axis of a pipe with a radius of
+/// 3 m.
 fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
     match device {
         Emulated::Head(device) | Emulated::Echosounder(device) => {
@@ -190,7 +198,7 @@ fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<
             step(device.as_mut(), heard, now, out, |pressure| pressure.pressure_pa = 150_360.0);
         }
         Emulated::Tether(device) => step(device.as_mut(), heard, now, out, |payout| {
-            payout.chainage_m = 5.0 + 0.2 * payout.at.since(MonoNs(0)).as_secs_f64();
+            payout.chainage_m = true_chainage_m(payout.at);
         }),
         Emulated::Inertial(device) => step(device.as_mut(), heard, now, out, |inertia| {
             inertia.force_mps2 = Vec3::new(0.0, 0.0, 9.81);

@@ -13,6 +13,10 @@ pub struct DiveResult {
     pub plan: Plan,
     /// Packets that the loop took during the dive, in order.
     pub consumed: Vec<Consumed>,
+    /// Positions at the advice updates, in order; after each tick, the latest.
+    pub positions: Vec<Position>,
+    /// Kinds of all alerts of the dive, and causes of missed stretches.
+    pub alerts: Vec<&'static str>,
     /// Digest of the results.
     pub digest: u64,
     /// Results of the lines between devices and loop, one for each device.
@@ -69,4 +73,19 @@ pub struct Consumed {
     pub received: MonoNs,
     /// Content of the packet.
     pub bytes: Vec<u8>,
+}
+
+/// Position at an advice update.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position {
+    /// Time of the advice update.
+    pub at: MonoNs,
+    /// Estimated chainage and its standard deviation, m.
+    pub chainage_m: f64,
+    /// Standard deviation of the chainage, m.
+    pub sd_m: f64,
+    /// Estimated speed, m/s.
+    pub speed_mps: f64,
+    /// Whether the position counts as reliable.
+    pub is_sure: bool,
 }

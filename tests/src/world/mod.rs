@@ -23,12 +23,15 @@ use std::time::Duration;
 
 use headrace::InRecordings;
 use headrace_config::Document;
+use headrace_coverage::{Cause, Causes};
 use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
+use headrace_monitor::alert_list::{Figures, ListedAlert};
+use headrace_monitor::live_state::PositionState;
 use headrace_monitor::notice_outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
-use headrace_ports::{Attached, Common, LineHistory, LineRecord, LineService, StatusQueue, Waker};
+use headrace_ports::{Attached, Common, LateData, LineHistory, LineRecord, LineService, StatusQueue, Waker};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{
     Every, Interrupted, LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo,
@@ -45,8 +48,9 @@ use crate::folder::Folder;
 use crate::random::Random;
 use cable::{Cable, Clock, Machine};
 use device::Device;
+pub use device::{TRUE_SPEED_MPS, true_chainage_m};
 use disk::{LeftFile, SimulatedDisk};
-pub use dive_result::{Consumed, DiveResult, Line, Replayed};
+pub use dive_result::{Consumed, DiveResult, Line, Position, Replayed};
 use plan::{BEGIN, Ending, Fault, LogChange, MachineFault, Plan};
 pub use sabotage::Sabotage;
 
@@ -84,6 +88,9 @@ const SENSORS: [&str; 6] = [
     "plugin = \"tether_hid\"\nconnect = \"udp:10.0.0.2:9002\"\ncounts_per_metre = 2000\n",
 ];
 
+/// Number of sensors, each on a line of its own.
+pub const SENSOR_COUNT: usize = SENSORS.len();
+
 /// Size of the recorder's queue, bytes. It is so small that a stall of some seconds fills the queue.
 const QUEUE_BYTES: usize = 128 * 1024;
 
@@ -114,6 +121,7 @@ pub struct World {
     board: StatusQueue,
     dive: Loop,
     consumed: Vec<Consumed>,
+    positions: Vec<Position>,
     disk: SimulatedDisk,
     recorder: RecorderWorker,
     /// Moments at which the recorder had emptied its queue, each with the number of packets that it had then recorded.
@@ -162,6 +170,7 @@ impl World {
             stopping: Arc::new(AtomicBool::new(false)),
             board: board.clone(),
             waker: Waker::of_this_thread(),
+            late_data: LateData::default(),
             record: (sabotage != Some(Sabotage::DropsUntold))
                 .then(|| Arc::new(InRecordings(vec![recorder.line_port()])) as Arc<dyn LineRecord>),
         };
@@ -183,6 +192,7 @@ impl World {
             devices.push(Device::new(sensor.emulator(&setup), cable, faults, loses, Random(random.bits())));
         }
         let (consumed, taken, syncing, certain) = (Vec::new(), VecDeque::new(), VecDeque::new(), 0);
+        let positions = Vec::new();
         let (is_failing, is_behind) = (false, false);
         Self {
             sabotage,
@@ -194,6 +204,7 @@ impl World {
             board,
             dive,
             consumed,
+            positions,
             disk,
             recorder,
             taken,
@@ -229,7 +240,8 @@ impl World {
         let (certain, longest_wait) = (self.certain, self.longest_wait);
         let has_left_out = self.skipped > 0 || self.is_behind;
         let since_begin = self.since_begin();
-        let Self { services, mut dive, devices, plan, mut consumed, disk, recorder, mut random, .. } = self;
+        let Self { services, mut dive, devices, plan, mut consumed, positions, .. } = self;
+        let Self { disk, recorder, mut random, .. } = self;
         let histories: Vec<LineHistory> =
             services.into_iter().flat_map(LineService::end).map(|(_, history)| history).collect();
         let mut recorder = Some(recorder);
@@ -265,6 +277,8 @@ impl World {
             longest_wait,
             plan,
             consumed,
+            positions,
+            alerts: dive.view().alert_list().iter().flat_map(words).collect(),
         }
     }
 
@@ -340,6 +354,7 @@ impl World {
         } else {
             let taken = self.dive.tick(now);
             note(&self.dive, &mut self.consumed);
+            self.positions.extend(position(&self.dive));
             if taken > 0 || !self.dive.has_waiting() {
                 self.waiting_since = None;
             } else {
@@ -535,13 +550,14 @@ fn assemble(
 
 /// Does the work of a line service's thread until the thread would wait.
 fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
-    // The driver reads once in each round. If it is due again at once in every round, a real thread would never wait.
-    // The limit of rounds detects this.
-    for _ in 0..10_000 {
+    // The driver reads once in each round, and also at intervals if nothing arrives. The limit detects a driver that is
+    // due again at once in every round; a real thread would never wait.
+    for round in 0..10_000 {
         let due = match service.closed_until() {
             Some(until) => until <= now,
             None => {
-                !cable.to_host.is_empty() || !cable.is_open() || service.due().is_some_and(|due| due <= now)
+                let is_due = service.due().is_some_and(|due| due <= now);
+                round == 0 || !cable.to_host.is_empty() || !cable.is_open() || is_due
             }
         };
         if !due {
@@ -550,6 +566,29 @@ fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
         service.step();
     }
     panic!("a line service is always due");
+}
+
+/// Position at the latest advice update; `None` without a position.
+fn position(dive: &Loop) -> Option<Position> {
+    let state = dive.view().live_state();
+    let (chainage_m, speed_mps) = state.chainage_m.zip(state.speed_mps)?;
+    let sd_m = state.sd.map_or(0.0, |sd| sd.along_m);
+    Some(Position {
+        at: state.at?,
+        chainage_m,
+        sd_m,
+        speed_mps,
+        is_sure: state.position == PositionState::Ok,
+    })
+}
+
+/// Kind of an alert, and causes of a missed stretch.
+fn words(alert: &ListedAlert) -> Vec<&'static str> {
+    let causes = match &alert.figures {
+        Figures::Missed(figures, ..) => figures.causes,
+        _ => Causes::default(),
+    };
+    [alert.kind.as_str()].into_iter().chain(causes.iter().map(Cause::as_str)).collect()
 }
 
 fn note(dive: &Loop, consumed: &mut Vec<Consumed>) {

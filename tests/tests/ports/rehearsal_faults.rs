@@ -85,8 +85,8 @@ fn unplugged_stalled_and_restarted_devices_are_reported_and_come_back() {
     assert!(complaints.contains("no device \"sonar_9\"; expected one of: sonar_0, sonar_1"), "{complaints}");
 }
 
-#[test]
-fn delayed_data_arrive_later_by_the_delay() {
+/// Returns the times, s, that a host of the cable counter waits for its next 30 reports after a command.
+fn waits_after(line: &str, id: &str, effect: &str) -> Vec<f64> {
     let folder = Folder::new();
     let mut emulator = Piped::emulator(&folder);
     let port = emulator.until("tether", "udp:127.0.0.1:");
@@ -96,15 +96,29 @@ fn delayed_data_arrive_later_by_the_delay() {
     host.send(b"\n").unwrap();
     let mut report = [0; 64];
     host.recv(&mut report).unwrap();
-    emulator.order("delay tether 2s", "tether", "data 2 s late");
+    emulator.order(line, id, effect);
     #[expect(clippy::disallowed_methods, reason = "the delay is wall time")]
-    let longest = (0..20).map(|_| {
+    let waits = (0..30).map(|_| {
         let begun = Instant::now();
         host.recv(&mut report).unwrap();
-        begun.elapsed()
+        begun.elapsed().as_secs_f64()
     });
-    let longest = longest.max().unwrap();
-    assert!((1.5..20.0).contains(&longest.as_secs_f64()), "{longest:?}");
+    waits.collect()
+}
+
+#[test]
+fn delayed_data_arrive_later_by_the_delay() {
+    let longest =
+        waits_after("delay tether 2s", "tether", "data 2 s late").into_iter().reduce(f64::max).unwrap();
+    assert!((1.5..20.0).contains(&longest), "{longest}");
+}
+
+#[test]
+fn held_data_of_all_devices_arrive_at_once() {
+    let waits = waits_after("hold 2s", "all devices", "data held back for 2 s");
+    let held = waits.iter().position(|wait| *wait > 1.0).unwrap();
+    let after: f64 = waits[held + 1..].iter().take(10).sum();
+    assert!(after < 0.5 * waits[held], "{waits:?}");
 }
 
 #[test]
@@ -130,6 +144,7 @@ fn keys_cause_and_end_faults() {
         (b"\x1b[A\x1b[Ar", "tether       restarts"),
         (b"f", "tether       count frozen"),
         (b"f", "tether       counts again"),
+        (b"b", "all devices  data held back for 1.3 s"),
     ] {
         screen.press(key);
         screen.until(shown);

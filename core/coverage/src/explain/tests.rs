@@ -65,6 +65,10 @@ impl Default for Wall {
 const BARE: Option<[[f64; 2]; 2]> = Some([[9.7, 10.5], [3.0, 4.5]]);
 
 fn named(wall: &Wall) -> Vec<Cause> {
+    explained(wall).causes.iter().collect()
+}
+
+fn explained(wall: &Wall) -> Evidence {
     let layout =
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
     let (mut store, mut lacks) = (SampleStore::new(layout), MissingSamples::default());
@@ -105,7 +109,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
     let passage = Passage { pings: 1000, placed: 1000, drive, adrift, ..Passage::default() };
     let evidence = explain(&case, core::iter::once(&passage), &store, &mut finder);
     assert_eq!(evidence.causes.iter().next(), Some(evidence.cause));
-    evidence.causes.iter().collect()
+    evidence
 }
 
 #[test]
@@ -217,6 +221,16 @@ fn silent_heads_are_the_only_named_cause_if_no_head_pinged() {
     let fast = || Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { is_dark: true, ..fast() }), [Cause::HeadSilent]);
     assert_eq!(named(&fast()), [Cause::TooFast]);
+}
+
+/// The passage knows no silent head, because the silence was short.
+#[test]
+fn head_that_was_silent_for_a_moment_is_named() {
+    let heads = |cause: Cause| {
+        explained(&Wall { bare: BARE, why: Causes::of(cause), ..Wall::default() }).silent_heads
+    };
+    assert_eq!(heads(Cause::HeadSilent), HeadSet::first(1));
+    assert_eq!(heads(Cause::HeadStalled), HeadSet::default());
 }
 
 #[test]
