@@ -507,6 +507,7 @@ impl Dive {
 
     /// Ends a dive on ports, and returns the report.
     pub(crate) fn end_live(mut self, supervisor: Supervisor, watch: &mut Watch) -> Report {
+        watch.ending();
         let notices = self.notices.clone();
         let histories = supervisor.stop(&mut self.armed, &mut |_| ());
         while let Some(notice) = notices.next() {

@@ -36,6 +36,8 @@ pub(crate) trait Follower {
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
     /// Called when the state of an interrupted dive has been rebuilt from its log.
     fn rebuilt(&mut self, _dive: &Loop) {}
+    /// Called when a dive on ports ends, before its last sections are judged.
+    fn ending(&mut self) {}
     /// Called when the dive has ended and all sections are judged.
     fn end(&mut self, dive: &Loop);
 }

@@ -11,6 +11,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::cli::Following;
 use crate::failure::Failure;
 use crate::mavlink_out::MavlinkOut;
+use crate::service::Service;
 use crate::tui::{Mode, Start, Tui};
 use crate::watch::{Show, Watch};
 
@@ -81,6 +82,11 @@ impl Followers {
     ///
     /// Errors: a follower can't be started.
     pub(crate) fn join(self, mut watch: Watch, joining: Joining<'_>) -> Result<Watch, Failure> {
+        if matches!(joining.mode, Mode::Live)
+            && let Some(service) = Service::start()?
+        {
+            watch = watch.followed_by(Box::new(service));
+        }
         if let Some((to, system_id)) = &self.mavlink_out {
             watch = watch.followed_by(Box::new(MavlinkOut::start(to, *system_id)?));
         }

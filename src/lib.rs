@@ -46,6 +46,7 @@ mod report_output;
 mod resume;
 mod screen;
 mod sensor_lines;
+mod service;
 mod simulate;
 mod smooth;
 mod summary;

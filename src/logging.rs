@@ -10,8 +10,9 @@ use crossbeam::channel::{Sender, bounded};
 use crossbeam::queue::ArrayQueue;
 use headrace_config::plain::one_line;
 use tracing::level_filters::LevelFilter;
+use tracing::{Level, Metadata};
 use tracing_subscriber::filter::Targets;
-use tracing_subscriber::fmt;
+use tracing_subscriber::fmt::{self, MakeWriter};
 use tracing_subscriber::prelude::*;
 
 use crate::cli::Verbosity;
@@ -27,7 +28,7 @@ const OURS: &str = "headrace";
 /// If a caller of this library has installed its own subscriber, that subscriber stays.
 pub(crate) fn start(verbosity: &Verbosity) {
     let (filter, error) = filter(verbosity.level(), std::env::var(VARIABLE).ok().as_deref());
-    let layer = fmt::layer().with_ansi(terminal::of(&io::stderr()).colour).with_writer(|| Stderr);
+    let layer = fmt::layer().with_ansi(terminal::of(&io::stderr()).colour).with_writer(Stderr);
     if tracing_subscriber::registry().with(layer.with_filter(filter)).try_init().is_err() {
         return;
     }
@@ -153,7 +154,31 @@ pub(crate) fn release() {
 /// Writes a line to stderr after the lines that are queued. The line may contain text from outside the
 /// program.
 pub(crate) fn complain(text: &str) {
-    pass(format!("{}\n", one_line(text)).as_bytes());
+    pass(format!("{}{}\n", prefix(Level::ERROR), one_line(text)).as_bytes());
+}
+
+/// Prefix by which systemd's journal recognises a line's priority; empty if stderr isn't the journal.
+///
+/// Source: `sd-daemon(3)`.
+fn prefix(level: Level) -> &'static str {
+    static IS_JOURNAL: OnceLock<bool> = OnceLock::new();
+    let is_journal = || {
+        let stream = std::env::var("JOURNAL_STREAM").ok();
+        rustix::fs::fstat(io::stderr())
+            .is_ok_and(|stderr| is_stream(stream.as_deref(), stderr.st_dev, stderr.st_ino))
+    };
+    match level {
+        _ if !*IS_JOURNAL.get_or_init(is_journal) => "",
+        Level::ERROR => "<3>",
+        Level::WARN => "<4>",
+        Level::INFO => "<6>",
+        _ => "<7>",
+    }
+}
+
+/// Whether `JOURNAL_STREAM` names the file with this device and inode. Source: `systemd.exec(5)`.
+fn is_stream(variable: Option<&str>, device: u64, inode: u64) -> bool {
+    variable == Some(format!("{device}:{inode}").as_str())
 }
 
 /// Waits until all lines for stderr are written. In a dive the wait is at most 2 s.
@@ -224,9 +249,24 @@ fn event(bytes: &[u8]) -> String {
 /// Stderr, for log messages.
 struct Stderr;
 
-impl Write for Stderr {
+impl MakeWriter<'_> for Stderr {
+    type Writer = LevelWriter;
+
+    fn make_writer(&self) -> LevelWriter {
+        LevelWriter(Level::INFO)
+    }
+
+    fn make_writer_for(&self, event: &Metadata<'_>) -> LevelWriter {
+        LevelWriter(*event.level())
+    }
+}
+
+/// Stderr, for a log message of a level.
+struct LevelWriter(Level);
+
+impl Write for LevelWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        pass(event(bytes).as_bytes());
+        pass((prefix(self.0).to_owned() + &event(bytes)).as_bytes());
         Ok(bytes.len())
     }
 
@@ -237,8 +277,6 @@ impl Write for Stderr {
 
 #[cfg(test)]
 mod tests {
-    use tracing::Level;
-
     use super::*;
 
     fn enabled(level: Option<LevelFilter>, variable: Option<&str>) -> impl Fn(&str, Level) -> bool {
@@ -252,6 +290,13 @@ mod tests {
         let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
         let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
         assert_eq!(event(text.as_bytes()), line);
+    }
+
+    #[test]
+    fn stderr_is_the_journal_only_if_both_numbers_agree() {
+        assert!(is_stream(Some("9:4711"), 9, 4711));
+        assert!(!is_stream(Some("9:4711"), 9, 4712) && !is_stream(Some("8:4711"), 9, 4711));
+        assert!(!is_stream(None, 9, 4711) && !is_stream(Some("9"), 9, 4711));
     }
 
     #[test]

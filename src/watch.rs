@@ -273,6 +273,11 @@ impl Watch {
         }
     }
 
+    /// Tells followers that a dive on ports ends.
+    pub(crate) fn ending(&mut self) {
+        self.followers.iter_mut().for_each(|follower| follower.ending());
+    }
+
     /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
         let mut told = Vec::new();
@@ -304,13 +309,7 @@ impl Watch {
     }
 
     fn status(&mut self, state: &LiveState, dive: &Loop) {
-        let name =
-            |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
-        let mut line = status_line(state, &dive.mission().profile, dive.head_descriptions(), &name);
-        if let Some((words, is_alarm)) = self.recorded.words() {
-            line.what.insert(line.what.len().min(1), words);
-            line.lamp = if is_alarm { Some(Lamp::Red) } else { line.lamp };
-        }
+        let line = state_line(dive, &self.recorded);
         if self.show == Show::JsonLines {
             let mut value = match serde_json::to_value(dive.view().live_state_json()) {
                 Ok(value) => value,
@@ -379,6 +378,18 @@ impl Watch {
             printer.line(text);
         }
     }
+}
+
+/// The dive's state as a line, with failing or unsynced recordings.
+pub(crate) fn state_line(dive: &Loop, recorded: &RecordingState) -> PilotLine {
+    let name = |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
+    let state = dive.view().live_state();
+    let mut line = status_line(state, &dive.mission().profile, dive.head_descriptions(), &name);
+    if let Some((words, is_alarm)) = recorded.words() {
+        line.what.insert(line.what.len().min(1), words);
+        line.lamp = if is_alarm { Some(Lamp::Red) } else { line.lamp };
+    }
+    line
 }
 
 /// Time shown with a state of the dive. It is the time of the state's last update, so that the same dive
