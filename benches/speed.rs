@@ -403,7 +403,7 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
             node_m: 0.5,
         }),
         unsure: None,
-        lacks: headrace_coverage::MissingSamples::default(),
+        missing_samples: headrace_coverage::MissingSamples::default(),
     };
     let mut last = [None; 8];
     let profile = shapes::ceran().unwrap();

@@ -294,13 +294,13 @@ impl Rehearsal<'_> {
             Order::End => self.is_ended = true,
             Order::Freeze(is_frozen) => {
                 self.is_frozen = is_frozen;
-                let told = if is_frozen { "count frozen" } else { "counts again" };
+                let text = if is_frozen { "count frozen" } else { "counts again" };
                 let counters = self.simulation.freeze_counters(is_frozen);
                 if counters.is_empty() {
                     complain("headrace: this vehicle has no cable counter to freeze");
                 }
                 for number in counters {
-                    tell(self.stands.get(number).map_or("", |stand| stand.id.as_str()), told);
+                    tell(self.stands.get(number).map_or("", |stand| stand.id.as_str()), text);
                 }
             }
             Order::Hold(duration) => {
@@ -320,7 +320,7 @@ impl Rehearsal<'_> {
 
 /// Changes a device, and shows the change.
 fn apply(stand: &mut Stand, change: Change, now: MonoNs) {
-    let told = match change {
+    let text = match change {
         Change::Unplug => {
             stand.unplug();
             "unplugged".to_owned()
@@ -347,12 +347,12 @@ fn apply(stand: &mut Stand, change: Change, now: MonoNs) {
             format!("restarts: off for {} s", OFF.as_secs_f64())
         }
     };
-    tell(&stand.id, &told);
+    tell(&stand.id, &text);
 }
 
 /// Shows a change of a device.
-fn tell(id: &str, told: &str) {
-    say(&format!("{id:<12} {told}"));
+fn tell(id: &str, text: &str) {
+    say(&format!("{id:<12} {text}"));
 }
 
 /// The delay that comes after `delay` when the key is pressed once more.

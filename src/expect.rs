@@ -61,8 +61,8 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
                 report.insert(TOLERANCES.to_owned(), stated);
             }
             // Keys missing in a golden report of an earlier version are added.
-            let lacks = |key: &String| before.get(key).is_none();
-            if !differs && !got.as_object().is_some_and(|got| got.keys().any(lacks)) {
+            let is_new = |key: &String| before.get(key).is_none();
+            if !differs && !got.as_object().is_some_and(|got| got.keys().any(is_new)) {
                 complain(&format!("{}: unchanged", golden.display()));
                 return Ok(());
             }

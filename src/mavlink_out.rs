@@ -33,7 +33,7 @@ pub(crate) struct MavlinkOut {
     heartbeat: Option<MonoNs>,
     figures: Option<MonoNs>,
     /// Numbers of the alerts whose texts have been sent.
-    told: BTreeSet<u32>,
+    sent: BTreeSet<u32>,
 }
 
 impl MavlinkOut {
@@ -54,7 +54,7 @@ impl MavlinkOut {
             thread: Some(thread),
             heartbeat: None,
             figures: None,
-            told: BTreeSet::new(),
+            sent: BTreeSet::new(),
         })
     }
 
@@ -88,7 +88,7 @@ fn is_due(last: &mut Option<MonoNs>, now: MonoNs, every: DurNs) -> bool {
 impl Follower for MavlinkOut {
     fn notice(&mut self, notice: &Notice, dive: &Loop) {
         let Notice::Listed { change: AlertChange::Raised, alert, .. } = notice else { return };
-        if !self.told.insert(alert.number) {
+        if !self.sent.insert(alert.number) {
             return;
         }
         let gravity = match alert.priority {

@@ -57,12 +57,12 @@ fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
 
 /// Texts about voice notes whose recordings are missing in the log.
 fn missing(found: &LoggedNotes) -> Vec<String> {
-    let lacks = |note: &NoteJson| {
+    let missing_note = |note: &NoteJson| {
         let voice = note.voice.as_ref().filter(|voice| voice.seconds.is_some())?;
         let words = format!("note {}: its recording isn't in the log", note.number);
         (!found.voices.contains_key(&voice.id)).then_some(words)
     };
-    found.notes.iter().filter_map(lacks).collect()
+    found.notes.iter().filter_map(missing_note).collect()
 }
 
 fn tell(

@@ -153,8 +153,8 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
     for port in page.taken() {
         complain(&format!("headrace: port {port} is taken; the page is on {}", page.address().port()));
     }
-    let told = told(&page, tokens.as_ref());
-    lines.unwrap_or(&mut complain)(told.trim_end());
+    let opening_text = opening_text(&page, tokens.as_ref());
+    lines.unwrap_or(&mut complain)(opening_text.trim_end());
     Ok(Served { page, span, clock, is_playback, waits, directed })
 }
 
@@ -199,7 +199,7 @@ fn hosts(args: &PageArgs) -> Vec<String> {
 }
 
 /// Address of the page, as text. Its tokens are shown only on a terminal, and are never logged.
-fn told(page: &Page, tokens: Option<&Tokens>) -> String {
+fn opening_text(page: &Page, tokens: Option<&Tokens>) -> String {
     let (scheme, at) = (page.scheme(), page.address());
     let host = if at.ip().is_unspecified() { own_address(at.ip()) } else { at.ip() };
     let base = format!("{scheme}://{}", SocketAddr::new(host, at.port()));
@@ -470,8 +470,8 @@ impl PageFollower {
 }
 
 impl Follower for PageFollower {
-    fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
-        self.collector.messages(told, dive);
+    fn messages(&mut self, messages: &[LiveMessage], dive: &Loop) {
+        self.collector.messages(messages, dive);
     }
 
     fn notice(&mut self, notice: &Notice, _: &Loop) {

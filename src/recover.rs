@@ -51,12 +51,12 @@ fn tell(args: &Recover, recovered: &Recovered, clock: DiveClock) -> Result<(), F
                 "offset": loss.offset, "bytes": loss.bytes,
             })
         });
-        let told = json!({
+        let report = json!({
             "log": args.output.display().to_string(), "messages": recovered.messages,
             "from_s": seconds.map(|span| span[0]), "to_s": seconds.map(|span| span[1]),
             "losses": losses.collect::<Vec<_>>(),
         });
-        return deliver(&told.to_string());
+        return deliver(&report.to_string());
     }
     for loss in &recovered.losses {
         say(&format!("lost     {}", loss.in_dive_time(clock)));

@@ -153,19 +153,19 @@ fn silence(source: &SourceReport) -> Option<String> {
 
 /// Text that explains why a dive is no inspection.
 fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
-    let lacking = why
+    let missing = why
         .missing
-        .map_or_else(|| "position".to_owned(), |lacking| lacking.trim_start_matches("no_").replace('_', " "));
+        .map_or_else(|| "position".to_owned(), |missing| missing.trim_start_matches("no_").replace('_', " "));
     let text = match why.reason {
         "no_sonar" => {
             return "NO COVERAGE: no profiling sonar returns in this dive; nothing was inspected".to_owned();
         }
         "outside_tunnel" => return outside_text(dive),
         "no_position" => {
-            format!("NO VERDICTS: the vehicle never had a position, because the {lacking} was unknown")
+            format!("NO VERDICTS: the vehicle never had a position, because the {missing} was unknown")
         }
         _ => format!(
-            "NO INSPECTION: {:.0} % of the pings had no position, mostly because of missing {lacking}",
+            "NO INSPECTION: {:.0} % of the pings had no position, mostly because of missing {missing}",
             why.without_position_share * 100.0
         ),
     };

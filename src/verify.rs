@@ -72,11 +72,11 @@ fn tell(
     if args.json {
         let differences: Vec<Value> =
             verified.differences.iter().map(|difference| as_json(difference, sources)).collect();
-        let told = json!({
+        let answer = json!({
             "same_records": verified.same, "unrecorded_records": verified.unrecorded, "differences": differences,
             "losses": losses,
         });
-        deliver(&told.to_string())?;
+        deliver(&answer.to_string())?;
         return Ok(code);
     }
     for loss in losses {
@@ -141,13 +141,14 @@ fn name(source: u64, sources: &[SourceInfo]) -> String {
 
 fn as_json(difference: &Difference, sources: &[SourceInfo]) -> Value {
     let Difference { tick, stream, record, what } = difference;
-    let mut told =
+    let mut answer =
         json!({"tick": tick, "stream": stream, "record": record, "what": text(difference, sources)});
-    if let (What::Field { source, field, live, replayed, .. }, Some(told)) = (what, told.as_object_mut()) {
-        told.insert("source".to_owned(), json!(source.map(|source| name(source, sources))));
-        told.insert("field".to_owned(), json!(field));
-        told.insert("live_bits".to_owned(), json!(format!("{live:016x}")));
-        told.insert("replayed_bits".to_owned(), json!(format!("{replayed:016x}")));
+    if let (What::Field { source, field, live, replayed, .. }, Some(answer)) = (what, answer.as_object_mut())
+    {
+        answer.insert("source".to_owned(), json!(source.map(|source| name(source, sources))));
+        answer.insert("field".to_owned(), json!(field));
+        answer.insert("live_bits".to_owned(), json!(format!("{live:016x}")));
+        answer.insert("replayed_bits".to_owned(), json!(format!("{replayed:016x}")));
     }
-    told
+    answer
 }

@@ -116,10 +116,10 @@ impl Watch {
             return;
         }
         self.clock = dive.view().clock();
-        let mut told = Vec::new();
-        self.teller.hear(notice, dive, &mut |one| told.push(one));
+        let mut messages = Vec::new();
+        self.teller.hear(notice, dive, &mut |one| messages.push(one));
         for follower in &mut self.followers {
-            follower.messages(&told, dive);
+            follower.messages(&messages, dive);
             follower.notice(notice, dive);
         }
         let at = match notice {
@@ -127,7 +127,7 @@ impl Watch {
             Notice::Advice(entry) => entry.at,
             Notice::Note(note) => note.at,
         };
-        self.tell(at, &told, dive);
+        self.tell(at, &messages, dive);
     }
 
     /// Shows the dive's state. Called after every tick, even without packets.
@@ -137,16 +137,16 @@ impl Watch {
         }
         self.clock = dive.view().clock();
         let state = dive.view().live_state();
-        let mut told = Vec::new();
-        self.teller.tick(state, dive, &mut |one| told.push(one));
+        let mut messages = Vec::new();
+        self.teller.tick(state, dive, &mut |one| messages.push(one));
         for follower in &mut self.followers {
-            follower.messages(&told, dive);
+            follower.messages(&messages, dive);
             follower.tick(dive);
         }
         if self.printer.is_none() {
             return;
         }
-        self.tell(state.now, &told, dive);
+        self.tell(state.now, &messages, dive);
         let condition = state.condition();
         if self.is_due(state, condition) {
             self.shown = Some((as_of(state), condition));
@@ -280,13 +280,13 @@ impl Watch {
 
     /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
-        let mut told = Vec::new();
-        self.teller.end(&dive.view().coverage().sections, &mut |one| told.push(one));
+        let mut messages = Vec::new();
+        self.teller.end(&dive.view().coverage().sections, &mut |one| messages.push(one));
         for follower in &mut self.followers {
-            follower.messages(&told, dive);
+            follower.messages(&messages, dive);
             follower.end(dive);
         }
-        self.tell(dive.now(), &told, dive);
+        self.tell(dive.now(), &messages, dive);
         if let Some(printer) = &mut self.printer {
             printer.end();
         }
@@ -335,11 +335,11 @@ impl Watch {
     }
 
     /// Writes live messages as lines, unless the output has no lines.
-    fn tell(&mut self, at: MonoNs, told: &[LiveMessage], dive: &Loop) {
+    fn tell(&mut self, at: MonoNs, messages: &[LiveMessage], dive: &Loop) {
         if self.printer.is_none() {
             return;
         }
-        for one in told {
+        for one in messages {
             let line = message_line(one, &dive.mission().profile, dive.head_descriptions());
             if self.show == Show::Lines {
                 if one.adds_line() {

@@ -247,8 +247,8 @@ inner."name" = "name 6"
                 VehicleConfig::parse(document, &KINDS, &|_| Err("no file".to_owned())).unwrap()
             };
             let (before, after) = (read(&text), read(&clean));
-            let told = |vehicle: &VehicleConfig| format!("{:?} {:?}", vehicle.tunnel, vehicle.site);
-            assert_eq!((told(&after), after.target), (told(&before), before.target));
+            let shown = |vehicle: &VehicleConfig| format!("{:?} {:?}", vehicle.tunnel, vehicle.site);
+            assert_eq!((shown(&after), after.target), (shown(&before), before.target));
             let sensors = |vehicle: &VehicleConfig| {
                 let sensors = vehicle.sensor_configs.iter();
                 sensors.map(|s| format!("{} {} {:?}", s.id, s.plugin, s.mount)).collect::<Vec<_>>()

@@ -245,12 +245,12 @@ fn tell(
     if args.json {
         let spans: Vec<_> =
             spans.iter().map(|(from, to)| json!({"from_ns": from.0, "to_ns": to.0})).collect();
-        let told = json!({
+        let report = json!({
             "log": args.output.display().to_string(), "messages": messages, "cut": cut, "results_left_out": results,
             "changed": changed, "emptied": emptied, "sensor_bytes_before": bytes_before, "sensor_bytes": bytes_after,
             "losses": losses, "spans": spans, "done": said,
         });
-        return deliver(&told.to_string());
+        return deliver(&report.to_string());
     }
     for words in said {
         say(&format!("done     {words}"));

@@ -21,7 +21,7 @@ use super::wall::{Extent, Wall};
 use crate::cli::KEYS;
 
 /// Maximum number of message lines that the screen keeps.
-const MOST_TOLD: usize = 100;
+const MOST_MESSAGES: usize = 100;
 /// Minimum size of the screen, columns and rows.
 const LEAST: (u16, u16) = (40, 10);
 /// Minimum size of the screen at which the allowed speed is also shown in large digits.
@@ -41,7 +41,7 @@ pub(super) struct Page {
     pub(super) ink: Palette,
     pub(super) shot: Option<ScreenFrame>,
     pub(super) wall: Wall,
-    told: VecDeque<PilotLine>,
+    messages: VecDeque<PilotLine>,
     /// Time for which the loop has been stalled; `None` if it isn't.
     pub(super) late: Option<DurNs>,
     pub(super) playing: Option<Playing>,
@@ -59,7 +59,7 @@ impl Page {
             ink,
             shot: None,
             wall: Wall::default(),
-            told: VecDeque::new(),
+            messages: VecDeque::new(),
             late: None,
             playing: None,
             note: None,
@@ -72,7 +72,7 @@ impl Page {
     /// Updates the screen's content with a frame.
     pub(super) fn take(&mut self, mut shot: ScreenFrame) {
         self.wall.take(&shot.wall);
-        for line in shot.told.drain(..) {
+        for line in shot.messages.drain(..) {
             self.tell(line);
         }
         self.shot = Some(shot);
@@ -84,10 +84,10 @@ impl Page {
     }
 
     fn tell(&mut self, line: PilotLine) {
-        if self.told.len() == MOST_TOLD {
-            self.told.pop_front();
+        if self.messages.len() == MOST_MESSAGES {
+            self.messages.pop_front();
         }
-        self.told.push_back(line);
+        self.messages.push_back(line);
     }
 
     /// Shows an answer to a key in the last row.
@@ -145,7 +145,7 @@ impl Page {
         panels::alerts(shot, self.ink, 2 + more_alerts, rows);
         panels::sensors(shot, self.ink, sensors, rows);
         panels::wall(&self.wall, self.extent, self.ink, (clock > 0, ruler), rows);
-        self.told(rows);
+        self.messages(rows);
     }
 
     fn header(&self, rows: &mut Rows<'_>) {
@@ -226,7 +226,7 @@ impl Page {
     }
 
     /// Draws the last messages, newest at the bottom.
-    fn told(&self, rows: &mut Rows<'_>) {
+    fn messages(&self, rows: &mut Rows<'_>) {
         let room = usize::from(rows.left());
         if room == 0 {
             return;
@@ -239,7 +239,7 @@ impl Page {
         };
         let columns = usize::from(rows.width());
         let mut lines: VecDeque<(String, Option<Lamp>)> = VecDeque::new();
-        for line in self.told.iter().rev() {
+        for line in self.messages.iter().rev() {
             if lines.len() >= room {
                 break;
             }

@@ -24,7 +24,7 @@ use super::wall::{Cell, Clock, WallNews};
 /// Averaging window for a sensor's rate of readings, in the time of the data.
 const RATE_OVER: DurNs = DurNs(2_000_000_000);
 /// Maximum number of messages kept between two frames.
-const MOST_TOLD: usize = 64;
+const MOST_MESSAGES: usize = 64;
 /// Number of sections on either side of the vehicle that every frame includes.
 const NEAR: i64 = 8;
 
@@ -47,7 +47,7 @@ pub(super) struct ScreenFrame {
     pub(super) recording: Option<(String, bool)>,
     pub(super) wall: WallNews,
     /// Messages since the last frame, oldest first.
-    pub(super) told: Vec<PilotLine>,
+    pub(super) messages: Vec<PilotLine>,
 }
 
 /// A sensor's row on the screen.
@@ -63,7 +63,7 @@ pub(super) struct SensorRow {
 /// Builds the frames, and keeps the state that is needed between frames.
 pub(super) struct FrameBuilder {
     vehicle: String,
-    told: VecDeque<PilotLine>,
+    messages: VecDeque<PilotLine>,
     /// Sections that have changed since the last frame; `None` if all have to be shown.
     changed: Option<BTreeSet<i64>>,
     clock: Option<Clock>,
@@ -77,7 +77,7 @@ impl FrameBuilder {
     pub(super) fn new(vehicle: &str) -> Self {
         Self {
             vehicle: vehicle.to_owned(),
-            told: VecDeque::new(),
+            messages: VecDeque::new(),
             changed: None,
             clock: None,
             counted: [None, None],
@@ -88,10 +88,10 @@ impl FrameBuilder {
 
     /// Adds a line to the messages.
     pub(super) fn tell(&mut self, line: PilotLine) {
-        if self.told.len() == MOST_TOLD {
-            self.told.pop_front();
+        if self.messages.len() == MOST_MESSAGES {
+            self.messages.pop_front();
         }
-        self.told.push_back(line);
+        self.messages.push_back(line);
     }
 
     pub(super) fn hear(&mut self, notice: &Notice) {
@@ -101,8 +101,8 @@ impl FrameBuilder {
     }
 
     /// Adds the lines of live messages, except messages that only repeat other lines.
-    pub(super) fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
-        for one in told.iter().filter(|one| one.adds_line()) {
+    pub(super) fn messages(&mut self, messages: &[LiveMessage], dive: &Loop) {
+        for one in messages.iter().filter(|one| one.adds_line()) {
             self.tell(message_line(one, &dive.mission().profile, dive.head_descriptions()));
         }
     }
@@ -150,7 +150,7 @@ impl FrameBuilder {
             alerts_hidden,
             recording: self.recorded.words(),
             wall: self.wall(&state, dive),
-            told: self.told.drain(..).collect(),
+            messages: self.messages.drain(..).collect(),
             state,
         }
     }
@@ -215,8 +215,8 @@ fn reason_text(
     if let Some(phase) = state.phase_text() {
         return phase;
     }
-    let is_told = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
-    if advice.reason == Reason::HelixPitch && !is_told {
+    let is_shown = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
+    if advice.reason == Reason::HelixPitch && !is_shown {
         return format!("the {} limits the speed", limit_words(advice.reason));
     }
     advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile, heads)

@@ -28,10 +28,10 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
     let signals = interrupt::seconds()?;
     let read = move || {
         let mut bytes = [0; 256];
-        let (mut requests, mut is_told) = (Requests::default(), false);
+        let (mut requests, mut is_sent) = (Requests::default(), false);
         while !until.load(Ordering::Relaxed) {
-            if !is_told && interrupted.load(Ordering::Relaxed) {
-                is_told = to.try_send(Message::Interrupted).is_ok();
+            if !is_sent && interrupted.load(Ordering::Relaxed) {
+                is_sent = to.try_send(Message::Interrupted).is_ok();
             }
             let stdin = io::stdin();
             let mut waiting = [PollFd::new(&signals, PollFlags::IN), PollFd::new(&stdin, PollFlags::IN)];

@@ -94,10 +94,10 @@ impl Tui {
         let wanted = Arc::new(AtomicBool::new(true));
         let is_live = matches!(start.mode, Mode::Live);
         let ended = listen::listen(sender.clone(), Arc::clone(&start.interrupted)).map_err(failed)?;
-        let artist = Renderer::new(hold, start.mode, Desk::new(start.console), Arc::clone(&wanted), ended);
+        let renderer = Renderer::new(hold, start.mode, Desk::new(start.console), Arc::clone(&wanted), ended);
         let (drawing, done) = bounded(0);
         let draw = move || {
-            artist.draw_until_the_end(&messages);
+            renderer.draw_until_the_end(&messages);
             drop::<Sender<()>>(drawing);
         };
         let thread =
@@ -126,8 +126,8 @@ impl Tui {
 }
 
 impl Follower for Tui {
-    fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
-        self.eye.messages(told, dive);
+    fn messages(&mut self, messages: &[LiveMessage], dive: &Loop) {
+        self.eye.messages(messages, dive);
     }
 
     fn notice(&mut self, notice: &Notice, _: &Loop) {

@@ -61,7 +61,7 @@ pub fn explain<'a>(
     let present = present(case, &seen, store.perimeter_m());
     let mut trial = Trial::new(case, &seen, store, finder, present);
     let causes = trial.smallest();
-    let in_hole = |lack: &&MissingSample| is_in(case.hole, case.target_m, store.perimeter_m(), lack);
+    let in_hole = |missing: &&MissingSample| is_in(case.hole, case.target_m, store.perimeter_m(), missing);
     let radius_m = case.target_m;
     let sampled =
         Sampled { target_m: case.target_m, t_y_m: drive.middle_t_y_m, perimeter_m: store.perimeter_m() };
@@ -74,7 +74,11 @@ pub fn explain<'a>(
     let hole_m = case.hole.diameter_m.min(times * case.target_m);
     let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);
     let passes_needed = if is_by_chance { here.max(drive.passes_needed) } else { MOST_PASSES };
-    let lost = case.lacks.between(case.hole.x_m - radius_m, case.hole.x_m + radius_m).filter(in_hole).count();
+    let lost = case
+        .missing_samples
+        .between(case.hole.x_m - radius_m, case.hole.x_m + radius_m)
+        .filter(in_hole)
+        .count();
     let evidence = Evidence {
         cause: causes.iter().next().unwrap_or(Cause::Unknown),
         causes,
@@ -104,25 +108,25 @@ fn silent_heads(case: &Case<'_>, seen: &Seen, causes: Causes, perimeter_m: f64) 
     if !causes.has(Cause::HeadSilent) {
         return seen.silent;
     }
-    let Case { hole, lacks, .. } = *case;
+    let Case { hole, missing_samples, .. } = *case;
     let [from_m, to_m] = [-0.5, 0.5].map(|side| hole.x_m + side * hole.diameter_m);
-    let is_silent = |lack: &&MissingSample| lack.why.has(Cause::HeadSilent);
-    let in_hole = |lack: &&MissingSample| is_in(hole, hole.diameter_m, perimeter_m, lack);
-    let lacking = lacks.between(from_m, to_m).filter(is_silent).filter(in_hole);
-    lacking.fold(seen.silent, |heads, lack| heads.with(usize::from(lack.head)))
+    let is_silent = |missing: &&MissingSample| missing.why.has(Cause::HeadSilent);
+    let in_hole = |missing: &&MissingSample| is_in(hole, hole.diameter_m, perimeter_m, missing);
+    let nearby = missing_samples.between(from_m, to_m).filter(is_silent).filter(in_hole);
+    nearby.fold(seen.silent, |heads, missing| heads.with(usize::from(missing.head)))
 }
 
 /// Factors that were present when the section was passed.
 fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let Case { hole, bounds_m: (from_m, to_m), target_m, .. } = *case;
     let around_m = f64::midpoint(hole.diameter_m.min(WIDEST * target_m), target_m);
-    let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
-    let near = |lack: &&MissingSample| {
+    let nearby = case.missing_samples.between(from_m - around_m, to_m + around_m);
+    let near = |missing: &&MissingSample| {
         // The hole may extend all round the wall. Then missing samples at any arc length count.
-        let off_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m).abs();
+        let off_m = math::wrap_signed(missing.arc_m - hole.arc_m, perimeter_m).abs();
         off_m < hole.diameter_m + target_m
     };
-    let mut present = lacking.filter(near).fold(Causes::default(), |all, lack| all.union(lack.why));
+    let mut present = nearby.filter(near).fold(Causes::default(), |all, missing| all.union(missing.why));
     let drive = &seen.worst;
     let is_passed = is_passed(case);
     let is_lost = case.is_torn || seen.unseen || seen.adrift;

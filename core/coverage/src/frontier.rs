@@ -307,7 +307,7 @@ impl Frontier {
     ///
     /// `heads` are the reaches of all heads; that of a silent head is where it would ping. While a head is alive, only
     /// pings move the zone.
-    pub fn beat(
+    pub fn update(
         &mut self,
         span: Reach,
         heads: impl Iterator<Item = HeadReach> + Clone,
@@ -486,7 +486,7 @@ mod tests {
         ///
         /// One head is half a metre in front of the vehicle, and the other half a metre behind it, whether they ping or
         /// not.
-        fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {
+        fn update(&mut self, now_s: u64, x_m: f64) -> Moved {
             let now = MonoNs(now_s * 1_000_000_000);
             let places = [x_m + 0.5, x_m - 0.5].map(|x_m| Reach { from_m: x_m, to_m: x_m });
             for (head, place) in self.heads.iter_mut().zip(places) {
@@ -495,7 +495,7 @@ mod tests {
                 }
             }
             let Self { frontier, heads } = self;
-            frontier.beat(places[0].with(places[1]), heads.iter().flatten().copied(), now, 0.25, 0.25)
+            frontier.update(places[0].with(places[1]), heads.iter().flatten().copied(), now, 0.25, 0.25)
         }
 
         fn ping(&mut self, head: usize, now_s: u64, x_m: f64) -> Moved {
@@ -511,7 +511,7 @@ mod tests {
         frontier.ping(0, 12, 3.5);
         frontier.ping(0, 13, 3.5);
         let to_come = frontier.to_come(MonoNs(13_000_000_000));
-        let moved = frontier.beat(13, 5.0);
+        let moved = frontier.update(13, 5.0);
         assert_eq!((moved.left_behind.is_empty(), moved.left_ahead.is_empty()), (true, true));
         assert_eq!((moved.to_come, frontier.to_come(MonoNs(13_000_000_000))), (to_come, to_come));
         assert_eq!(
@@ -521,7 +521,7 @@ mod tests {
         );
         assert_eq!(frontier.frontier.way(), Some(Reach { from_m: 2.5, to_m: 5.5 }));
         assert!(moved.way_grown && !moved.is_nothing());
-        assert!(frontier.beat(13, 5.1).is_nothing(), "the vehicle is still in the same section");
+        assert!(frontier.update(13, 5.1).is_nothing(), "the vehicle is still in the same section");
     }
 
     #[test]
@@ -529,12 +529,12 @@ mod tests {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
-        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "the heads' silence isn't known yet");
+        assert!(frontier.update(1, 3.5).left_behind.is_empty(), "the heads' silence isn't known yet");
         // If the rear head pinged, it would be at 6 m: a quarter of a metre past section [5.5, 5.75).
-        assert_eq!(frontier.beat(3, 6.5).left_behind, 9..23);
+        assert_eq!(frontier.update(3, 6.5).left_behind, 9..23);
         let to_come = frontier.to_come(MonoNs(3_000_000_000));
         assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));
-        assert_eq!(frontier.beat(4, 5.5).left_ahead, 25..29, "going back leaves sections ahead");
+        assert_eq!(frontier.update(4, 5.5).left_ahead, 25..29, "going back leaves sections ahead");
     }
 
     #[test]
@@ -558,8 +558,8 @@ mod tests {
     #[test]
     fn sections_wait_for_every_head_again_after_all_heads_were_silent() {
         let mut frontier = Fixture::default();
-        frontier.beat(0, 3.0);
-        frontier.beat(5, 4.0);
+        frontier.update(0, 3.0);
+        frontier.update(5, 4.0);
         let moved = frontier.ping(0, 6, 4.5);
         assert_eq!((moved.left_behind.is_empty(), moved.left_ahead.is_empty()), (true, true), "{moved:?}");
         frontier.ping(0, 7, 4.5);

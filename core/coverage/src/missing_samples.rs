@@ -53,15 +53,15 @@ impl MissingSamples {
     /// Adds a missing sample to the list. If the list is full, the new sample replaces the oldest one.
     ///
     /// Allocates: never.
-    pub fn add(&mut self, lack: MissingSample) {
+    pub fn add(&mut self, missing: MissingSample) {
         let at = if self.ring.len() < ROOM { self.ring.len() } else { self.next as usize };
         if let Some(oldest) = self.ring.get_mut(at) {
-            *oldest = lack;
+            *oldest = missing;
             self.next = if at + 1 >= ROOM { 0 } else { self.next + 1 };
         } else {
-            self.ring.push(lack);
+            self.ring.push(missing);
         }
-        self.extend(at, lack.x_m);
+        self.extend(at, missing.x_m);
         let (kept, blocks) = (self.ring.len(), self.extents_m.len());
         debug_assert!(
             kept <= ROOM && blocks == kept.div_ceil(BLOCK),
@@ -84,7 +84,7 @@ impl MissingSamples {
             let latest = self.ring.get(block * BLOCK..=at);
             debug_assert!(latest.is_some(), "sample {at} is one of {}", self.ring.len());
             let latest = latest.unwrap_or_default();
-            *extent_m = latest.iter().fold([x_m; 2], |extent_m, lack| wider_m(extent_m, lack.x_m));
+            *extent_m = latest.iter().fold([x_m; 2], |extent_m, missing| wider_m(extent_m, missing.x_m));
         }
     }
 
@@ -97,11 +97,12 @@ impl MissingSamples {
         let at = if self.ring.len() < ROOM { self.ring.len() } else { self.next as usize };
         let (newer, older) = self.ring.split_at_mut(at);
         let latest = newer.iter_mut().rev().chain(older.iter_mut().rev());
-        let of_head = latest.filter(|lack| lack.head == head && lack.why == Causes::of(from)).take(count);
-        of_head.fold(None, |between_m: Option<[f64; 2]>, lack| {
-            lack.why = Causes::of(to);
-            let [least_m, most_m] = between_m.unwrap_or([lack.x_m; 2]);
-            Some([least_m.min(lack.x_m), most_m.max(lack.x_m)])
+        let of_head =
+            latest.filter(|missing| missing.head == head && missing.why == Causes::of(from)).take(count);
+        of_head.fold(None, |between_m: Option<[f64; 2]>, missing| {
+            missing.why = Causes::of(to);
+            let [least_m, most_m] = between_m.unwrap_or([missing.x_m; 2]);
+            Some([least_m.min(missing.x_m), most_m.max(missing.x_m)])
         })
     }
 
@@ -110,8 +111,8 @@ impl MissingSamples {
         let meets = move |extent_m: &[f64; 2]| extent_m[0] <= to_m && extent_m[1] >= from_m;
         let blocks =
             self.ring.chunks(BLOCK).zip(&self.extents_m).filter(move |(_, extent_m)| meets(extent_m));
-        let lacks = blocks.flat_map(|(block, _)| block);
-        lacks.filter(move |lack| (from_m..=to_m).contains(&lack.x_m))
+        let missing_samples = blocks.flat_map(|(block, _)| block);
+        missing_samples.filter(move |missing| (from_m..=to_m).contains(&missing.x_m))
     }
 }
 
@@ -121,8 +122,8 @@ mod tests {
 
     #[test]
     fn full_list_drops_the_oldest_missing_samples() {
-        let mut lacks = MissingSamples::default();
-        let lack = |x_m: f64| MissingSample {
+        let mut missing_samples = MissingSamples::default();
+        let missing = |x_m: f64| MissingSample {
             x_m,
             arc_m: 1.0,
             head: 0,
@@ -130,21 +131,21 @@ mod tests {
             may_be_wall: false,
         };
         for k in 0..2 * ROOM + 10 {
-            lacks.add(lack(k as f64));
+            missing_samples.add(missing(k as f64));
         }
-        assert_eq!(lacks.between(0.0, f64::INFINITY).count(), ROOM);
+        assert_eq!(missing_samples.between(0.0, f64::INFINITY).count(), ROOM);
         let first = (ROOM + 10) as f64;
-        assert_eq!(lacks.between(0.0, first - 1.0).count(), 0);
-        assert_eq!(lacks.between(first, first + 4.0).count(), 5);
+        assert_eq!(missing_samples.between(0.0, first - 1.0).count(), 0);
+        assert_eq!(missing_samples.between(first, first + 4.0).count(), 5);
     }
 
     #[test]
     fn only_the_latest_missing_samples_of_a_head_get_the_new_cause() {
-        let mut lacks = MissingSamples::default();
+        let mut missing_samples = MissingSamples::default();
         let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
         for k in 0..ROOM + 100 {
             let (head, why) = (u8::from(k % 2 == 1), if k % 5 == 0 { Cause::Occluded } else { missing });
-            lacks.add(MissingSample {
+            missing_samples.add(MissingSample {
                 x_m: k as f64,
                 arc_m: 0.0,
                 head,
@@ -154,12 +155,15 @@ mod tests {
         }
         let last = (ROOM + 99) as f64;
         // Every second missing sample is of head 1. Every fifth of those is occluded, including the very last.
-        assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
-        let revised = |lack: &&MissingSample| lack.why == Causes::of(silent);
+        assert_eq!(missing_samples.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
+        let revised = |missing: &&MissingSample| missing.why == Causes::of(silent);
         let revised: Vec<MissingSample> =
-            lacks.between(0.0, f64::INFINITY).filter(revised).copied().collect();
-        assert!(revised.len() == 8 && revised.iter().all(|lack| lack.head == 1 && lack.x_m >= last - 18.0));
-        assert_eq!(lacks.revise(2, 8, [missing, silent]), None);
+            missing_samples.between(0.0, f64::INFINITY).filter(revised).copied().collect();
+        assert!(
+            revised.len() == 8
+                && revised.iter().all(|missing| missing.head == 1 && missing.x_m >= last - 18.0)
+        );
+        assert_eq!(missing_samples.revise(2, 8, [missing, silent]), None);
     }
 
     /// While the ring fills and while it is overwritten, a search by blocks finds the same samples as a full search.
@@ -167,11 +171,11 @@ mod tests {
     /// The vehicle drives to and fro over 90 m.
     #[test]
     fn block_search_finds_every_missing_sample() {
-        let mut lacks = MissingSamples::default();
+        let mut missing_samples = MissingSamples::default();
         for k in 0..ROOM + 5 * BLOCK + 77 {
             let along_m = (k % 9000) as f64 * 0.01;
             let x_m = if (k / 9000).is_multiple_of(2) { along_m } else { 90.0 - along_m };
-            lacks.add(MissingSample {
+            missing_samples.add(MissingSample {
                 x_m,
                 arc_m: k as f64,
                 head: 0,
@@ -180,10 +184,11 @@ mod tests {
             });
             if k % 977 == 0 || k >= ROOM && k % 101 == 0 {
                 let [from_m, to_m] = [x_m - 0.3, x_m + 0.1 * (k % 7) as f64];
-                let all = lacks.ring.iter().filter(|lack| (from_m..=to_m).contains(&lack.x_m));
-                assert!(lacks.between(from_m, to_m).eq(all), "after {k}");
+                let all =
+                    missing_samples.ring.iter().filter(|missing| (from_m..=to_m).contains(&missing.x_m));
+                assert!(missing_samples.between(from_m, to_m).eq(all), "after {k}");
             }
         }
-        assert!(lacks.between(90.1, 100.0).next().is_none());
+        assert!(missing_samples.between(90.1, 100.0).next().is_none());
     }
 }

@@ -90,7 +90,7 @@ mod tests {
             for index in seen.sections.sections_of(seen.outlook.way) {
                 let mut judging = Judging {
                     store: &store,
-                    lacks: &MissingSamples::default(),
+                    missing_samples: &MissingSamples::default(),
                     finder: &mut finder,
                     profile: &profile,
                     tell: &mut |_, _| {},

@@ -154,7 +154,7 @@ pub struct Runs {
 stateful!(Runs { lists: runs; slots: member, failing; fixed: first, join; });
 
 /// Context for updating missed stretches, with a function to call for each that changes.
-pub struct Telling<'a> {
+pub struct RunUpdate<'a> {
     /// Time of the change.
     pub at: MonoNs,
     /// Function that returns the hole of any section.
@@ -196,18 +196,18 @@ impl Runs {
     /// Sets the state of a section: it fails for the given causes, or does not fail (`None`).
     ///
     /// Allocates: never.
-    pub fn set(&mut self, section: i64, failing: Option<Failing>, telling: &mut Telling<'_>) {
+    pub fn set(&mut self, section: i64, failing: Option<Failing>, update: &mut RunUpdate<'_>) {
         let was_in = self.of(section);
         match (was_in, failing) {
             (Some(id), Some(failing)) => {
                 let before = self.failing_at(section);
                 self.put_down_to(section, failing);
                 self.count_again(id, [&before, &failing]);
-                self.measure_again(id, section, telling);
-                (telling.tell)(id, RunChange::Changed);
+                self.measure_again(id, section, update);
+                (update.tell)(id, RunChange::Changed);
             }
-            (Some(id), None) => self.leave(section, id, telling),
-            (None, Some(failing)) => self.join(section, failing, telling),
+            (Some(id), None) => self.leave(section, id, update),
+            (None, Some(failing)) => self.join(section, failing, update),
             (None, None) => {}
         }
         for id in [was_in, self.of(section)].into_iter().flatten() {
@@ -262,30 +262,30 @@ impl Runs {
 
     /// Adds a failed section to the neighbouring missed stretches, which it may merge. Without neighbours, starts a new
     /// one.
-    fn join(&mut self, section: i64, failing: Failing, telling: &mut Telling<'_>) {
+    fn join(&mut self, section: i64, failing: Failing, update: &mut RunUpdate<'_>) {
         let near = |side: i64| (1..=self.join).find_map(|step| self.of(section + side * step));
         let (kept, other) = match (near(-1), near(1)) {
             (Some(a), Some(b)) if a != b => (a.min(b), Some(a.max(b))),
             (Some(id), _) | (None, Some(id)) => (id, None),
             (None, None) => {
-                if let Some(id) = self.begin(section, failing, telling) {
-                    (telling.tell)(id, RunChange::Raised);
+                if let Some(id) = self.begin(section, failing, update) {
+                    (update.tell)(id, RunChange::Raised);
                 }
                 return;
             }
         };
         self.put(section, kept);
         self.put_down_to(section, failing);
-        self.add(kept, section, telling);
+        self.add(kept, section, update);
         if let Some(other) = other {
-            self.merge(other, kept, telling.at);
-            (telling.tell)(other, RunChange::Merged);
+            self.merge(other, kept, update.at);
+            (update.tell)(other, RunChange::Merged);
         }
-        (telling.tell)(kept, RunChange::Changed);
+        (update.tell)(kept, RunChange::Changed);
     }
 
     /// Removes a section from its missed stretch, which then shrinks, splits or is cleared.
-    fn leave(&mut self, section: i64, id: RunId, telling: &mut Telling<'_>) {
+    fn leave(&mut self, section: i64, id: RunId, update: &mut RunUpdate<'_>) {
         self.take_out(section);
         let Some(run) = self.get(id).copied() else {
             debug_assert!(false, "{id:?} is one of {} runs", self.runs.len());
@@ -296,29 +296,29 @@ impl Runs {
         let earlier = (run.from..section).rev().find(|index| self.of(*index) == Some(id));
         if let (Some(earlier), Some(later)) = (earlier, later)
             && later - earlier > self.join
-            && let Some(new) = self.begin(later, self.failing_at(later), telling)
+            && let Some(new) = self.begin(later, self.failing_at(later), update)
         {
             for index in later..run.to {
                 if self.of(index) == Some(id) {
                     self.put(index, new);
                 }
             }
-            self.measure(new, telling);
-            (telling.tell)(new, RunChange::Raised);
+            self.measure(new, update);
+            (update.tell)(new, RunChange::Raised);
         }
-        self.measure(id, telling);
+        self.measure(id, update);
         let open = self.get(id).is_some_and(Run::is_open);
-        (telling.tell)(id, if open { RunChange::Changed } else { RunChange::Cleared });
+        (update.tell)(id, if open { RunChange::Changed } else { RunChange::Cleared });
     }
 
-    fn begin(&mut self, section: i64, failing: Failing, telling: &Telling<'_>) -> Option<RunId> {
+    fn begin(&mut self, section: i64, failing: Failing, update: &RunUpdate<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
             // All numbers of missed stretches are used up. The section remains flagged, but belongs to no stretch.
             return None;
         }
         let id = RunId(u32::try_from(self.runs.len()).ok()?);
-        let worst = (section, (telling.hole)(section)?);
-        let (from, to, at) = (section, section + 1, telling.at);
+        let worst = (section, (update.hole)(section)?);
+        let (from, to, at) = (section, section + 1, update.at);
         let mut run = Run {
             cause: failing.causes.iter().next().unwrap_or(Cause::Unknown),
             counts: [0; Cause::ALL.len()],
@@ -363,44 +363,44 @@ impl Runs {
     }
 
     /// Updates the figures of a missed stretch for a section that was just added to it.
-    fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
-        let (hole, failing) = ((telling.hole)(section), self.failing_at(section));
+    fn add(&mut self, id: RunId, section: i64, update: &RunUpdate<'_>) {
+        let (hole, failing) = ((update.hole)(section), self.failing_at(section));
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
             run.failed += 1;
             run.count_in(&failing);
             run.choose();
-            run.changed = telling.at;
+            run.changed = update.at;
             run.worst = hole.map_or(run.worst, |hole| larger(run.worst, (section, hole)));
         }
     }
 
     /// Updates the largest hole of a missed stretch, because the hole of this section has changed.
-    fn measure_again(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
-        let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (telling.hole)(section)) else {
+    fn measure_again(&mut self, id: RunId, section: i64, update: &RunUpdate<'_>) {
+        let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (update.hole)(section)) else {
             return;
         };
         if run.worst.0 == section && hole.diameter_m < run.worst.1.diameter_m {
-            self.measure(id, telling);
+            self.measure(id, update);
         } else {
-            run.changed = telling.at;
+            run.changed = update.at;
             run.worst = larger(run.worst, (section, hole));
         }
     }
 
     /// Computes the section count, causes, ends and largest hole of a missed stretch again.
-    fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
+    fn measure(&mut self, id: RunId, update: &RunUpdate<'_>) {
         let Some(run) = self.get(id).copied() else {
             debug_assert!(false, "{id:?} is one of {} runs", self.runs.len());
             return;
         };
         let members = || (run.from..run.to).filter(|index| self.of(*index) == Some(id));
         let failed = u32::try_from(members().count()).unwrap_or(u32::MAX);
-        let holes = members().filter_map(|index| Some((index, (telling.hole)(index)?)));
+        let holes = members().filter_map(|index| Some((index, (update.hole)(index)?)));
         let worst = holes.reduce(larger).unwrap_or(run.worst);
         let ends = members().next().zip(members().next_back());
         let (from, to) = ends.map_or((run.from, run.to), |(first, last)| (first, last + 1));
-        let cleared = (failed == 0).then_some(telling.at);
-        let mut now = Run { failed, worst, from, to, cleared, changed: telling.at, ..run };
+        let cleared = (failed == 0).then_some(update.at);
+        let mut now = Run { failed, worst, from, to, cleared, changed: update.at, ..run };
         now.count_none();
         members().for_each(|index| now.count_in(&self.failing_at(index)));
         now.choose();

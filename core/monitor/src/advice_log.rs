@@ -96,10 +96,10 @@ mod tests {
         let advice = advice(&situation(None));
         let mut log = AdviceLog::default();
         let room = log.entries.capacity();
-        let beats = 180_000_u32;
-        for beat in 0..beats {
-            let at = MonoNs(u64::from(beat) * ADVICE_PERIOD.0.unsigned_abs());
-            let speed_mps = f64::from(beat % 2);
+        let updates = 180_000_u32;
+        for update in 0..updates {
+            let at = MonoNs(u64::from(update) * ADVICE_PERIOD.0.unsigned_abs());
+            let speed_mps = f64::from(update % 2);
             log.take(&AdviceEntry { at, chainage_m: None, speed_mps, advice });
         }
         assert_eq!(log.entries.capacity(), room);

@@ -17,7 +17,7 @@ use super::result_stream::{RecordKind, ResultStream};
 use super::stage::AdviseStage;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy, ReturningHeads};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
@@ -308,8 +308,8 @@ mod tests {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();
-            for beat in 0..150 {
-                let seconds = 0.2 * f64::from(beat);
+            for update in 0..150 {
+                let seconds = 0.2 * f64::from(update);
                 let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.01 * seconds);
                 let pose = Some(Pose { attitude, ..pose(5.0) });
                 let turned = Situation { pose, speed_mps, ..two_heads(apart_m) };

@@ -2,7 +2,7 @@
 //! state, alerts and notes.
 
 use super::adviser::Advised;
-use super::alert_list::{AlertList, Beat, MOST_LISTED, RunInput, Telling};
+use super::alert_list::{AdviceUpdate, AlertList, AlertOutputs, MOST_LISTED, RunInput};
 use super::console::command::Command;
 use super::console::packets::ReceivedCommand;
 use super::dive_plan::planner::{Now, PlanSettings, Planner};
@@ -120,7 +120,7 @@ impl Alerter {
     /// Applies the observations after the last judgement of a dive.
     pub(super) fn take_observations_at_end(&mut self, observations: &Observations, at: MonoNs) {
         self.notices.clear();
-        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
+        let mut to = AlertOutputs { notices: &mut self.notices, stream: &mut self.changes };
         self.list.take_observations_at_end(observations, at, &mut to);
     }
 
@@ -132,7 +132,7 @@ impl Alerter {
         self.state = LiveState {
             at: Some(*at),
             position: match fix {
-                Err(lacking) => PositionState::None(*lacking),
+                Err(no_fix) => PositionState::None(*no_fix),
                 Ok(_) if doubts.cable.is_some() => PositionState::Doubtful(PositionDoubt::Cable),
                 Ok(_) if reserved_m > SPREAD_SHARE * self.state.target.max_hole_m => {
                     PositionState::Doubtful(PositionDoubt::Spread)
@@ -164,7 +164,7 @@ impl Alerter {
         digest(&mut self.states, *at, situation, &self.state);
         let as_of = LiveState { now: *at, ..self.state };
         let Doubts { setting, unverified_mounts, .. } = *doubts;
-        self.take_beat(&Beat { at: *at, state: &as_of, setting, unverified_mounts });
+        self.take_update(&AdviceUpdate { at: *at, state: &as_of, setting, unverified_mounts });
     }
 
     /// Plans the rest of the dive. While the vehicle goes back, its destination is that of the plan.
@@ -272,9 +272,9 @@ impl Alerter {
     }
 
     /// Applies an advice update. All inputs before it must have been applied already.
-    fn take_beat(&mut self, beat: &Beat<'_>) {
-        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
-        self.list.beat(beat, &mut to);
+    fn take_update(&mut self, update: &AdviceUpdate<'_>) {
+        let mut to = AlertOutputs { notices: &mut self.notices, stream: &mut self.changes };
+        self.list.update(update, &mut to);
     }
 
     /// Applies the inputs that remain in the tick.
@@ -285,7 +285,7 @@ impl Alerter {
 
     /// Applies a changed missed stretch.
     fn take_run(&mut self, run: &RunInput) {
-        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
+        let mut to = AlertOutputs { notices: &mut self.notices, stream: &mut self.changes };
         self.list.take_run(run, &mut to);
     }
 
@@ -308,17 +308,17 @@ impl Alerter {
         inputs.taken.unread = until.max(inputs.taken.unread);
     }
 
-    /// Applies changed missed stretches and commands: those before an advice update, or all if `beat` is `None`.
+    /// Applies changed missed stretches and commands: those before an advice update, or all if `update` is `None`.
     ///
     /// A command comes before the results of the event that follows it.
-    fn take_until(&mut self, beat: Option<usize>, inputs: &mut Inputs<'_>) {
+    fn take_until(&mut self, update: Option<usize>, inputs: &mut Inputs<'_>) {
         loop {
             let run = inputs.runs.get(inputs.taken.runs);
             let run = run.filter(|run| {
-                beat.is_none_or(|event| run.event < event || run.event == event && run.at_beat)
+                update.is_none_or(|event| run.event < event || run.event == event && run.at_update)
             });
             let command = inputs.commands.get(inputs.taken.commands);
-            let command = command.filter(|command| beat.is_none_or(|event| command.before <= event));
+            let command = command.filter(|command| update.is_none_or(|event| command.before <= event));
             match (run, command) {
                 (Some(run), command) if command.is_none_or(|command| command.before > run.event) => {
                     inputs.taken.runs += 1;
@@ -336,7 +336,7 @@ impl Alerter {
 
     fn take_command(&mut self, received: &ReceivedCommand) {
         let ReceivedCommand { at, command, .. } = *received;
-        let mut to = Telling { notices: &mut self.notices, stream: &mut self.changes };
+        let mut to = AlertOutputs { notices: &mut self.notices, stream: &mut self.changes };
         let has_effect = match command {
             Command::Acknowledge { alert, by } => self.list.acknowledge(alert, by, at, &mut to),
             Command::Silence { .. } => self.list.silence(at, &mut to),

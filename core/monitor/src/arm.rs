@@ -109,7 +109,7 @@ fn spawn_vehicle(
 ) -> Vec<Entity> {
     let world = &mut placer.world;
     let repeats = vec![StuckSensor::default(); MAX_SOURCES];
-    let navigator = Navigator { navigation, next_beat: None, repeats, hung: 0 };
+    let navigator = Navigator { navigation, next_update: None, repeats, hung: 0 };
     let vehicle = world.spawn((navigator, VehicleState::default())).id();
     let mut hidden = advisor.hidden_angles();
     let mut heads = Vec::new();
@@ -258,6 +258,6 @@ fn coverage(mission: &Mission, heads_reach_m: f64) -> Result<Coverage, PluginErr
         to_m: mission.length_m,
         node_m: mission.coverage.node_m,
     });
-    let (frontier, lacks) = (Frontier::default(), MissingSamples::default());
-    Ok(Coverage { store, sections, frontier, soundings, unsure: None, lacks })
+    let (frontier, missing_samples) = (Frontier::default(), MissingSamples::default());
+    Ok(Coverage { store, sections, frontier, soundings, unsure: None, missing_samples })
 }

@@ -86,7 +86,7 @@ impl core::fmt::Debug for ConsolePort {
 pub struct ConsoleInput {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     port: Port,
-    time_told: MonoNs,
+    time_sent: MonoNs,
     /// Time of the most recent call of `take_in_live`; `None` before the first call.
     called: Option<MonoNs>,
 }
@@ -98,7 +98,7 @@ impl ConsoleInput {
     pub fn new(dive: &mut Loop, clock: Option<Arc<TimestampClock>>) -> Option<(Self, ConsolePort)> {
         let port = dive.take_console()?;
         let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
-        let input = Self { waiting: Arc::clone(&waiting), port, time_told: MonoNs(0), called: None };
+        let input = Self { waiting: Arc::clone(&waiting), port, time_sent: MonoNs(0), called: None };
         Some((input, ConsolePort { waiting, clock, notes: Arc::default() }))
     }
 
@@ -118,13 +118,13 @@ impl ConsoleInput {
         if idle.0 >= STALL.0 && self.port.has_room(MAX_COMMAND_BYTES) {
             self.put(now, &Command::stalled_for(idle));
         }
-        if self.time_told == MonoNs(0) {
-            self.time_told = now;
+        if self.time_sent == MonoNs(0) {
+            self.time_sent = now;
         }
         let last = dive.view().live_state().heard.iter().flatten().max();
-        let since = now.since(last.copied().unwrap_or(self.time_told).max(self.time_told));
+        let since = now.since(last.copied().unwrap_or(self.time_sent).max(self.time_sent));
         if since.0 >= TIME_EVERY.0 && self.port.has_room(MAX_COMMAND_BYTES) {
-            self.time_told = now;
+            self.time_sent = now;
             self.put(now, &Command::Time);
         }
     }

@@ -34,7 +34,7 @@ pub struct Navigator {
     /// Method that computes fixes from readings.
     pub navigation: Box<dyn Navigation>,
     /// Time of the next advice update, a multiple of the advice period; `None` before the first packet.
-    pub next_beat: Option<MonoNs>,
+    pub next_update: Option<MonoNs>,
     /// Detectors of stuck sensors, by source.
     pub repeats: Vec<StuckSensor>,
     /// Bitmask of the stuck sources.
@@ -44,13 +44,13 @@ pub struct Navigator {
 impl Stateful for Navigator {
     fn save(&self, to: &mut Saver) {
         self.navigation.save(to);
-        to.value(&self.next_beat);
+        to.value(&self.next_update);
         to.value(&(&self.repeats, self.hung));
     }
 
     fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
         self.navigation.restore(from)?;
-        self.next_beat = from.value()?;
+        self.next_update = from.value()?;
         (self.repeats, self.hung) = from.value()?;
         Ok(())
     }

@@ -50,7 +50,7 @@ pub(crate) fn coverage() -> Coverage {
         frontier: Frontier::default(),
         soundings: Soundings::new(GridLayout { perimeter_m, from_m, to_m, node_m: 0.5 }),
         unsure: None,
-        lacks: MissingSamples::default(),
+        missing_samples: MissingSamples::default(),
     }
 }
 

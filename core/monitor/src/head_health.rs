@@ -129,33 +129,33 @@ mod tests {
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
     /// Health of a head after this many pings. Each ping detects the wall, something other than the wall, or nothing.
-    fn hearing(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> HeadHealth {
-        let mut hearing = HeadHealth::default();
+    fn health(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> HeadHealth {
+        let mut health = HeadHealth::default();
         for ping in 0..pings {
             let heard =
                 is_wall(ping).map(|is_wall| Heard { range_m: 5.0 + f64::from(ping), off_m: 0.0, is_wall });
-            hearing.add(f64::from(ping) * STEP_RAD, heard);
+            health.add(f64::from(ping) * STEP_RAD, heard);
         }
-        hearing
+        health
     }
 
     #[test]
     fn head_detects_no_wall_after_a_turn_without_returns() {
-        let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
+        let from_500 = |pings| health(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
         // After a single return, the head counts as detecting the wall again.
-        let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
+        let heard_again = health(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
         // Three quarters of each turn give no return, as beside a side tunnel or an absorbing wall.
-        let side = hearing(4000, |ping| (ping % 400 < 100).then_some(true));
+        let side = health(4000, |ping| (ping % 400 < 100).then_some(true));
         assert!(!side.is_deaf(std::iter::empty()));
     }
 
     #[test]
     fn head_off_the_design_counts_as_detecting_no_wall_if_another_head_detects_it() {
-        let elsewhere = hearing(1200, |ping| Some(ping < 400));
-        let [hears, does_not] = [hearing(1200, |_| Some(true)), hearing(1200, |_| Some(false))];
+        let elsewhere = health(1200, |ping| Some(ping < 400));
+        let [hears, does_not] = [health(1200, |_| Some(true)), health(1200, |_| Some(false))];
         assert!(elsewhere.is_deaf([does_not.elsewhere(), hears.elsewhere()].into_iter()));
         assert!(
             !elsewhere.is_deaf([does_not.elsewhere()].into_iter()),
@@ -163,23 +163,23 @@ mod tests {
         );
         assert!(!elsewhere.is_deaf(std::iter::empty()), "there is no other head");
         assert!(!hears.is_deaf([hears.elsewhere()].into_iter()));
-        let begins = hearing(100, |_| Some(true));
+        let begins = health(100, |_| Some(true));
         assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "the other head isn't known yet");
         // A rock or a niche occupies a third of the turn.
-        let rock = hearing(4000, |ping| Some(ping % 400 >= 130));
+        let rock = health(4000, |ping| Some(ping % 400 >= 130));
         assert!(!rock.is_deaf([hears.elsewhere()].into_iter()));
     }
 
     #[test]
     fn head_with_constant_range_is_stuck_if_the_wall_distance_varies() {
         let stuck = |pings: u32, spread_m: f64| {
-            let mut hearing = HeadHealth::default();
+            let mut health = HeadHealth::default();
             for ping in 0..pings {
                 let angle_rad = f64::from(ping) * STEP_RAD;
                 let off_m = spread_m / 2.0 * math::cos(angle_rad);
-                hearing.add(angle_rad, Some(Heard { range_m: 5.0, off_m, is_wall: true }));
+                health.add(angle_rad, Some(Heard { range_m: 5.0, off_m, is_wall: true }));
             }
-            hearing.is_deaf(std::iter::empty())
+            health.is_deaf(std::iter::empty())
         };
         assert!(stuck(202, 0.4) && !stuck(199, 0.4));
         // In the centre of a round pipe or near it, the wall's distance varies by less than the limit, so a constant

@@ -96,7 +96,7 @@ impl MeasuredMotion {
         let size = step.abs();
         if size < SAME_ANGLE_RAD {
             // The head has not turned, so `last` and the turn rate are unchanged.
-            let standing = at.since(last).as_secs_f64() > self.stands_after_s();
+            let standing = at.since(last).as_secs_f64() > self.stalled_after_s();
             return Turned { single_step: false, new_sweep: false, standing };
         }
         if self.is_elsewhere(at.since(last), size) {
@@ -148,7 +148,7 @@ impl MeasuredMotion {
     }
 
     /// Time at the same angle after which a head counts as stalled, seconds. It is four ping periods.
-    fn stands_after_s(&self) -> f64 {
+    fn stalled_after_s(&self) -> f64 {
         let ping_period_s = self.step_rad.zip(self.rate_radps()).map(|(step, rate)| step / rate.abs());
         ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)
     }

@@ -103,9 +103,9 @@ pub struct LiveMessages {
     unsure: Option<Stretch>,
     /// Whether the stretch without a verdict was reported with its hole's error, and not the hole's size, as the
     /// reason.
-    told_as_error: bool,
+    reported_as_error: bool,
     /// Stretches without a verdict whose ends were reported.
-    told: Vec<Stretch>,
+    reported: Vec<Stretch>,
     /// Sections at an end of the coverage extent. Their message is held back until the vehicle is well away
     /// from them.
     at_ends: Option<Stretch>,
@@ -200,7 +200,7 @@ impl LiveMessages {
         });
         let Some((alert, doubt)) = doubted else { return };
         let is_other =
-            |(number, told): (u32, SettingDoubt)| number == alert.number && !told.is_of_same(&doubt);
+            |(number, reported): (u32, SettingDoubt)| number == alert.number && !reported.is_of_same(&doubt);
         if self.setting.replace((alert.number, doubt)).is_some_and(is_other) {
             tell(alert_change(AlertChange::Changed, alert, at, dive));
         }
@@ -217,7 +217,7 @@ impl LiveMessages {
                 break;
             }
         }
-        self.told.push(all);
+        self.reported.push(all);
         tell(LiveMessage::NotInspected(UnsureStretch::of(&all, sections)));
     }
 
@@ -235,12 +235,14 @@ impl LiveMessages {
             }
             return;
         };
-        let is_told = |told: &Stretch| told.why == here.why && (told.from..told.to).contains(&section);
+        let is_reported =
+            |reported: &Stretch| reported.why == here.why && (reported.from..reported.to).contains(&section);
         // The pilot is passing a missed stretch again. Half a pass gives only an intermediate result, which
         // is not reported.
-        let is_missed =
-            |told: &ReportedMiss| here.why != Unsure::NotInspected && (told.from..told.to).contains(&section);
-        if self.told.iter().any(is_told) || self.missed.iter().any(is_missed) {
+        let is_missed = |reported: &ReportedMiss| {
+            here.why != Unsure::NotInspected && (reported.from..reported.to).contains(&section)
+        };
+        if self.reported.iter().any(is_reported) || self.missed.iter().any(is_missed) {
             return;
         }
         if here.why == Unsure::NotInspected {
@@ -251,24 +253,24 @@ impl LiveMessages {
             return;
         }
         if let Some(last) = &mut self.unsure
-            && (is_told(last) || last.join(&here, section_m))
+            && (is_reported(last) || last.join(&here, section_m))
         {
             // The first sections of the stretch may lack a verdict for another reason than most of its
             // sections.
-            if self.told_as_error && !last.is_mostly_error() {
-                self.told_as_error = false;
+            if self.reported_as_error && !last.is_mostly_error() {
+                self.reported_as_error = false;
                 tell(LiveMessage::CannotSay(UnsureStretch::of(last, sections)));
             }
             return;
         }
         self.close_unsure(sections, tell);
-        (self.unsure, self.told_as_error) = (Some(here), here.is_mostly_error());
+        (self.unsure, self.reported_as_error) = (Some(here), here.is_mostly_error());
         tell(LiveMessage::CannotSay(UnsureStretch::of(&here, sections)));
     }
 
     fn close_unsure(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
         if let Some(stretch) = self.unsure.take() {
-            self.told.push(stretch);
+            self.reported.push(stretch);
             tell(LiveMessage::CannotSayEnds(UnsureStretch::of(&as_it_is(&stretch, sections), sections)));
         }
     }
@@ -298,7 +300,7 @@ impl LiveMessages {
         let Some(run) = sections.runs().get(id) else { return };
         match change {
             // A missed stretch within a reported stretch is not a new stretch.
-            RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
+            RunChange::Raised if self.missed.iter().any(|reported| reported.meets(run)) => {}
             RunChange::Raised => {
                 self.close_run(sections, tell);
                 let Some(evidence) = sections.evidence_of(run, run.cause) else { return };
@@ -323,28 +325,28 @@ impl LiveMessages {
 
     /// Merges a missed stretch, which has grown, with the reported stretches that it touches.
     fn widen(&mut self, run: &Run) {
-        let mut met = self.missed.iter().filter(|told| told.meets(run));
+        let mut met = self.missed.iter().filter(|reported| reported.meets(run));
         let Some(mut whole) = met.next().copied() else { return };
         (whole.from, whole.to) = (whole.from.min(run.from), whole.to.max(run.to));
         for other in met {
             (whole.from, whole.to) = (whole.from.min(other.from), whole.to.max(other.to));
         }
-        self.missed.retain(|told| !told.meets(run));
+        self.missed.retain(|reported| !reported.meets(run));
         self.missed.push(whole);
     }
 
     /// Reports that a missed stretch is cleared, with the bounds reported before. Then reports its parts
     /// without a verdict.
     fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
-        let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
-        let Some(told) = self.missed.get(at).copied() else { return };
-        if sections.runs().all().iter().any(|other| other.is_open() && told.meets(other)) {
+        let Some(at) = self.missed.iter().position(|reported| reported.meets(run)) else { return };
+        let Some(reported) = self.missed.get(at).copied() else { return };
+        if sections.runs().all().iter().any(|other| other.is_open() && reported.meets(other)) {
             return;
         }
         self.missed.swap_remove(at);
-        let (from_m, to_m) = (sections.bounds_m(told.from).0, sections.bounds_m(told.to).0);
-        tell(LiveMessage::Cleared { run: told.run.0, from_m, to_m });
-        for section in told.from..told.to {
+        let (from_m, to_m) = (sections.bounds_m(reported.from).0, sections.bounds_m(reported.to).0);
+        tell(LiveMessage::Cleared { run: reported.run.0, from_m, to_m });
+        for section in reported.from..reported.to {
             self.note_unsure(section, sections, tell);
         }
         self.close_unsure(sections, tell);
@@ -355,9 +357,9 @@ impl LiveMessages {
     /// A pilot who follows only the earlier advice may miss the same wall again.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
         let sections = &dive.view().coverage().sections;
-        let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };
+        let Some((_, reported)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };
         let lasts = |cause: &Cause| f64::from(run.count(*cause)) * sections.section_m() >= LASTS_M;
-        let Some(cause) = Cause::ALL.into_iter().find(|cause| !told.has(*cause) && lasts(cause)) else {
+        let Some(cause) = Cause::ALL.into_iter().find(|cause| !reported.has(*cause) && lasts(cause)) else {
             return;
         };
         let has = |index: i64| {
@@ -365,7 +367,7 @@ impl LiveMessages {
             evidence.causes.has(cause).then_some((index, evidence))
         };
         let Some((index, evidence)) = (run.from..run.to).find_map(has) else { return };
-        *told = told.union(evidence.causes);
+        *reported = reported.union(evidence.causes);
         tell(flag(id, run, index, &evidence, dive));
     }
 }
@@ -378,11 +380,11 @@ fn alert_change(change: AlertChange, alert: &ListedAlert, at: MonoNs, dive: &Loo
 /// they were reported.
 ///
 /// If every section has a verdict by now, returns the stretch as it was reported.
-fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
-    let each = (told.from..told.to).filter_map(|index| sections.unsure(index));
-    let mut each = each.filter(|here| here.why == told.why);
-    let Some(mut now) = each.next() else { return *told };
-    (now.from, now.to) = (told.from, told.to);
+fn as_it_is(reported: &Stretch, sections: &Sections) -> Stretch {
+    let each = (reported.from..reported.to).filter_map(|index| sections.unsure(index));
+    let mut each = each.filter(|here| here.why == reported.why);
+    let Some(mut now) = each.next() else { return *reported };
+    (now.from, now.to) = (reported.from, reported.to);
     for here in each {
         // The bounds already include all sections, so joining them succeeds.
         if !now.join(&here, sections.section_m()) {

@@ -242,7 +242,7 @@ pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
 }
 
 /// Line of text for a live message.
-pub fn message_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescriptions) -> PilotLine {
+pub fn message_line(message: &LiveMessage, profile: &Profile, heads: &HeadDescriptions) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,
         speed: String::new(),
@@ -251,7 +251,7 @@ pub fn message_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescripti
         lamp,
     };
     let to = |from_m: f64, to_m: f64| format!("{} to {}", station(from_m), station(to_m));
-    match told {
+    match message {
         LiveMessage::Flag { from_m, missed, .. } => {
             let at_most_mps = missed.figures.again_mps(missed.v_max_mps);
             let action = actions_text(&missed.figures.actions(), missed.back_to_m, at_most_mps, heads);

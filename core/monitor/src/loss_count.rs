@@ -79,7 +79,7 @@ pub struct LossCount {
     /// Whether the latest ping was lost.
     was_lost: bool,
     /// Health of the head.
-    hearing: HeadHealth,
+    health: HeadHealth,
 }
 
 impl LossCount {
@@ -109,18 +109,18 @@ impl LossCount {
     ///
     /// Allocates: never.
     pub fn hear(&mut self, angle_rad: f64, heard: Option<Heard>) {
-        let was_deaf = self.hearing.hears_nothing();
-        self.hearing.add(angle_rad, heard);
+        let was_deaf = self.health.hears_nothing();
+        self.health.add(angle_rad, heard);
         if was_deaf && heard.is_some() {
             // While the head detected nothing, all its returns were missing. These losses don't predict the losses from
             // now on.
-            *self = Self { hearing: self.hearing, ..Self::default() };
+            *self = Self { health: self.health, ..Self::default() };
         }
     }
 
     /// Health of the head.
-    pub fn hearing(&self) -> &HeadHealth {
-        &self.hearing
+    pub fn health(&self) -> &HeadHealth {
+        &self.health
     }
 
     /// Upper bound of the rate at which returns are lost by chance. Until enough pings are counted, all lost pings
@@ -166,9 +166,9 @@ mod tests {
             count.ping(f64::from(ping) * STEP_RAD, ping >= 500);
             count.hear(f64::from(ping) * STEP_RAD, (ping < 500).then_some(wall));
         }
-        assert!(count.hearing().hears_nothing() && count.rate().share > 0.0);
+        assert!(count.health().hears_nothing() && count.rate().share > 0.0);
         count.hear(4000.0 * STEP_RAD, Some(wall));
-        assert!(!count.hearing().hears_nothing() && count.rate() == LossRate::default());
+        assert!(!count.health().hears_nothing() && count.rate() == LossRate::default());
     }
 
     /// Whether a ping is lost at random, with a probability of `in_hundred` per cent.

@@ -267,8 +267,8 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
 }
 
 /// Text of the requirement that is missing for a position.
-pub(super) fn no_position_text(lacking: NoFix) -> String {
-    condition_words(Condition::NoPosition(lacking)).text()
+pub(super) fn no_position_text(no_fix: NoFix) -> String {
+    condition_words(Condition::NoPosition(no_fix)).text()
 }
 
 /// Text of the change that allows a higher speed.

@@ -81,7 +81,7 @@ pub struct Coverage {
     /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
     /// Most recent missing samples: points where a sample was expected but not obtained.
-    pub lacks: MissingSamples,
+    pub missing_samples: MissingSamples,
 }
 
 impl Coverage {
@@ -91,7 +91,7 @@ impl Coverage {
     }
 }
 
-stateful!(Coverage { state: store, sections, frontier, soundings, unsure, lacks; });
+stateful!(Coverage { state: store, sections, frontier, soundings, unsure, missing_samples; });
 
 /// Hole search, with its working memory.
 #[derive(Debug, Default, Resource)]
@@ -139,7 +139,7 @@ pub struct Tally {
     /// Number of returns without a fix.
     pub unplaced: u64,
     /// Number of returns without a fix by reason, in the order of [`NoFix::ALL`].
-    pub lacking: [u64; NoFix::ALL.len()],
+    pub no_fix: [u64; NoFix::ALL.len()],
     /// Number of pings without a fix, with or without a return.
     pub without_fix: u64,
     /// Number of samples outside the sample store's extent.

@@ -53,7 +53,7 @@ pub fn condition_words(condition: Condition) -> ConditionWords {
     let [name, detail, action, speed] = match condition {
         Condition::NoData => ["WAITING", "no reading from any sensor yet", "", ""],
         Condition::Old(_) => ["OLD", "nothing from any sensor", "stop", ""],
-        Condition::NoPosition(lacking) => ["NO POSITION", missing_words(lacking), "hold still", ""],
+        Condition::NoPosition(no_fix) => ["NO POSITION", missing_words(no_fix), "hold still", ""],
         Condition::Outside(_) => ["OUTSIDE", "no head is within the tunnel", "", ""],
         Condition::NoSonar => ["NO SONAR", "no returns", "stop", ""],
         Condition::Passed => ["passed here", "any speed will do", "", ""],
@@ -72,8 +72,8 @@ pub fn condition_words(condition: Condition) -> ConditionWords {
 }
 
 /// Words for the requirement that is missing for a position.
-pub fn missing_words(lacking: NoFix) -> &'static str {
-    match lacking {
+pub fn missing_words(no_fix: NoFix) -> &'static str {
+    match no_fix {
         NoFix::Heading => "heading unknown",
         NoFix::Chainage => "chainage unknown",
         NoFix::Section => "lateral position unknown",

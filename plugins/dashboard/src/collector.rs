@@ -36,7 +36,7 @@ const MENDED_AT_ONCE_M: f64 = 10.0;
 /// some of them are left out.
 const SHORTEST_MENDED_M: f64 = 0.01;
 /// Maximum number of events, such as live messages, kept while the queue is full.
-const MOST_TOLD: usize = 256;
+const MOST_EVENTS: usize = 256;
 /// Maximum number of sections in one message.
 const SECTIONS_AT_ONCE: usize = 4096;
 /// Longest interval between two live states sent to the page. When it has passed, a state is sent even without an
@@ -85,15 +85,15 @@ pub struct Collector {
     played: Option<MonoNs>,
     changed: BTreeSet<i64>,
     samples: Vec<SampleRecord>,
-    told: Vec<Value>,
+    events: Vec<Value>,
     /// Range of chainage of the dropped samples, m.
-    lacking_m: Option<[f64; 2]>,
+    unsent_m: Option<[f64; 2]>,
     dropped: Dropped,
     skips: bool,
     back_due: bool,
     notes_due: bool,
     /// The most recently sent list of missed stretches, with its time and the length of the way back, m.
-    back_told: Option<(MonoNs, f64, Value)>,
+    back_sent: Option<(MonoNs, f64, Value)>,
     /// Depth by the latest reading of the pressure sensor, m.
     depth_m: Option<f64>,
     recording: RecordingJson,
@@ -131,13 +131,13 @@ impl Collector {
             played: None,
             changed: BTreeSet::new(),
             samples: Vec::new(),
-            told: Vec::new(),
-            lacking_m: None,
+            events: Vec::new(),
+            unsent_m: None,
             dropped: Dropped::default(),
             skips: false,
             back_due: false,
             notes_due: false,
-            back_told: None,
+            back_sent: None,
             depth_m: None,
             recording: RecordingJson {
                 on: recorded_to.is_some(),
@@ -158,8 +158,8 @@ impl Collector {
 
     /// Collects the live messages that a notice, a tick or the end of the dive causes. Call this method before the
     /// method that handles the notice, the tick or the end.
-    pub fn messages(&mut self, told: &[LiveMessage], dive: &Loop) {
-        for one in told {
+    pub fn messages(&mut self, messages: &[LiveMessage], dive: &Loop) {
+        for one in messages {
             let mut value =
                 serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
             if let Some(object) = value.as_object_mut() {
@@ -191,7 +191,7 @@ impl Collector {
         let is_due = self.sent.is_none_or(|sent| now.since(sent).0.abs() >= EVERY.0);
         // Playback needs each tick's samples in a message of their own, so that it can seek back to any tick.
         if is_due
-            || !self.told.is_empty()
+            || !self.events.is_empty()
             || !self.changed.is_empty()
             || self.is_playback && !self.samples.is_empty()
         {
@@ -211,7 +211,7 @@ impl Collector {
     /// pieces.
     pub fn rebuilt(&mut self, dive: &Loop) {
         self.clock = dive.view().clock();
-        self.lacking_m = dive.view().coverage().frontier.way().map(|way| [way.from_m, way.to_m]);
+        self.unsent_m = dive.view().coverage().frontier.way().map(|way| [way.from_m, way.to_m]);
         (self.back_due, self.notes_due) = (true, true);
         self.change_all(dive);
     }
@@ -251,7 +251,7 @@ impl Collector {
             return;
         }
         let now = dive.now();
-        (self.sent, self.rates_from, self.back_told) = (None, None, None);
+        (self.sent, self.rates_from, self.back_sent) = (None, None, None);
         (self.back_due, self.notes_due) = (true, true);
         if let Some(compared) = &mut self.compared {
             compared.forget();
@@ -259,7 +259,7 @@ impl Collector {
         self.sensors.iter_mut().for_each(|sensor| sensor.ping = None);
         self.depth_m = None;
         self.samples.clear();
-        self.told.clear();
+        self.events.clear();
         self.played = Some(now);
         self.hand(Fed::Jump(now));
         self.change_all(dive);
@@ -273,7 +273,7 @@ impl Collector {
             compared.forget();
         }
         self.back_due = true;
-        self.back_told = None;
+        self.back_sent = None;
         // From the end of the dive on, even a live dive waits for room in the queue.
         self.waits = true;
         while !self.changed.is_empty() && self.send(dive) {}
@@ -361,15 +361,15 @@ impl Collector {
         }
         self.dropped.samples += 1;
         let x_m = f64::from(sample.x_m);
-        let [from_m, to_m] = self.lacking_m.unwrap_or([x_m; 2]);
-        self.lacking_m = Some([from_m.min(x_m), to_m.max(x_m)]);
+        let [from_m, to_m] = self.unsent_m.unwrap_or([x_m; 2]);
+        self.unsent_m = Some([from_m.min(x_m), to_m.max(x_m)]);
     }
 
     fn push_told(&mut self, value: Value) {
-        if self.told.len() < MOST_TOLD {
-            self.told.push(value);
+        if self.events.len() < MOST_EVENTS {
+            self.events.push(value);
         } else {
-            self.dropped.told += 1;
+            self.dropped.events += 1;
         }
     }
 
@@ -400,7 +400,7 @@ impl Collector {
             samples: core::mem::take(&mut self.samples),
             mended: self.mended(dive),
             sections: changed,
-            told: core::mem::take(&mut self.told),
+            events: core::mem::take(&mut self.events),
             notes: core::mem::take(&mut self.notes_due)
                 .then(|| dive.view().notes().iter().map(|note| NoteJson::of(note, self.clock)).collect()),
             back: self.back(dive),
@@ -425,7 +425,7 @@ impl Collector {
     /// nor head numbers.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn mended(&mut self, dive: &Loop) -> Vec<SampleRecord> {
-        let Some([from_m, whole_to_m]) = self.lacking_m.take() else { return Vec::new() };
+        let Some([from_m, whole_to_m]) = self.unsent_m.take() else { return Vec::new() };
         let (store, mut to_m) = (&dive.view().coverage().store, whole_to_m.min(from_m + MENDED_AT_ONCE_M));
         let count = |to_m: f64| {
             let mut count = 0;
@@ -435,7 +435,7 @@ impl Collector {
         while count(to_m) > MOST_SAMPLES && to_m - from_m > SHORTEST_MENDED_M {
             to_m = from_m.midpoint(to_m);
         }
-        self.lacking_m = (to_m < whole_to_m).then_some([to_m, whole_to_m]);
+        self.unsent_m = (to_m < whole_to_m).then_some([to_m, whole_to_m]);
         let (profile, t_ms) = (&dive.mission().profile, self.t_ms(dive.now()));
         let mut mended = Vec::new();
         store.each_between(from_m, to_m, |WallPoint { x_m, arc_m }, _| {
@@ -516,10 +516,10 @@ impl Collector {
     /// and is due.
     fn back(&mut self, dive: &Loop) -> Option<Value> {
         let now = dive.now();
-        let told = self.back_told.as_ref();
-        let waits = told.is_some_and(|(told, ..)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
+        let sent = self.back_sent.as_ref();
+        let waits = sent.is_some_and(|(then, ..)| (0..BACK_EVERY.0).contains(&now.since(*then).0));
         // Even without new missed stretches, the way back changes as the vehicle moves.
-        let has_legs = told.is_some_and(|(.., legs)| legs.as_array().is_some_and(|legs| !legs.is_empty()));
+        let has_legs = sent.is_some_and(|(.., legs)| legs.as_array().is_some_and(|legs| !legs.is_empty()));
         if waits || !self.back_due && !has_legs {
             return None;
         }
@@ -538,14 +538,15 @@ impl Collector {
                 "at_most_mps": at_most_mps, "why": why.join(", ")}));
         }
         let legs = Value::from(shown);
-        let is_old =
-            |(_, told_m, told): &(MonoNs, f64, Value)| *told == legs && (told_m - way_m).abs() < WAY_STEP_M;
-        if self.back_told.as_ref().is_some_and(is_old) {
+        let is_old = |(_, sent_m, before): &(MonoNs, f64, Value)| {
+            *before == legs && (sent_m - way_m).abs() < WAY_STEP_M
+        };
+        if self.back_sent.as_ref().is_some_and(is_old) {
             return None;
         }
         let time_s = time_s.map(|s| rounded(s, 10.0));
         let back = json!({"type": "back", "legs": legs, "way_m": rounded(way_m, 100.0), "time_s": time_s});
-        self.back_told = Some((now, way_m, legs));
+        self.back_sent = Some((now, way_m, legs));
         Some(back)
     }
 }

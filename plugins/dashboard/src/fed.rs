@@ -43,7 +43,7 @@ pub struct News {
     /// Sections that have changed since the previous message.
     pub sections: Vec<SectionRecord>,
     /// Events since the previous message, as JSON objects with a type.
-    pub told: Vec<Value>,
+    pub events: Vec<Value>,
     /// All notes of the dive; `None` if there is no new note.
     pub notes: Option<Vec<NoteJson>>,
     /// Missed stretches to go back to; `None` if the list hasn't changed.
@@ -132,7 +132,7 @@ pub struct Dropped {
     /// Number of dropped samples. Wall samples among these are sent again from the loop's store.
     pub samples: u64,
     /// Number of dropped events.
-    pub told: u64,
+    pub events: u64,
 }
 
 /// State of playback.

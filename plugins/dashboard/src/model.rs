@@ -19,7 +19,7 @@ use crate::site::{Greeting, May, Site};
 use crate::wire::{SectionRecord, sample_frame, section_frame};
 
 /// Maximum number of events, such as live messages, kept for viewers that reconnect.
-const MOST_TOLD: usize = 256;
+const MOST_EVENTS: usize = 256;
 /// Maximum number of samples in one message: 100 kB/s at five messages a second. More samples are thinned; `/samples`
 /// returns all of them.
 const MOST_AT_ONCE: usize = 1000;
@@ -88,8 +88,8 @@ pub struct Model {
     state: Option<Box<(Box<LiveStateJson>, Beside)>>,
     state_is_new: bool,
     playback: Option<PlaybackState>,
-    told_new: Vec<Value>,
-    told: VecDeque<(u64, Utf8Bytes)>,
+    new_events: Vec<Value>,
+    events: VecDeque<(u64, Utf8Bytes)>,
     notes: Vec<NoteJson>,
     back: Option<Value>,
     back_is_new: bool,
@@ -116,8 +116,8 @@ impl Model {
             state: None,
             state_is_new: false,
             playback: None,
-            told_new: Vec::new(),
-            told: VecDeque::new(),
+            new_events: Vec::new(),
+            events: VecDeque::new(),
             notes: Vec::new(),
             back: None,
             back_is_new: false,
@@ -159,7 +159,7 @@ impl Model {
             self.samples.take(at_ms, &news.samples, self.site.is_playback);
             return false;
         }
-        let is_urgent = !news.told.is_empty();
+        let is_urgent = !news.events.is_empty();
         for record in news.sections {
             let before = self.sections.get(&record.index);
             if before.is_none_or(|before| before.record != record) {
@@ -182,7 +182,7 @@ impl Model {
         }
         self.state = Some(Box::new((news.state, news.beside)));
         self.state_is_new = true;
-        self.told_new.extend(news.told);
+        self.new_events.extend(news.events);
         self.notes = news.notes.unwrap_or(core::mem::take(&mut self.notes));
         if news.back.is_some() {
             (self.back, self.back_is_new) = (news.back, true);
@@ -209,8 +209,8 @@ impl Model {
         self.jumps += 1;
         self.sections.clear();
         self.changed.clear();
-        self.told.clear();
-        self.told_new.clear();
+        self.events.clear();
+        self.new_events.clear();
         self.places.clear();
         self.samples.jump(self.ms(at));
         self.history.jump(self.clock.seconds(at));
@@ -234,15 +234,15 @@ impl Model {
     /// Returns the changes since the previous call, as messages for all viewers.
     pub fn flush(&mut self) -> Vec<Message> {
         let mut messages = Vec::new();
-        for value in core::mem::take(&mut self.told_new) {
+        for value in core::mem::take(&mut self.new_events) {
             let message = self.text(value, Sort::Other);
             if let Body::Text(text) = &message.body {
-                self.told.push_back((message.seq, text.clone()));
+                self.events.push_back((message.seq, text.clone()));
             }
             messages.push(message);
         }
-        while self.told.len() > MOST_TOLD {
-            self.told.pop_front();
+        while self.events.len() > MOST_EVENTS {
+            self.events.pop_front();
         }
         messages.extend(self.flush_sections());
         messages.extend(self.flush_samples());
@@ -344,11 +344,11 @@ impl Model {
             messages.push(binary(sample_frame(low, &samples)));
         }
         if let Some(since) = since {
-            let missed = self.told.iter().filter(|(seq, _)| *seq > since);
-            messages.extend(missed.map(|(seq, told)| Message {
+            let missed = self.events.iter().filter(|(seq, _)| *seq > since);
+            messages.extend(missed.map(|(seq, events)| Message {
                 seq: *seq,
                 sort: Sort::Other,
-                body: Body::Text(told.clone()),
+                body: Body::Text(events.clone()),
             }));
         }
         messages.extend(self.lists().iter().chain(&self.back).map(text));

@@ -139,8 +139,8 @@ fn input(report: &[u8]) -> Result<Vec<u8>, UhidError> {
 }
 
 fn size(what: &'static str, bytes: &[u8], least: usize, most: usize) -> Result<u16, UhidError> {
-    let told = u16::try_from(bytes.len()).ok().filter(|_| (least..=most).contains(&bytes.len()));
-    told.ok_or(UhidError::Size { what, bytes: bytes.len(), least, most })
+    let size = u16::try_from(bytes.len()).ok().filter(|_| (least..=most).contains(&bytes.len()));
+    size.ok_or(UhidError::Size { what, bytes: bytes.len(), least, most })
 }
 
 /// Appends a text to a field of `field` bytes. The last byte of the field stays zero.

@@ -44,21 +44,21 @@ fn injected_mount_errors_are_estimated() {
             assert!(found.median_m < 0.02);
             let mean = |of: fn(&Wrong) -> f64| f64::midpoint(of(&wrong[0]), of(&wrong[1]));
             for (head, wrong) in found.heads.iter().zip(&wrong) {
-                let told = format!("{name}, seed {seed}, {head:?}");
-                assert_eq!(head.is_mirrored, Ok(wrong.is_mirrored), "{told}");
+                let case = format!("{name}, seed {seed}, {head:?}");
+                assert_eq!(head.is_mirrored, Ok(wrong.is_mirrored), "{case}");
                 let [angle, left, up] = [head.angle_rad, head.left_m, head.up_m]
-                    .map(|of| of.unwrap_or_else(|why| panic!("{told}: {why}")));
+                    .map(|of| of.unwrap_or_else(|why| panic!("{case}: {why}")));
                 let off_deg = short_deg(angle.value) - wrong.angle_deg;
                 let off_left = left.value - (wrong.left_m - mean(|w| w.left_m));
                 let off_up = up.value - (wrong.up_m - mean(|w| w.up_m));
                 for (off, sd, most) in
                     [(off_deg, angle.sd.to_degrees(), 0.3), (off_left, left.sd, 0.01), (off_up, up.sd, 0.01)]
                 {
-                    assert!(off.abs() <= 3.0 * sd && off.abs() < most, "{off} +- {sd}: {told}");
+                    assert!(off.abs() <= 3.0 * sd && off.abs() < most, "{off} +- {sd}: {case}");
                     worst.0 = worst.0.max(off.abs() / sd);
                     worst.1 = worst.1.max(sd / most);
                 }
-                assert!(head.used > 190 && head.rejected > 5, "{told}");
+                assert!(head.used > 190 && head.rejected > 5, "{case}");
             }
             let [y, z] = found.place_m;
             assert!(

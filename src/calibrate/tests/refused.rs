@@ -79,7 +79,7 @@ fn head_that_sees_one_side_only_is_refused() {
 #[test]
 fn sense_of_rotation_in_a_symmetric_section_needs_echosounders_and_a_vehicle_off_the_centre() {
     let wrong = [Wrong::default(); 2];
-    for (at, has_echoes, told) in
+    for (at, has_echoes, is_accepted) in
         [([0.6, 2.3], true, true), ([0.6, 2.3], false, false), ([0.0, 2.3], true, false)]
     {
         for (name, profile) in profiles() {
@@ -88,7 +88,7 @@ fn sense_of_rotation_in_a_symmetric_section_needs_echosounders_and_a_vehicle_off
             let stand = Stand { at, has_echoes, wrong: vec![Wrong::default()], ..stand };
             let found = stand.ask(|material| heads(material).unwrap());
             let of = found.heads[0].is_mirrored;
-            assert_eq!(of.is_ok(), told, "{name}, {at:?}, {has_echoes}: {of:?}");
+            assert_eq!(of.is_ok(), is_accepted, "{name}, {at:?}, {has_echoes}: {of:?}");
             assert!(!of.unwrap_or(false));
             assert!(matches!(found.heads[0].left_m, Err(NotEstimated::OneHead)));
         }

@@ -39,7 +39,7 @@ pub struct Case<'a> {
     /// Causes of the two neighbouring sections. If several sets of causes are equally small, these are tried first.
     pub beside: [Causes; 2],
     /// The most recent missing samples.
-    pub lacks: &'a MissingSamples,
+    pub missing_samples: &'a MissingSamples,
 }
 
 /// Ping counts of the sections round a hole. `worst` holds the driving figures at the moment with the largest distance
@@ -110,16 +110,16 @@ pub(super) fn is_unheard(case: &Case<'_>, seen: &Seen) -> bool {
 
 /// Whether missing samples of silent heads are listed for the section.
 pub(super) fn is_remembered(case: &Case<'_>) -> bool {
-    let mut lacking = case.lacks.between(case.bounds_m.0, case.bounds_m.1);
-    lacking.any(|lack| lack.why.has(Cause::HeadSilent))
+    let mut missing = case.missing_samples.between(case.bounds_m.0, case.bounds_m.1);
+    missing.any(|missing| missing.why.has(Cause::HeadSilent))
 }
 
 /// Whether a missing sample lies in the central part of a hole.
 ///
 /// The central part is at most as large as the target, because samples that land later may still shrink the hole.
-pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
-    let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
-    math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
+pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, missing: &MissingSample) -> bool {
+    let around_m = math::wrap_signed(missing.arc_m - hole.arc_m, perimeter_m);
+    math::hypot(missing.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
 }
 
 impl Drive {

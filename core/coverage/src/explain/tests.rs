@@ -71,7 +71,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
 fn explained(wall: &Wall) -> Evidence {
     let layout =
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
-    let (mut store, mut lacks) = (SampleStore::new(layout), MissingSamples::default());
+    let (mut store, mut missing_samples) = (SampleStore::new(layout), MissingSamples::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
     // The section's centre lies midway between two passes.
     let rows = count(4.0, wall.along_m);
@@ -85,7 +85,7 @@ fn explained(wall: &Wall) -> Evidence {
             if !is_bare {
                 store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
             } else if !wall.why.is_empty() {
-                lacks.add(MissingSample { x_m, arc_m, head: 0, why: wall.why, may_be_wall: false });
+                missing_samples.add(MissingSample { x_m, arc_m, head: 0, why: wall.why, may_be_wall: false });
             }
         }
     }
@@ -103,7 +103,7 @@ fn explained(wall: &Wall) -> Evidence {
         is_torn: wall.is_torn,
         target_m: TARGET_M,
         beside: wall.beside,
-        lacks: &lacks,
+        missing_samples: &missing_samples,
     };
     let Wall { drive, adrift, .. } = *wall;
     let passage = Passage { pings: 1000, placed: 1000, drive, adrift, ..Passage::default() };

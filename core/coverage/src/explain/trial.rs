@@ -37,9 +37,9 @@ pub(super) struct Trial<'a> {
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// Factors that were present in the section (`present`), and those of them that caused missing samples (`lacking`).
+    /// Factors that were present in the section (`present`), and those of them that caused missing samples (`missing_causes`).
     present: Causes,
-    lacking: Causes,
+    missing_causes: Causes,
     left: u32,
     /// Bounds of the hole's diameter if all missing samples are put back, m, and number of bisection steps left.
     full_m: [f64; 2],
@@ -55,7 +55,7 @@ impl<'a> Trial<'a> {
         present: Causes,
     ) -> Self {
         let drive = &seen.worst;
-        let lacking = [
+        let missing_causes = [
             Cause::OutOfRange,
             Cause::MissingReturns,
             Cause::Occluded,
@@ -63,17 +63,18 @@ impl<'a> Trial<'a> {
             Cause::HeadStalled,
             Cause::PositionLost,
         ];
-        let lacking: Causes = lacking.into_iter().filter(|cause| present.has(*cause)).collect();
+        let missing_causes: Causes = missing_causes.into_iter().filter(|cause| present.has(*cause)).collect();
         let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
         let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
         // Samples that are put back outside the hole cannot shrink it.
-        let fills = |lack: &MissingSample| {
-            lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
+        let fills = |missing: &MissingSample| {
+            missing.why.is_within(missing_causes)
+                && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), missing)
         };
-        let is_whole = most_m <= case.target_m || !case.lacks.between(from_m, to_m).any(fills);
+        let is_whole = most_m <= case.target_m || !case.missing_samples.between(from_m, to_m).any(fills);
         let full_m = if is_whole { [case.hole.diameter_m; 2] } else { [case.target_m / 2.0, most_m] };
         let halvings = if is_whole { 0 } else { SEARCHED };
-        Self { case, drive, seen, store, finder, present, left: MOST_TRIED, lacking, full_m, halvings }
+        Self { case, drive, seen, store, finder, present, left: MOST_TRIED, missing_causes, full_m, halvings }
     }
 
     /// Smallest set of present factors without which the section would have passed.
@@ -188,13 +189,13 @@ impl<'a> Trial<'a> {
 
     /// Lays out the wall as it would be without the factors in `removed`, for the search for holes.
     fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &WallChanges) {
-        let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
+        let Case { bounds_m, first_visit, target_m, missing_samples, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
-        let put_back = lacks
+        let put_back = missing_samples
             // Mirroring the wall later needs samples from this wider range.
             .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
-            .filter(|lack| lack.why.is_within(removed))
-            .map(|lack| WallPoint { x_m: lack.x_m, arc_m: lack.arc_m });
+            .filter(|missing| missing.why.is_within(removed))
+            .map(|missing| WallPoint { x_m: missing.x_m, arc_m: missing.arc_m });
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 
@@ -212,11 +213,11 @@ impl<'a> Trial<'a> {
     ///
     /// Infinite if the remaining factors cause many missing samples.
     fn stays_m(&self, removed: Causes) -> f64 {
-        let Case { bounds_m, lacks, .. } = *self.case;
+        let Case { bounds_m, missing_samples, .. } = *self.case;
         let (mut all, mut stay) = (0_u32, 0_u32);
-        for lack in lacks.between(bounds_m.0, bounds_m.1) {
+        for missing in missing_samples.between(bounds_m.0, bounds_m.1) {
             all += 1;
-            stay += u32::from(!lack.why.is_within(removed));
+            stay += u32::from(!missing.why.is_within(removed));
         }
         if f64::from(stay) > STAYS * f64::from(all) {
             return f64::INFINITY;
@@ -260,7 +261,7 @@ impl<'a> Trial<'a> {
         if least_m < most_m && self.halvings > 0 && matters(self.full_m) {
             let otherwise = WallChanges { to_come: self.to_come(), ..WallChanges::NOTHING };
             let [mut smaller_m, mut larger_m] = self.full_m;
-            self.lay(self.lacking, larger_m / 2.0, &otherwise);
+            self.lay(self.missing_causes, larger_m / 2.0, &otherwise);
             while self.halvings > 0 && matters([smaller_m, larger_m]) {
                 self.halvings -= 1;
                 let tried_m = math::sqrt(smaller_m * larger_m);

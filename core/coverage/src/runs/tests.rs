@@ -46,7 +46,7 @@ impl Rig {
             })
         };
         let mut tell = |id, change| changes.push((id, change));
-        runs.set(section, failing, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
+        runs.set(section, failing, &mut RunUpdate { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
     /// Checks every missed stretch that is not cleared against the states of its sections.

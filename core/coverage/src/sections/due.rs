@@ -348,7 +348,7 @@ mod tests {
         };
         let mut judging = Judging {
             store: &store,
-            lacks: &MissingSamples::default(),
+            missing_samples: &MissingSamples::default(),
             finder: &mut HoleFinder::default(),
             profile: &profile,
             tell: &mut |_, _| {},

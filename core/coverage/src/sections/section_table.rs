@@ -10,7 +10,7 @@ use crate::hole::{FARTHEST_M, Hole, HoleFinder, WallChanges};
 use crate::missing_samples::MissingSamples;
 use crate::openings::Opening;
 use crate::passage::PassError;
-use crate::runs::{Run, RunChange, RunId, Runs, Telling};
+use crate::runs::{Run, RunChange, RunId, RunUpdate, Runs};
 use crate::section::{Judgement, Metres, Section, Verdict};
 use crate::store::SampleStore;
 use crate::unsure::{Driven, Stretch};
@@ -91,7 +91,7 @@ pub struct Judging<'a> {
     /// Store with all samples.
     pub store: &'a SampleStore,
     /// The most recent missing samples, for the causes of fails.
-    pub lacks: &'a MissingSamples,
+    pub missing_samples: &'a MissingSamples,
     /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
     /// Design profile of the tunnel.
@@ -445,7 +445,11 @@ impl Sections {
         let evidence = flagged.and_then(|section| section.evidence);
         let failing = evidence.as_ref().map(Evidence::failing);
         let hole = |index: i64| get(index)?.hole;
-        runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
+        runs.set(
+            request.section,
+            failing,
+            &mut RunUpdate { at: request.at, hole: &hole, tell: judging.tell },
+        );
     }
 
     /// Determines the causes of a section's hole. They follow from the heads' passages through all sections within the
@@ -484,7 +488,7 @@ impl Sections {
             is_torn: visits.are_unrelated(),
             target_m: self.target.max_hole_m,
             beside: [beside(request.section - 1), beside(request.section + 1)],
-            lacks: judging.lacks,
+            missing_samples: judging.missing_samples,
         };
         let passages = near.filter_map(|index| Some(&self.get(index)?.passage));
         explain(&case, passages, judging.store, judging.finder)
@@ -538,15 +542,16 @@ fn is_filled_by_doubtful(
     radius_m: f64,
     first_visit: u32,
 ) -> bool {
-    let Judging { store, lacks, finder, .. } = judging;
+    let Judging { store, missing_samples, finder, .. } = judging;
     if radius_m >= FARTHEST_M {
         return false;
     }
-    let doubtful = || lacks.between(from_m - radius_m, to_m + radius_m).filter(|lack| lack.may_be_wall);
+    let doubtful =
+        || missing_samples.between(from_m - radius_m, to_m + radius_m).filter(|missing| missing.may_be_wall);
     if doubtful().next().is_none() {
         return false;
     }
-    let more = doubtful().map(|lack| WallPoint { x_m: lack.x_m, arc_m: lack.arc_m });
+    let more = doubtful().map(|missing| WallPoint { x_m: missing.x_m, arc_m: missing.arc_m });
     finder.lay_otherwise((store, first_visit), (from_m, to_m), radius_m, &WallChanges::NOTHING, more);
     !finder.has_circle_otherwise((from_m, to_m), radius_m, &WallChanges::NOTHING)
 }

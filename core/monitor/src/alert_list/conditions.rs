@@ -2,7 +2,7 @@
 
 use super::alert::{AlertChange, AlertState, Figures};
 use super::kind::{ListKind, Priority};
-use super::life_cycle::Telling;
+use super::life_cycle::AlertOutputs;
 use super::list::AlertList;
 use super::timer::{self, Due};
 use crate::live_state::condition::Condition;
@@ -33,7 +33,7 @@ const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
 const MORE_PCT: f64 = 2.0;
 
 /// An advice update, with the live state at that time.
-pub(crate) struct Beat<'a> {
+pub(crate) struct AdviceUpdate<'a> {
     pub(crate) at: MonoNs,
     /// Live state whose `now` is the time of the advice update.
     pub(crate) state: &'a LiveState,
@@ -58,8 +58,8 @@ impl Seen {
 
 impl AlertList {
     /// Checks all conditions at an advice update.
-    pub(crate) fn beat(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
-        let Beat { at, state, .. } = *beat;
+    pub(crate) fn update(&mut self, update: &AdviceUpdate<'_>, to: &mut AlertOutputs<'_>) {
+        let AdviceUpdate { at, state, .. } = *update;
         let begun = *self.begun.get_or_insert(at);
         self.v_max_mps = state.v_max_mps().unwrap_or(0.0);
         self.x_m = state.chainage_m;
@@ -67,10 +67,10 @@ impl AlertList {
         self.had.sure_position |= state.position == PositionState::Ok;
         self.had.turning |= state.turning;
         self.had.sonar |= state.has_sonar() && state.turning != 0;
-        self.take_speed(beat, to);
-        self.take_position(beat, begun, to);
-        self.take_unsure(beat, to);
-        self.take_observations(beat, to);
+        self.take_speed(update, to);
+        self.take_position(update, begun, to);
+        self.take_unsure(update, to);
+        self.take_observations(update, to);
         self.take_sensors(at, state, to);
         self.take_left(at, state, to);
         self.take_recording(at, to);
@@ -80,7 +80,7 @@ impl AlertList {
     /// Checks sensors and remaining resources while no sensor delivers data.
     ///
     /// `state` is the live state of the last advice update, with `now` set to `at`.
-    pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
+    pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut AlertOutputs<'_>) {
         self.take_sensors(at, state, to);
         if self.begun.is_some() {
             self.take_left(at, state, to);
@@ -90,18 +90,18 @@ impl AlertList {
     }
 
     /// Records whether a log recording fails.
-    pub(crate) fn set_recording(&mut self, fails: bool, at: MonoNs, to: &mut Telling<'_>) {
+    pub(crate) fn set_recording(&mut self, fails: bool, at: MonoNs, to: &mut AlertOutputs<'_>) {
         self.recording_fails = fails;
         self.take_recording(at, to);
     }
 
     /// Records that the computer stalled for some seconds until `at`.
-    pub(crate) fn set_stalled(&mut self, seconds: u32, at: MonoNs, to: &mut Telling<'_>) {
+    pub(crate) fn set_stalled(&mut self, seconds: u32, at: MonoNs, to: &mut AlertOutputs<'_>) {
         self.stalled = Some((at, seconds));
         self.take_stall(at, to);
     }
 
-    fn take_stall(&mut self, at: MonoNs, to: &mut Telling<'_>) {
+    fn take_stall(&mut self, at: MonoNs, to: &mut AlertOutputs<'_>) {
         let last = self.stalled.filter(|(ended, _)| at.since(*ended).0 <= GROWS.0);
         let figures = last.map_or(Figures::None, |(_, seconds)| Figures::Stalled(seconds));
         self.observe(at, &Seen::of(ListKind::ComputerStalled, last.is_some(), figures), to);
@@ -112,7 +112,7 @@ impl AlertList {
         self.battery_pct = Some(battery_pct);
     }
 
-    fn take_recording(&mut self, at: MonoNs, to: &mut Telling<'_>) {
+    fn take_recording(&mut self, at: MonoNs, to: &mut AlertOutputs<'_>) {
         let seen = Seen::of(ListKind::NotRecorded, self.recording_fails, Figures::None);
         self.observe(at, &seen, to);
     }
@@ -122,8 +122,8 @@ impl AlertList {
         self.begun.is_some_and(|begun| at.since(begun).0 >= GRACE.0)
     }
 
-    fn take_speed(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
-        let Beat { at, state, .. } = *beat;
+    fn take_speed(&mut self, update: &AdviceUpdate<'_>, to: &mut AlertOutputs<'_>) {
+        let AdviceUpdate { at, state, .. } = *update;
         let condition = state.condition();
         let speed_mps = state.speed_mps.unwrap_or(0.0);
         let figures = state
@@ -139,24 +139,24 @@ impl AlertList {
         self.observe(at, &Seen::of(ListKind::TurnFails, condition == Condition::TurnFails, figures), to);
     }
 
-    fn take_position(&mut self, beat: &Beat<'_>, begun: MonoNs, to: &mut Telling<'_>) {
-        let Beat { at, state, .. } = *beat;
-        let (lacks, figures) = match state.position {
-            PositionState::None(lacking) => (true, Figures::MissingRequirement(lacking)),
+    fn take_position(&mut self, update: &AdviceUpdate<'_>, begun: MonoNs, to: &mut AlertOutputs<'_>) {
+        let AdviceUpdate { at, state, .. } = *update;
+        let (is_missing, figures) = match state.position {
+            PositionState::None(no_fix) => (true, Figures::MissingRequirement(no_fix)),
             _ => (false, Figures::None),
         };
         // Navigation needs time to align before it gives the first position.
         let is_late = at.since(begun).0 >= GRACE.0;
-        let lacks = lacks && (self.had.position || is_late);
-        self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
+        let is_missing = is_missing && (self.had.position || is_late);
+        self.observe(at, &Seen::of(ListKind::NoPosition, is_missing, figures), to);
         let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread)
             && (self.had.sure_position || is_late);
         let error = Figures::Error(state.target.error_m(state.pass_sd_m), state.stand_s > 0);
         self.observe(at, &Seen::of(ListKind::PositionDoubtful, is_spread, error), to);
     }
 
-    fn take_unsure(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
-        let Beat { at, state, .. } = *beat;
+    fn take_unsure(&mut self, update: &AdviceUpdate<'_>, to: &mut AlertOutputs<'_>) {
+        let AdviceUpdate { at, state, .. } = *update;
         // Stretches at the ends of the coverage extent (the tunnel that the vehicle has visited) are reported
         // once the vehicle has left them.
         let now = state.unsure.filter(|stretch| stretch.why != Unsure::NotInspected);
@@ -170,8 +170,8 @@ impl AlertList {
     }
 
     /// Checks the observations about the dive as a whole.
-    fn take_observations(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
-        let Beat { at, state, setting, unverified_mounts } = *beat;
+    fn take_observations(&mut self, update: &AdviceUpdate<'_>, to: &mut AlertOutputs<'_>) {
+        let AdviceUpdate { at, state, setting, unverified_mounts } = *update;
         let unverified = unverified_mounts && self.is_late(at);
         self.observe(at, &Seen::of(ListKind::MountsUnverified, unverified, Figures::None), to);
         let active = |kind: ListKind, source: Option<SourceId>| {
@@ -204,7 +204,7 @@ impl AlertList {
         &mut self,
         observations: &Observations,
         at: MonoNs,
-        to: &mut Telling<'_>,
+        to: &mut AlertOutputs<'_>,
     ) {
         let is_made_at_end = |kind: ObservedKind| {
             matches!(kind, ObservedKind::OutsideTunnel | ObservedKind::ProfileContradicted)
@@ -219,7 +219,7 @@ impl AlertList {
         }
     }
 
-    fn take_sensors(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
+    fn take_sensors(&mut self, at: MonoNs, state: &LiveState, to: &mut AlertOutputs<'_>) {
         let is_late = self.is_late(at);
         let sources = || (0_u16..).take(usize::from(state.sources));
         let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
@@ -270,7 +270,7 @@ impl AlertList {
     }
 
     /// Checks the remaining cable, time and charge.
-    fn take_left(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
+    fn take_left(&mut self, at: MonoNs, state: &LiveState, to: &mut AlertOutputs<'_>) {
         let cable = self.cable_left_m(state.chainage_m).zip(self.limits.cable_m);
         let time = self.time_left_s(at).zip(self.limits.dive_time.map(DurNs::as_secs_f64));
         let battery = self.battery_pct.map(|pct| (pct, 100.0));
@@ -285,7 +285,7 @@ impl AlertList {
         kind: ListKind,
         left: Option<(f64, f64)>,
         little_pct: [f64; 3],
-        to: &mut Telling<'_>,
+        to: &mut AlertOutputs<'_>,
     ) {
         let Some((left, all)) = left else { return };
         let share_pct = 100.0 * left / all;
@@ -316,7 +316,7 @@ impl AlertList {
     }
 
     /// Updates the timer of a situation, and raises or ends the situation's alert when due.
-    pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
+    pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut AlertOutputs<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);
         let timing = self.timing.of(kind.class());
@@ -335,7 +335,7 @@ impl AlertList {
                 }
                 self.rectify(number, at, to);
             }
-            Due::GoesOn => self.update(number, figures, to, at),
+            Due::GoesOn => self.change_figures(number, figures, to, at),
             Due::Nothing => {}
         }
     }
@@ -347,7 +347,7 @@ impl AlertList {
         kind: ListKind,
         source: Option<SourceId>,
         (at, figures): (MonoNs, Figures),
-        to: &mut Telling<'_>,
+        to: &mut AlertOutputs<'_>,
     ) -> u32 {
         let stretch = figures.stretch();
         let waits =
@@ -366,7 +366,7 @@ impl AlertList {
     }
 
     /// Updates the figures of a continuing alert, and publishes a change of place.
-    fn update(&mut self, number: u32, figures: Figures, to: &mut Telling<'_>, at: MonoNs) {
+    fn change_figures(&mut self, number: u32, figures: Figures, to: &mut AlertOutputs<'_>, at: MonoNs) {
         let Some(alert) = self.get_mut(number) else { return };
         alert.figures = alert.figures.and_then(figures, alert.kind);
         let stretch = figures.stretch();

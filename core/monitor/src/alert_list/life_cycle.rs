@@ -11,12 +11,12 @@ use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::SourceId;
 
 /// Context for publishing changes of alerts.
-pub(crate) struct Telling<'a> {
+pub(crate) struct AlertOutputs<'a> {
     pub(crate) notices: &'a mut Vec<Notice>,
     pub(crate) stream: &'a mut ResultStream,
 }
 
-impl Telling<'_> {
+impl AlertOutputs<'_> {
     /// Publishes a change of an alert. Allocates: never.
     ///
     /// The digest includes the change even if the list of notices is full.
@@ -57,7 +57,7 @@ impl Figures {
             Self::Missed(_, _, at_most_mps) => at_most_mps,
             Self::CannotSay(stretch) => stretch.largest().hole_m[0],
             Self::Advice(figures) => figures.speed_mps,
-            Self::MissingRequirement(lacking) => f64::from(lacking as u8),
+            Self::MissingRequirement(no_fix) => f64::from(no_fix as u8),
             Self::Error(figure, _) | Self::Left(figure) => figure,
             Self::Stalled(count) | Self::Withheld(WithheldReadings { count, .. }) => f64::from(count),
             Self::Deviation(occurrences) => occurrences.worst_m,
@@ -74,7 +74,7 @@ impl AlertList {
         source: Option<SourceId>,
         (at, figures): (MonoNs, Figures),
         stretch: Option<(i64, i64)>,
-        to: &mut Telling<'_>,
+        to: &mut AlertOutputs<'_>,
     ) -> u32 {
         self.make_room(at, to);
         self.raised += 1;
@@ -106,7 +106,7 @@ impl AlertList {
 
     /// Makes room in a full list: drops the oldest cleared alert. If no alert is cleared, first merges the newest
     /// missed stretch into another alert.
-    fn make_room(&mut self, at: MonoNs, to: &mut Telling<'_>) {
+    fn make_room(&mut self, at: MonoNs, to: &mut AlertOutputs<'_>) {
         if self.alerts.len() < MOST_LISTED {
             return;
         }
@@ -126,7 +126,7 @@ impl AlertList {
 
     /// Reactivates an alert whose condition holds again before anybody has acknowledged it, and counts the
     /// occurrence.
-    pub(super) fn hold_again(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
+    pub(super) fn hold_again(&mut self, number: u32, at: MonoNs, to: &mut AlertOutputs<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         (alert.state, alert.rectified) = (AlertState::Active, None);
         alert.count += 1;
@@ -135,7 +135,7 @@ impl AlertList {
     }
 
     /// Marks that an alert's condition no longer holds.
-    pub(super) fn rectify(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
+    pub(super) fn rectify(&mut self, number: u32, at: MonoNs, to: &mut AlertOutputs<'_>) {
         let Some(alert) = self.get_mut(number).filter(|alert| alert.state == AlertState::Active) else {
             return;
         };
@@ -153,7 +153,13 @@ impl AlertList {
 
     /// Acknowledges the alert with this number, or all alerts with 0. Returns false if there was nothing to
     /// acknowledge.
-    pub(crate) fn acknowledge(&mut self, number: u32, by: Who, at: MonoNs, to: &mut Telling<'_>) -> bool {
+    pub(crate) fn acknowledge(
+        &mut self,
+        number: u32,
+        by: Who,
+        at: MonoNs,
+        to: &mut AlertOutputs<'_>,
+    ) -> bool {
         let mut any = false;
         let is_meant = |alert: &&mut ListedAlert| number == 0 || alert.number == number;
         for alert in self.alerts.iter_mut().filter(is_meant).filter(|alert| alert.needs_acknowledgement()) {
@@ -170,7 +176,7 @@ impl AlertList {
     }
 
     /// Silences all sounding alerts. Returns false if none sounded.
-    pub(crate) fn silence(&mut self, at: MonoNs, to: &mut Telling<'_>) -> bool {
+    pub(crate) fn silence(&mut self, at: MonoNs, to: &mut AlertOutputs<'_>) -> bool {
         let mut any = false;
         for alert in self.alerts.iter_mut().filter(|alert| alert.sounds(at)) {
             any = true;
@@ -181,7 +187,13 @@ impl AlertList {
     }
 
     /// Raises the priority of an alert, which must then be acknowledged again.
-    pub(super) fn set_priority(&mut self, number: u32, priority: Priority, at: MonoNs, to: &mut Telling<'_>) {
+    pub(super) fn set_priority(
+        &mut self,
+        number: u32,
+        priority: Priority,
+        at: MonoNs,
+        to: &mut AlertOutputs<'_>,
+    ) {
         let Some(alert) = self.get_mut(number).filter(|alert| alert.priority < priority) else { return };
         alert.priority = priority;
         (alert.acknowledged, alert.silenced_until) = (None, None);

@@ -18,10 +18,10 @@ pub mod texts;
 mod timer;
 
 pub use alert::{Acknowledgement, AlertChange, AlertState, Figures, ListedAlert};
-pub(super) use conditions::Beat;
+pub(super) use conditions::AdviceUpdate;
 pub use json::{AlertCountsJson, LeftJson, ListedAlertJson, NoteJson, SettingJson, SpokenJson};
 pub use kind::{AlertClass, ListKind, Priority};
-pub(super) use life_cycle::Telling;
+pub(super) use life_cycle::AlertOutputs;
 pub use list::{AlertList, MOST_LISTED, SILENCE};
 pub(super) use runs::RunInput;
 pub use texts::TextContext;

@@ -2,7 +2,7 @@
 
 use super::alert::{AlertChange, AlertState, Figures, ListedAlert};
 use super::kind::ListKind;
-use super::life_cycle::Telling;
+use super::life_cycle::AlertOutputs;
 use super::list::AlertList;
 use crate::pilot_text::CauseFigures;
 use headrace_coverage::{RunChange, RunId, Sections};
@@ -15,7 +15,7 @@ pub(crate) struct RunInput {
     /// event after the update.
     pub(crate) event: usize,
     /// Whether the stretch was judged at an advice update before the event with the index `event`.
-    pub(crate) at_beat: bool,
+    pub(crate) at_update: bool,
     pub(crate) at: MonoNs,
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
@@ -28,7 +28,7 @@ pub(crate) struct RunInput {
 impl RunInput {
     /// Alert input for a missed stretch that a judgement has changed; `None` if there is no such stretch.
     pub(crate) fn of(
-        (event, at_beat): (usize, bool),
+        (event, at_update): (usize, bool),
         at: MonoNs,
         (id, change): (RunId, RunChange),
         sections: &Sections,
@@ -36,13 +36,13 @@ impl RunInput {
         let run = sections.runs().get(id)?;
         let causes = CauseFigures::of_run(sections, run).map(|figures| (figures, run.worst.1.arc_m));
         let stretch = (run.from, run.to);
-        Some(Self { event, at_beat, at, id, change, stretch, causes, merged_into: run.merged_into })
+        Some(Self { event, at_update, at, id, change, stretch, causes, merged_into: run.merged_into })
     }
 }
 
 impl AlertList {
     /// Applies a changed missed stretch to the alert list.
-    pub(crate) fn take_run(&mut self, input: &RunInput, to: &mut Telling<'_>) {
+    pub(crate) fn take_run(&mut self, input: &RunInput, to: &mut AlertOutputs<'_>) {
         let at = input.at;
         match input.change {
             RunChange::Raised => self.raise_run(input, to),
@@ -73,7 +73,7 @@ impl AlertList {
         }
     }
 
-    fn raise_run(&mut self, input: &RunInput, to: &mut Telling<'_>) {
+    fn raise_run(&mut self, input: &RunInput, to: &mut AlertOutputs<'_>) {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
@@ -103,7 +103,7 @@ impl AlertList {
     /// with this stretch.
     ///
     /// If a later pass splits a stretch in two, one alert covers both parts.
-    fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {
+    fn widen(&mut self, number: u32, input: &RunInput, to: &mut AlertOutputs<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         let (from, until) = alert.stretch.unwrap_or(input.stretch);
         let wide = if alert.open_runs == 1 {
@@ -124,7 +124,7 @@ impl AlertList {
         }
     }
 
-    fn close_run(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
+    fn close_run(&mut self, number: u32, at: MonoNs, to: &mut AlertOutputs<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         alert.open_runs = alert.open_runs.saturating_sub(1);
         if alert.open_runs == 0 {
@@ -134,7 +134,7 @@ impl AlertList {
 
     /// Merges the alerts of two missed stretches that have merged. The alert with the lower number represents
     /// both stretches.
-    fn merge_runs(&mut self, input: &RunInput, to: &mut Telling<'_>) {
+    fn merge_runs(&mut self, input: &RunInput, to: &mut AlertOutputs<'_>) {
         let Some(into) = input.merged_into else { return };
         let (other, kept) = (self.alert_of(input.id), self.alert_of(into));
         self.set_alert_of(input.id, 0);
@@ -156,7 +156,7 @@ impl AlertList {
     }
 
     /// Merges the alert `high` into the alert `low`. The alert `high` ends.
-    fn merge(&mut self, low: u32, high: u32, at: MonoNs, to: &mut Telling<'_>) {
+    fn merge(&mut self, low: u32, high: u32, at: MonoNs, to: &mut AlertOutputs<'_>) {
         let Some(gone) = self.get_mut(high) else { return };
         let before = *gone;
         (gone.state, gone.cleared) = (AlertState::Cleared, Some(at));
@@ -184,7 +184,7 @@ impl AlertList {
 
     /// Merges the newest missed stretch into its nearest neighbour. This frees an entry in a list that is
     /// full of live alerts.
-    pub(super) fn share_one(&mut self, at: MonoNs, to: &mut Telling<'_>) {
+    pub(super) fn share_one(&mut self, at: MonoNs, to: &mut AlertOutputs<'_>) {
         let stretches = || {
             let missed = self.alerts.iter().filter(|alert| alert.kind == ListKind::Missed && alert.is_live());
             missed.filter_map(|alert| Some((alert.number, alert.stretch?)))

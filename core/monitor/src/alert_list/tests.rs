@@ -44,16 +44,16 @@ impl Bench {
         Self { list, notices: self.notices, stream }
     }
 
-    fn with<T>(&mut self, act: impl FnOnce(&mut AlertList, &mut Telling<'_>) -> T) -> T {
+    fn with<T>(&mut self, act: impl FnOnce(&mut AlertList, &mut AlertOutputs<'_>) -> T) -> T {
         let Self { list, notices, stream } = self;
-        act(list, &mut Telling { notices, stream })
+        act(list, &mut AlertOutputs { notices, stream })
     }
 
     fn run(&mut self, id: u32, change: RunChange, stretch: (i64, i64), merged_into: Option<u32>) {
         let merged_into = merged_into.map(RunId);
         let causes = None;
         let (at, id) = (MonoNs(u64::from(id) + 1), RunId(id));
-        let input = RunInput { event: 0, at_beat: false, at, id, change, stretch, causes, merged_into };
+        let input = RunInput { event: 0, at_update: false, at, id, change, stretch, causes, merged_into };
         self.with(|list, to| list.take_run(&input, to));
     }
 }
@@ -62,7 +62,7 @@ impl Bench {
 #[derive(Debug, Clone, Copy)]
 enum Happens {
     /// An advice update, with the conditions that hold.
-    Beat([bool; 3]),
+    AdviceUpdate([bool; 3]),
     AcknowledgeNewest,
     AcknowledgeAll,
     Silence,
@@ -110,7 +110,7 @@ impl Oracle {
         (on.map(|from| now - from), off)
     }
 
-    fn beat(&mut self, at: u64, holds: bool, (hold_ms, off_ms): (u64, u64), next: &mut u32) {
+    fn update(&mut self, at: u64, holds: bool, (hold_ms, off_ms): (u64, u64), next: &mut u32) {
         self.history.push((at, holds));
         let state = self.all.last().map_or("none", |last| last.1);
         let (on, off) = self.spells_ms(hold_ms);
@@ -158,9 +158,9 @@ impl Oracle {
 
 fn happens() -> impl Strategy<Value = Happens> {
     prop_oneof![
-        12 => any::<[bool; 3]>().prop_map(Happens::Beat),
-        6 => Just(Happens::Beat([true; 3])),
-        6 => Just(Happens::Beat([false; 3])),
+        12 => any::<[bool; 3]>().prop_map(Happens::AdviceUpdate),
+        6 => Just(Happens::AdviceUpdate([true; 3])),
+        6 => Just(Happens::AdviceUpdate([false; 3])),
         1 => Just(Happens::AcknowledgeNewest),
         1 => Just(Happens::AcknowledgeAll),
         1 => Just(Happens::Silence),
@@ -184,14 +184,14 @@ proptest! {
         for (step, times) in steps {
             let at = MonoNs(now * 1_000_000);
             match step {
-                Happens::Beat(holds) => {
+                Happens::AdviceUpdate(holds) => {
                     for _ in 0..times {
                         now += BEAT_MS;
                         let at = MonoNs(now * 1_000_000);
                         for ((kind, holds), oracle) in KINDS.into_iter().zip(holds).zip(&mut oracles) {
                             let seen = Seen::of(kind, holds, Figures::None);
                             bench.with(|list, to| list.observe(at, &seen, to));
-                            oracle.beat(now, holds, (hold_ms, off_ms), &mut next);
+                            oracle.update(now, holds, (hold_ms, off_ms), &mut next);
                         }
                     }
                 }
@@ -238,16 +238,16 @@ proptest! {
 #[test]
 fn flickering_speed_raises_one_alert() {
     let mut bench = Bench::new(1.0, 5.0);
-    for beat in 0..3000_u64 {
-        let seen = Seen::of(ListKind::TooFast, beat % 3 != 0, Figures::None);
-        bench.with(|list, to| list.observe(MonoNs(beat * 200_000_000), &seen, to));
+    for update in 0..3000_u64 {
+        let seen = Seen::of(ListKind::TooFast, update % 3 != 0, Figures::None);
+        bench.with(|list, to| list.observe(MonoNs(update * 200_000_000), &seen, to));
     }
     assert_eq!((bench.list.raised(), bench.notices.len()), (1, 1));
     // Without hold time and dead band, the same speeds raise ten alerts a minute.
     let mut bench = Bench::new(0.0, 0.0);
-    for beat in 0..300_u64 {
-        let seen = Seen::of(ListKind::TurnFails, beat % 3 != 0, Figures::None);
-        bench.with(|list, to| list.observe(MonoNs(beat * 200_000_000), &seen, to));
+    for update in 0..300_u64 {
+        let seen = Seen::of(ListKind::TurnFails, update % 3 != 0, Figures::None);
+        bench.with(|list, to| list.observe(MonoNs(update * 200_000_000), &seen, to));
     }
     assert_eq!(bench.list.raised(), 100);
 }
@@ -306,31 +306,31 @@ fn silence_of_all_sensors_raises_only_one_alert() {
 fn alert_with_increased_priority_needs_a_new_acknowledgement() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
-    let mut beat = |bench: &mut Bench, at_s: u64, pct: f64| {
+    let mut update = |bench: &mut Bench, at_s: u64, pct: f64| {
         let at = MonoNs(at_s * 1_000_000_000);
         (state.at, state.now) = (Some(at), at);
         bench.list.set_battery(pct);
         bench.with(|list, to| {
-            list.beat(&Beat { at, state: &state, setting: None, unverified_mounts: false }, to);
+            list.update(&AdviceUpdate { at, state: &state, setting: None, unverified_mounts: false }, to);
         });
     };
     let battery = |bench: &Bench| {
         let found = bench.list.iter().find(|alert| alert.kind == ListKind::BatteryLeft);
         found.map(|alert| (alert.priority, alert.needs_acknowledgement()))
     };
-    beat(&mut bench, 1, 21.0);
+    update(&mut bench, 1, 21.0);
     assert_eq!(battery(&bench), None);
-    beat(&mut bench, 2, 20.0);
+    update(&mut bench, 2, 20.0);
     assert_eq!(battery(&bench), Some((Priority::Warning, true)));
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(3), to));
-    beat(&mut bench, 4, 10.0);
+    update(&mut bench, 4, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, true)));
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(5), to));
     // The charge rises a little above the alarm's limit and falls back to it.
-    beat(&mut bench, 6, 11.0);
-    beat(&mut bench, 7, 10.0);
+    update(&mut bench, 6, 11.0);
+    update(&mut bench, 7, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, false)));
-    beat(&mut bench, 8, 4.0);
+    update(&mut bench, 8, 4.0);
     assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
 }
 
@@ -340,19 +340,21 @@ fn alert_with_increased_priority_needs_a_new_acknowledgement() {
 fn unverified_mounts_raise_a_caution_after_the_grace_period_until_they_are_verified() {
     let mut bench = Bench::new(0.0, 0.0);
     let mut state = crate::live_state::test_state();
-    let mut beat = |at_s: u64, unverified_mounts: bool| {
+    let mut update = |at_s: u64, unverified_mounts: bool| {
         let at = MonoNs(at_s * 1_000_000_000);
         (state.at, state.now) = (Some(at), at);
-        bench.with(|list, to| list.beat(&Beat { at, state: &state, setting: None, unverified_mounts }, to));
+        bench.with(|list, to| {
+            list.update(&AdviceUpdate { at, state: &state, setting: None, unverified_mounts }, to)
+        });
         let found = bench.list.iter().find(|alert| alert.kind == ListKind::MountsUnverified);
         found.map(|alert| (alert.priority, alert.state == AlertState::Active))
     };
-    assert_eq!((beat(1, true), beat(30, true)), (None, None));
+    assert_eq!((update(1, true), update(30, true)), (None, None));
     assert_eq!(
-        (beat(31, true), beat(90, true)),
+        (update(31, true), update(90, true)),
         (Some((Priority::Caution, true)), Some((Priority::Caution, true)))
     );
-    assert_eq!(beat(91, false), Some((Priority::Caution, false)));
+    assert_eq!(update(91, false), Some((Priority::Caution, false)));
 }
 
 /// Later occurrences only update the figures of the active alert. They publish no notice.
@@ -360,19 +362,19 @@ fn unverified_mounts_raise_a_caution_after_the_grace_period_until_they_are_verif
 fn later_occurrences_update_the_alert_figures_and_publish_no_notice() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
-    let mut beat = |bench: &mut Bench, at: MonoNs, occurrences: Occurrences| {
+    let mut update = |bench: &mut Bench, at: MonoNs, occurrences: Occurrences| {
         let kind = ObservedKind::ProfileContradicted;
         state.observations[0] = Some(ActiveObservation { kind, source: None, occurrences });
         (state.at, state.now) = (Some(at), at);
         bench.with(|list, to| {
-            list.beat(&Beat { at, state: &state, setting: None, unverified_mounts: false }, to);
+            list.update(&AdviceUpdate { at, state: &state, setting: None, unverified_mounts: false }, to);
         });
     };
     let first = Occurrences { count: 1, first_m: 7.0, worst_m: 0.4 };
-    beat(&mut bench, MonoNs(1_000_000_000), first);
+    update(&mut bench, MonoNs(1_000_000_000), first);
     let (notices, digest) = (bench.notices.len(), bench.stream.value());
     let second = Occurrences { count: 2, worst_m: 0.5, ..first };
-    beat(&mut bench, MonoNs(1_200_000_000), second);
+    update(&mut bench, MonoNs(1_200_000_000), second);
     let alert = bench.list.iter().find(|alert| alert.kind == ListKind::ProfileContradicted).unwrap();
     assert_eq!(alert.figures, Figures::Deviation(second));
     assert_eq!((bench.notices.len(), bench.stream.value()), (notices, digest));

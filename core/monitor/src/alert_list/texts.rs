@@ -89,7 +89,7 @@ impl ListedAlert {
                 )
             }
             (_, Figures::Advice(figures)) => advice_text(figures, around.profile, around.heads),
-            (_, Figures::MissingRequirement(lacking)) => no_position_text(*lacking),
+            (_, Figures::MissingRequirement(no_fix)) => no_position_text(*no_fix),
             (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
             (kind, Figures::Deviation(Occurrences { first_m, worst_m, .. })) => match kind.observed() {
                 Some(kind) => {

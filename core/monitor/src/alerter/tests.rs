@@ -22,11 +22,11 @@ const SETTINGS: PlanSettings =
 /// Live state after an advice update with this position error between passes.
 ///
 /// The target is half a metre, and the confidence is two standard deviations.
-fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
+fn after(pass_error_m: f64, is_cable_doubted: bool, no_fix: Option<NoFix>) -> LiveState {
     let pose = Pose { position: Point3::new(12.5, 0.0, 3.0), attitude: Rot::identity() };
     let relative = Relative::along(pass_error_m);
     let fix = Fix { pose, speed_mps: 0.07, relative, revisit: relative, tie: 0, settled: 0 };
-    let fix = lacking.map_or(Ok(fix), Err);
+    let fix = no_fix.map_or(Ok(fix), Err);
     let cable = is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, differs_m: 0.5, log: None });
     let doubts = Doubts { cable, setting: None, unverified_mounts: false, stand_s: 3, hung: 0 };
     let pose = fix.ok().map(|fix| fix.pose);
@@ -57,7 +57,7 @@ fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> L
 fn position_is_doubtful_if_the_pass_error_is_large_or_the_cable_counter_is_distrusted() {
     let spread = PositionState::Doubtful(PositionDoubt::Spread);
     let cable = PositionState::Doubtful(PositionDoubt::Cable);
-    for (pass_error_m, is_cable_doubted, lacking, expected) in [
+    for (pass_error_m, is_cable_doubted, no_fix, expected) in [
         (0.0, false, None, PositionState::Ok),
         (0.049, false, None, PositionState::Ok),
         (0.051, false, None, spread),
@@ -66,9 +66,9 @@ fn position_is_doubtful_if_the_pass_error_is_large_or_the_cable_counter_is_distr
         (0.051, true, None, cable),
         (0.0, false, Some(NoFix::Chainage), PositionState::None(NoFix::Chainage)),
     ] {
-        let state = after(pass_error_m, is_cable_doubted, lacking);
+        let state = after(pass_error_m, is_cable_doubted, no_fix);
         assert_eq!(state.position, expected, "{pass_error_m}");
-        let has_fix = lacking.is_none();
+        let has_fix = no_fix.is_none();
         assert_eq!((state.chainage_m, state.speed_mps), (has_fix.then_some(12.5), has_fix.then_some(0.07)));
         assert_eq!((state.at, state.now, state.stand_s), (Some(AT), MonoNs(9_050_000_000), 3));
     }
@@ -77,13 +77,13 @@ fn position_is_doubtful_if_the_pass_error_is_large_or_the_cable_counter_is_distr
 const NOW: MonoNs = MonoNs(9_000_000_000);
 
 /// Missed stretch that consists of a single section without samples. It is flagged at the event with
-/// the index `event` or, if `at_beat` is true, at the advice update before that event.
-fn run(event: usize, at_beat: bool) -> RunInput {
+/// the index `event` or, if `at_update` is true, at the advice update before that event.
+fn run(event: usize, at_update: bool) -> RunInput {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
     let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 100 };
     let mut sections = Sections::new(0.25, Target::new(0.5), 0.0, 20.0);
-    let mut told: Option<(RunId, RunChange)> = None;
+    let mut changed: Option<(RunId, RunChange)> = None;
     let request = Request {
         section: 4,
         at: NOW,
@@ -96,13 +96,13 @@ fn run(event: usize, at_beat: bool) -> RunInput {
     };
     let mut judging = Judging {
         store: &SampleStore::new(layout),
-        lacks: &MissingSamples::default(),
+        missing_samples: &MissingSamples::default(),
         finder: &mut HoleFinder::default(),
         profile: &profile,
-        tell: &mut |id, change| told = Some((id, change)),
+        tell: &mut |id, change| changed = Some((id, change)),
     };
     sections.judge(&request, &mut judging);
-    RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
+    RunInput::of((event, at_update), NOW, changed.unwrap(), &sections).unwrap()
 }
 
 /// Alerter with its inputs in one tick: a changed missed stretch, a command that acknowledges all
@@ -138,15 +138,15 @@ impl Bench {
         }
     }
 
-    /// Applies the inputs up to the advice update before event number `beat`, or all inputs of the tick if `None`.
+    /// Applies the inputs up to the advice update before event number `update`, or all inputs of the tick if `None`.
     ///
     /// Returns the number of alerts raised, the number of acknowledged alerts, the number of commands without effect,
     /// and the last reading's time.
-    fn until(&mut self, beat: Option<usize>) -> (u32, usize, u64, Option<u64>) {
+    fn until(&mut self, update: Option<usize>) -> (u32, usize, u64, Option<u64>) {
         let Self { alerter, run, command, events } = self;
         let (runs, commands) = (core::slice::from_ref(run), core::slice::from_ref(command));
         let mut inputs = Inputs { runs, commands, events, unread: &[], taken: Taken::default() };
-        match beat {
+        match update {
             Some(event) => alerter.take_before(event, &mut inputs),
             None => alerter.take_rest(&mut inputs),
         }
@@ -166,8 +166,9 @@ fn command_is_applied_before_the_results_of_the_next_event() {
 
 #[test]
 fn alerter_update_applies_only_inputs_before_the_update() {
-    let at =
-        |run: RunInput, command_before: usize, beat: usize| Bench::new(run, command_before).until(Some(beat));
+    let at = |run: RunInput, command_before: usize, update: usize| {
+        Bench::new(run, command_before).until(Some(update))
+    };
     assert_eq!(at(run(4, false), 9, 5), (1, 0, 0, Some(4)));
     assert_eq!(at(run(5, false), 9, 5), (0, 0, 0, Some(4)), "that event comes after the update");
     assert_eq!(at(run(5, true), 9, 5), (1, 0, 0, Some(4)), "at the update itself");

@@ -113,8 +113,8 @@ impl LiveState {
         if self.is_old() {
             return Condition::Old(age);
         }
-        if let PositionState::None(lacking) = self.position {
-            return Condition::NoPosition(lacking);
+        if let PositionState::None(no_fix) = self.position {
+            return Condition::NoPosition(no_fix);
         }
         if let Some(end_m) = self.outside_m().filter(|_| self.position == PositionState::Ok) {
             return Condition::Outside(end_m);

@@ -304,7 +304,7 @@ impl LiveState {
             why: match self.position {
                 PositionState::Ok => None,
                 PositionState::Doubtful(doubt) => Some(doubt.as_str()),
-                PositionState::None(lacking) => Some(lacking.as_str()),
+                PositionState::None(no_fix) => Some(no_fix.as_str()),
             },
             chainage_m: self.chainage_m,
             station: self.chainage_m.map(station),

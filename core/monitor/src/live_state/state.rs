@@ -70,7 +70,7 @@ impl PositionState {
         match self {
             Self::Ok => 0,
             Self::Doubtful(doubt) => 1 + doubt as u64,
-            Self::None(lacking) => 3 + lacking as u64,
+            Self::None(no_fix) => 3 + no_fix as u64,
         }
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::alert_list::{AlertList, Beat, Figures, Occurrences, Telling};
+use crate::alert_list::{AdviceUpdate, AlertList, AlertOutputs, Figures, Occurrences};
 use crate::fixtures::armed;
 use crate::head_descriptions::tests::two;
 use crate::live_state::{ActiveObservation, PositionState, test_state};
@@ -115,12 +115,12 @@ fn unsure_stretch_is_shown_with_reason_and_remedy() {
     let profile = shapes::circle(3.0).unwrap();
     let mut text = String::new();
     for why in Unsure::ALL {
-        let told = if why == Unsure::NotInspected {
+        let message = if why == Unsure::NotInspected {
             LiveMessage::NotInspected(stretch(why))
         } else {
             LiveMessage::CannotSay(stretch(why))
         };
-        let lines = message_line(&told, &profile, &two()).broken(60);
+        let lines = message_line(&message, &profile, &two()).broken(60);
         assert!(lines.iter().all(|line| line.chars().count() <= 60), "{lines:#?}");
         text.push_str(&lines.join("\n"));
         text.push('\n');
@@ -134,8 +134,11 @@ fn raised(kind: ObservedKind) -> ListedAlertJson {
     let occurrences = Occurrences { count: 3, first_m: 12.5, worst_m: 0.4 };
     state.observations[0] = Some(ActiveObservation { kind, source: None, occurrences });
     let mut list = AlertList::new(AlertTiming::default(), LimitsConfig::default(), 0);
-    let mut to = Telling { notices: &mut Vec::new(), stream: &mut ResultStream::default() };
-    list.beat(&Beat { at: MonoNs(1), state: &state, setting: None, unverified_mounts: false }, &mut to);
+    let mut to = AlertOutputs { notices: &mut Vec::new(), stream: &mut ResultStream::default() };
+    list.update(
+        &AdviceUpdate { at: MonoNs(1), state: &state, setting: None, unverified_mounts: false },
+        &mut to,
+    );
     let alert = list.iter().find(|alert| matches!(alert.figures, Figures::Deviation(_))).unwrap();
     alert.json(&armed().view().surroundings(), MonoNs(1))
 }
@@ -146,9 +149,9 @@ fn observation_has_a_line_when_its_alert_is_raised() {
     let found = (alert.occurrences, alert.first_m, alert.worst_m, alert.setting.as_ref());
     assert_eq!(found, (Some(3), Some(12.5), Some(0.4), None));
     let number = alert.number;
-    let told = |change: AlertChange| LiveMessage::AlertChange { change, alert: Box::new(alert.clone()) };
-    assert!(told(AlertChange::Raised).adds_line() && !told(AlertChange::Rectified).adds_line());
-    let line = message_line(&told(AlertChange::Raised), &shapes::circle(3.0).unwrap(), &two());
+    let message = |change: AlertChange| LiveMessage::AlertChange { change, alert: Box::new(alert.clone()) };
+    assert!(message(AlertChange::Raised).adds_line() && !message(AlertChange::Rectified).adds_line());
+    let line = message_line(&message(AlertChange::Raised), &shapes::circle(3.0).unwrap(), &two());
     let text = "raised: 0+012.50: samples 0.40 m outside the tunnel: check the tether's zero";
     assert_eq!((line.place, line.what), (format!("ALERT {number}"), vec![text.to_owned()]));
 }

@@ -45,7 +45,7 @@ pub(super) fn georeference(
     placed.0.clear();
     for item in &positioned.0 {
         match *item {
-            Positioned::Beat { at, fix, doubts, sd, before } => {
+            Positioned::AdviceUpdate { at, fix, doubts, sd, before } => {
                 let situation = situation(at, fix, &tunnel, &plan, &heads);
                 let placement = Placement::Update(Update { at, situation, doubts, fix, sd });
                 placed.0.push(PlacedItem { event: before, placement });
@@ -139,7 +139,7 @@ fn outcome(
 ) -> Outcome {
     let fix = match fix {
         Ok(fix) => fix,
-        Err(lacking) if sonar.range_m.is_some() => return Outcome::Unplaced(lacking),
+        Err(no_fix) if sonar.range_m.is_some() => return Outcome::Unplaced(no_fix),
         Err(_) => return Outcome::Lost(Loss::Missing, None),
     };
     let origin = fix.pose.place(mount.position);
@@ -199,7 +199,7 @@ fn situation(
             let angle_rad = angle_rad + rate_radps * at.since(last).as_secs_f64();
             let (mount, sector_rad) = (mounted.info.mount, track.sector_rad());
             let others = heads.iter().filter(|(other, ..)| other.0 != head.0);
-            if lost.hearing().is_deaf(others.map(|(.., lost, _)| lost.hearing().elsewhere())) {
+            if lost.health().is_deaf(others.map(|(.., lost, _)| lost.health().elsewhere())) {
                 deaf = deaf.with(head.0);
             } else {
                 *slot = Some(HeadMotion { mount, angle_rad, rate_radps, step_rad, sector_rad });

@@ -20,7 +20,7 @@ pub(super) enum Positioned {
     /// A sonar ping. The fix is for the ping's time of validity.
     Ping { event: usize, sensor: Entity, fix: Result<Fix, NoFix> },
     /// An advice update at a multiple of the advice period. `before` is the index of the first event after the update.
-    Beat { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
+    AdviceUpdate { at: MonoNs, fix: Result<Fix, NoFix>, doubts: Doubts, sd: Option<PoseSd>, before: usize },
 }
 
 /// Sonar pings and advice updates of this tick with their fixes, in order.
@@ -55,7 +55,7 @@ pub(super) fn navigate(
     for (index, event) in events.0.iter().enumerate() {
         // Time may stall or go back, but each advice update is emitted only once. After a gap, only the latest update
         // is emitted.
-        if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
+        if let Some(at) = update_before(&mut navigator.next_update, event.received) {
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
             let (cable, setting) = (navigation.cable_doubt(), navigation.setting_doubt());
@@ -65,7 +65,7 @@ pub(super) fn navigate(
             let sd = navigation.pose_sd();
             *state = VehicleState { at: Some(at), fix, sd, cable_doubt: doubts.cable };
             digest(&mut poses.0, at, &state);
-            list.0.push(Positioned::Beat { at, fix, doubts, sd, before: index });
+            list.0.push(Positioned::AdviceUpdate { at, fix, doubts, sd, before: index });
         }
         let sensor = entities.of_source(event.source);
         if let (Reading::Sonar(_), Some(sensor)) = (&event.reading, sensor) {
@@ -98,7 +98,7 @@ impl Navigator {
 }
 
 /// Time of the latest advice update at or before `now`; `None` if this update was already emitted.
-fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
+fn update_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     let period = ADVICE_PERIOD.0.unsigned_abs();
     let last = MonoNs(now.0 - now.0 % period);
     match *next {
@@ -117,8 +117,8 @@ fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
 fn digest(poses: &mut ResultStream, at: MonoNs, state: &VehicleState) {
     let fix = match &state.fix {
         Ok(fix) => fix,
-        Err(lacking) => {
-            poses.record(RecordKind::NoPose).integer(at.0).integer(*lacking as u64);
+        Err(no_fix) => {
+            poses.record(RecordKind::NoPose).integer(at.0).integer(*no_fix as u64);
             return;
         }
     };
@@ -157,7 +157,7 @@ mod tests {
             (5.19, None),
             (5.2, Some(5.2)),
         ] {
-            assert_eq!(beat_before(&mut next, at(now_s)), beat_s.map(at), "at {now_s} s");
+            assert_eq!(update_before(&mut next, at(now_s)), beat_s.map(at), "at {now_s} s");
         }
     }
 }

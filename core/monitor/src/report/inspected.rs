@@ -57,8 +57,8 @@ pub(super) fn not_inspected(dive: &Loop) -> Option<NotInspectedReport> {
         share if share > MOST => "mostly_no_position",
         _ => return None,
     };
-    let most = NoFix::ALL.into_iter().zip(tally.lacking).filter(|(_, count)| *count > 0);
-    let most = most.max_by_key(|(_, count)| *count).map(|(lacking, _)| lacking.as_str());
+    let most = NoFix::ALL.into_iter().zip(tally.no_fix).filter(|(_, count)| *count > 0);
+    let most = most.max_by_key(|(_, count)| *count).map(|(no_fix, _)| no_fix.as_str());
     let silent = dive.sources().iter().zip(dive.view().health()).filter(|(_, health)| health.readings == 0);
     Some(NotInspectedReport {
         reason,

@@ -12,9 +12,9 @@ pub(super) fn count(tally: &mut Tally, ping: &PlacedPing) {
         Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
         Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
         Outcome::Lost(Loss::Occluded, _) => tally.occluded += 1,
-        Outcome::Unplaced(lacking) => {
+        Outcome::Unplaced(why) => {
             tally.unplaced += 1;
-            if let Some(count) = tally.lacking.get_mut(lacking as usize) {
+            if let Some(count) = tally.no_fix.get_mut(why as usize) {
                 *count += 1;
             }
         }
@@ -54,7 +54,7 @@ mod tests {
             out_of_range: 1,
             occluded: 3,
             unplaced: 3,
-            lacking: [0, 1, 2],
+            no_fix: [0, 1, 2],
             without_fix: 4,
             ..Tally::default()
         };

@@ -13,7 +13,7 @@ use headrace_sampling::passes::Situation;
 /// Extends the coverage extent at an advice update with a fix.
 ///
 /// If no head works, requests judging of the sections that the vehicle has left.
-pub(super) fn note_beat(
+pub(super) fn note_update(
     coverage: &mut Coverage,
     heads: &mut Heads<'_, '_>,
     tunnel: &TunnelDesign,
@@ -42,7 +42,7 @@ pub(super) fn note_beat(
     }
     let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
     let Coverage { sections, frontier, .. } = coverage;
-    let moved = frontier.beat(span, reaches.clone(), at, sections.section_m(), sections.left_m());
+    let moved = frontier.update(span, reaches.clone(), at, sections.section_m(), sections.left_m());
     if sections.may_be_due(&moved) {
         let outlook = frontier.outlook(reaches, at);
         sections.due(&moved, &outlook, &mut |request| requests.0.push(request));
@@ -106,12 +106,12 @@ mod tests {
         }
 
         /// Assumed chainages of the heads, m, after an advice update with the vehicle at chainage `x_m`.
-        fn beat(&mut self, seconds: u64, x_m: Option<f64>) -> [Option<f64>; 2] {
+        fn update(&mut self, seconds: u64, x_m: Option<f64>) -> [Option<f64>; 2] {
             let tunnel = tunnel();
             let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
             let mut heads = state.get_mut(&mut self.world).unwrap();
-            let beat = (at(seconds), &situation(x_m));
-            note_beat(&mut self.coverage, &mut heads, &tunnel, beat, &mut self.requests);
+            let update = (at(seconds), &situation(x_m));
+            note_update(&mut self.coverage, &mut heads, &tunnel, update, &mut self.requests);
             let mut places = heads.iter().map(|(.., reach)| reach.0.map(|reach| reach.latest().middle_m()));
             [places.next().flatten(), places.next().flatten()]
         }
@@ -128,17 +128,17 @@ mod tests {
     fn silent_head_is_assumed_to_move_with_the_vehicle() {
         // The second head is silent from 1 s on. The first one keeps pinging.
         let mut bench = Bench::new([Some(9), Some(1)]);
-        assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");
+        assert_eq!(bench.update(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");
         // Sections 14 to 18 contain the wall from 3.5 m to 4.5 m, which the silent head has passed.
         assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=18).collect()));
-        assert_eq!(bench.beat(11, Some(5.6)), [Some(4.5), Some(5.1)]);
+        assert_eq!(bench.update(11, Some(5.6)), [Some(4.5), Some(5.1)]);
         assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=20).collect()));
         let way = bench.coverage.frontier.way().unwrap();
         assert!((way.from_m - 4.5).abs() < 1e-9 && (way.to_m - 6.1).abs() < 1e-9, "{way:?}");
         // All heads have passed the stretch from the front head's first place to the rear head's last place.
         let through = bench.coverage.frontier.through();
         assert_eq!(through, None, "empty: 5.1 m isn't beyond 5.5 m");
-        bench.beat(12, Some(7.0));
+        bench.update(12, Some(7.0));
         let through = bench.coverage.frontier.through().unwrap();
         assert!((through.from_m - 5.5).abs() < 1e-9 && (through.to_m - 6.5).abs() < 1e-9, "{through:?}");
     }
@@ -146,10 +146,10 @@ mod tests {
     #[test]
     fn sections_left_by_silent_heads_are_judged_at_the_next_advice_update() {
         let mut bench = Bench::new([Some(1), Some(1)]);
-        bench.beat(10, Some(5.0));
+        bench.update(10, Some(5.0));
         bench.requests.0.clear();
         for seconds in 11..=20 {
-            bench.beat(seconds, Some(5.0 + 0.3 * (seconds - 10) as f64));
+            bench.update(seconds, Some(5.0 + 0.3 * (seconds - 10) as f64));
         }
         // The extent begins at 4.5 m, with the rear head. The judged sections end a quarter of a metre before the
         // rear head's place at 7.5 m.
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn coverage_extent_is_unknown_until_there_is_a_fix() {
         let mut bench = Bench::new([Some(1), None]);
-        assert_eq!(bench.beat(10, None), [Some(4.5), None]);
+        assert_eq!(bench.update(10, None), [Some(4.5), None]);
         assert!(bench.coverage.frontier.way().is_none() && bench.silent(0).is_empty());
         assert_eq!(HeadSet::default(), bench.coverage.sections.get(18).unwrap().passage.silent);
     }

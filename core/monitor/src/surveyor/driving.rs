@@ -58,10 +58,10 @@ pub(crate) struct Driving {
     /// margin, m.
     fitted: [f64; 3],
     looks: Looks,
-    pub(super) lacking: MissingSampleFinder,
+    pub(super) missing_finder: MissingSampleFinder,
 }
 
-stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, lacking; });
+stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, missing_finder; });
 
 impl Driving {
     /// Updates the driving figures from the present situation, and from the same situation with no head
@@ -168,18 +168,18 @@ impl Driving {
         let scheduled = phasing.as_scheduled(situation.configured, planned_mps);
         let planned_gap_s = gap_s(&scheduled.at(speed_mps)).min(healthy_gap_s);
         let plan_mps = if planned_mps > 0.0 { planned_mps } else { speed_mps };
-        let stalled = self.lacking.stalled;
+        let stalled = self.missing_finder.stalled;
         let in_step = passes.heads().iter().filter(|head| !stalled.has(*head));
         let in_step = in_step.fold(HeadSet::default(), HeadSet::with);
         let scheduled_at_plan = scheduled.at(plan_mps);
         let left_at_plan_s = scheduled_at_plan.gap_s(in_step);
         let gap_at_plan_s = gap_s(&as_it_is.at(plan_mps));
         let healthy_at_plan_s = gap_s(&phasing.at(plan_mps));
-        let all_turn = turning == situation.configured && self.lacking.all_turn(at);
+        let all_turn = turning == situation.configured && self.missing_finder.all_turn(at);
         // At a speed other than the planned one, the evenness of passes doesn't show whether the heads are in
         // phase. Therefore the times between passes at the planned speed are compared.
         if all_turn && gap_at_plan_s <= IN_STEP * gap_s(&scheduled_at_plan).min(healthy_at_plan_s) {
-            self.lacking.stalled = HeadSet::default();
+            self.missing_finder.stalled = HeadSet::default();
         }
         let periods = healthy.heads.iter().flatten().map(HeadMotion::ping_period_s);
         self.now = Drive {
@@ -292,15 +292,15 @@ mod tests {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "no head has stalled");
-        driving.lacking.stalled = HeadSet::default().with(1);
+        driving.missing_finder.stalled = HeadSet::default().with(1);
         // The restored head is a sixteenth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
         assert!(near(late.even_gap_s, 2.0), "as if the heads were evenly spread");
-        assert!(driving.lacking.stalled.has(1));
+        assert!(driving.missing_finder.stalled.has(1));
         let again = noted(&mut driving, EVEN, 0.2, 0.2);
         assert!(near(again.left_at_plan_s, 4.0) && near(again.gap_s, 2.0));
-        assert!(driving.lacking.stalled.is_empty(), "the head is in phase again");
+        assert!(driving.missing_finder.stalled.is_empty(), "the head is in phase again");
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0));
     }
 

@@ -35,14 +35,14 @@ fn judge_one(
     finder: &mut Finder,
     outputs: &mut OutputRefs<'_>,
 ) {
-    let Coverage { store, sections, unsure, lacks, .. } = coverage;
+    let Coverage { store, sections, unsure, missing_samples, .. } = coverage;
     let OutputRefs { notices, runs, digests, observations } = outputs;
     let begun = notices.len();
     let mut tell = |id: RunId, change: RunChange| {
         notices.push(Notice::Run { id, at: request.at, change });
         digests.judgements.record(RecordKind::Run).integer(u64::from(id.0)).integer(change as u64);
     };
-    let mut judging = Judging { store, lacks, finder: &mut finder.0, profile, tell: &mut tell };
+    let mut judging = Judging { store, missing_samples, finder: &mut finder.0, profile, tell: &mut tell };
     let change = sections.judge(request, &mut judging);
     note_runs(notices.get(begun..).unwrap_or_default(), stop, sections, runs);
     let Some(change) = change else { return };
@@ -138,7 +138,7 @@ mod tests {
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
         let section = Notice::Section { section: 40, at: AT, change: Judgement::Raised };
         assert_eq!((notices, coverage.unsure), (vec![run, section], None));
-        let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
+        let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_update, run.at));
         assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
         // A section gets no verdict if some heads have not been in it. Neighbouring sections without a
         // verdict form one stretch, and a distant section forms another.
@@ -171,7 +171,7 @@ mod tests {
             let mut runs = Vec::with_capacity(room);
             note_runs(&notices, (5, false), &coverage.sections, &mut runs);
             assert_eq!(runs.iter().map(|run| run.id.0).collect::<Vec<_>>(), expected);
-            assert!(runs.iter().all(|run| (run.event, run.at_beat, run.at) == (5, false, AT)));
+            assert!(runs.iter().all(|run| (run.event, run.at_update, run.at) == (5, false, AT)));
         }
     }
 }

@@ -157,11 +157,15 @@ impl MissingSampleFinder {
 }
 
 /// Records a ping. If the ping was aimed at the wall and gave no return, it is a missing sample.
-pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, lacks: &mut MissingSamples) {
+pub(super) fn note_ping(
+    missing_finder: &mut MissingSampleFinder,
+    ping: &PlacedPing,
+    missing_samples: &mut MissingSamples,
+) {
     if ping.standing {
-        lacking.stalled = lacking.stalled.with(ping.head);
+        missing_finder.stalled = missing_finder.stalled.with(ping.head);
     }
-    let MissingSampleFinder { heads, away, forgot, deaf, .. } = lacking;
+    let MissingSampleFinder { heads, away, forgot, deaf, .. } = missing_finder;
     let Some(head) = heads.get_mut(ping.head) else { return };
     head.pinged = Some(ping.valid_at);
     head.longest_m = ping.longest_m;
@@ -184,7 +188,13 @@ pub(super) fn note_ping(lacking: &mut MissingSampleFinder, ping: &PlacedPing, la
             // The vehicle would occlude this wall even with a longer range setting, so occlusion is a further cause.
             let stays = loss == Loss::OutOfRange && ping.hidden == Hidden::Yes && head.is_hidden();
             let why = if stays { Causes::of(cause).with(Cause::Occluded) } else { Causes::of(cause) };
-            lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why, may_be_wall: false });
+            missing_samples.add(MissingSample {
+                x_m,
+                arc_m,
+                head: number_of(ping.head),
+                why,
+                may_be_wall: false,
+            });
         }
         Outcome::Lost(_, None) | Outcome::Unplaced(_) if ping.fix.is_none() => {
             let is_lost = !matches!(ping.outcome, Outcome::Unplaced(_));
@@ -203,13 +213,17 @@ pub(super) fn number_of(head: usize) -> u8 {
 }
 
 /// Records the heads that ping without detecting the wall. Their losses in the last turn are not random.
-fn note_deaf(lacking: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Coverage) {
-    let before = core::mem::replace(&mut lacking.deaf, deaf);
+fn note_deaf(missing_finder: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Coverage) {
+    let before = core::mem::replace(&mut missing_finder.deaf, deaf);
     for head in deaf.iter().filter(|head| !before.has(*head)) {
-        let Some((.., step_rad)) = lacking.heads.get(head).and_then(|turning| turning.seen) else { continue };
+        let Some((.., step_rad)) = missing_finder.heads.get(head).and_then(|turning| turning.seen) else {
+            continue;
+        };
         let turn = usize::try_from(math::floor_to_i64(TAU / step_rad)).unwrap_or(0);
         let causes = [Cause::MissingReturns, Cause::HeadSilent];
-        let Some([from_m, to_m]) = coverage.lacks.revise(number_of(head), turn, causes) else { continue };
+        let Some([from_m, to_m]) = coverage.missing_samples.revise(number_of(head), turn, causes) else {
+            continue;
+        };
         let sections = &mut coverage.sections;
         for index in sections.index_of(from_m)..=sections.index_of(to_m) {
             if let Some(section) = sections.get_mut(index) {
@@ -223,20 +237,20 @@ fn note_deaf(lacking: &mut MissingSampleFinder, deaf: HeadSet, coverage: &mut Co
 /// without a fix.
 ///
 /// Allocates: never.
-pub(super) fn note_beat(
-    lacking: &mut MissingSampleFinder,
+pub(super) fn note_update(
+    missing_finder: &mut MissingSampleFinder,
     now: Drive,
     heads: &Heads<'_, '_>,
     (at, situation): (MonoNs, &Situation),
     profile: &Profile,
     coverage: &mut Coverage,
 ) {
-    let stalled = lacking.stalled;
-    note_deaf(lacking, situation.deaf, coverage);
+    let stalled = missing_finder.stalled;
+    note_deaf(missing_finder, situation.deaf, coverage);
     if let Some(pose) = situation.pose {
-        note_away(lacking, now, heads, (at, pose), profile, coverage);
+        note_away(missing_finder, now, heads, (at, pose), profile, coverage);
     }
-    let MissingSampleFinder { heads: turning, pose: before, away, forgot, .. } = lacking;
+    let MissingSampleFinder { heads: turning, pose: before, away, forgot, .. } = missing_finder;
     let speed_mps = situation.speed_mps;
     for (number, mounted, hidden, ..) in heads {
         let Some(head) = turning.get_mut(number.0) else { continue };
@@ -274,7 +288,7 @@ pub(super) fn note_beat(
                 let pose = Pose { position: pose.position + Vec3::new(-back_m, 0.0, 0.0), ..pose };
                 let hides = |angle_rad| hidden.hides(angle_rad);
                 let placing = Placing { mount: &mounted.info.mount, turning: head, profile, hidden: &hides };
-                placing.lack(&pose, &ping, now, coverage);
+                placing.add_missing(&pose, &ping, now, coverage);
             } else if !keep(away, Away { why: ping.why.with(Cause::PositionLost), ..ping }) {
                 // There is no room for the remaining pings of this head, so they are skipped.
                 *forgot = true;
@@ -293,14 +307,14 @@ pub(super) fn note_beat(
 ///
 /// Allocates: never.
 pub(super) fn note_away(
-    lacking: &mut MissingSampleFinder,
+    missing_finder: &mut MissingSampleFinder,
     now: Drive,
     heads: &Heads<'_, '_>,
     (at, pose): (MonoNs, Pose),
     profile: &Profile,
     coverage: &mut Coverage,
 ) {
-    let MissingSampleFinder { heads: turning, pose: before, away, forgot, .. } = lacking;
+    let MissingSampleFinder { heads: turning, pose: before, away, forgot, .. } = missing_finder;
     let Some((then, from)) = *before else { return };
     let way = Way { from: (then, from), to: (at, pose) };
     let speed_mps = way.speed_mps();
@@ -320,7 +334,7 @@ pub(super) fn note_away(
         let (Some(mount), Some(turning)) = (mount, turning.get(head)) else { continue };
         let hidden = |angle_rad| hides(heads, head, angle_rad);
         let placing = Placing { mount: &mount, turning, profile, hidden: &hidden };
-        placing.lack(&way.at(ping.at), &ping, Drive { speed_mps, ..now }, coverage);
+        placing.add_missing(&way.at(ping.at), &ping, Drive { speed_mps, ..now }, coverage);
     }
 }
 
@@ -386,7 +400,7 @@ struct Placing<'a> {
 impl Placing<'_> {
     /// Records a missing sample at the wall point at which a ping was aimed, and the driving figures in the
     /// section of that point.
-    fn lack(&self, pose: &Pose, ping: &Away, drive: Drive, coverage: &mut Coverage) {
+    fn add_missing(&self, pose: &Pose, ping: &Away, drive: Drive, coverage: &mut Coverage) {
         let origin = pose.place(self.mount.position);
         let beam = pose.attitude * (self.mount.rotation * head_direction(ping.angle_rad));
         let wall = self.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
@@ -413,7 +427,7 @@ impl Placing<'_> {
                 why = why.with(Cause::MissingReturns);
             }
         }
-        coverage.lacks.add(MissingSample {
+        coverage.missing_samples.add(MissingSample {
             x_m,
             arc_m: wall.arc_m,
             head: ping.head,

@@ -120,7 +120,7 @@ mod tests {
         let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
         let mut judging = Judging {
             store: &store,
-            lacks: &MissingSamples::default(),
+            missing_samples: &MissingSamples::default(),
             finder: &mut HoleFinder::default(),
             profile: &profile,
             tell: &mut |_, _| {},

@@ -63,11 +63,18 @@ fn note_update(
         due::suspect(coverage, between_m, (heads, *at), requests);
     }
     let profile = &site.tunnel.profile;
-    let healthy = driving.lacking.healthy(*at, situation, heads);
+    let healthy = driving.missing_finder.healthy(*at, situation, heads);
     driving.note(*at, [situation, &healthy], profile, plan);
     let now = driving.now;
-    missing_samples::note_beat(&mut driving.lacking, now, heads, (*at, situation), profile, coverage);
-    coverage_extent::note_beat(coverage, heads, &site.tunnel, (*at, situation), requests);
+    missing_samples::note_update(
+        &mut driving.missing_finder,
+        now,
+        heads,
+        (*at, situation),
+        profile,
+        coverage,
+    );
+    coverage_extent::note_update(coverage, heads, &site.tunnel, (*at, situation), requests);
     due::look_around(coverage, heads, *at, requests);
 }
 
@@ -84,12 +91,12 @@ fn note_ping(
     coverage.frontier.hear(ping.received);
     if let Some(fix) = &ping.fix {
         let (now, here) = (driving.now, (ping.valid_at, fix.pose));
-        missing_samples::note_away(&mut driving.lacking, now, heads, here, &tunnel.profile, coverage);
+        missing_samples::note_away(&mut driving.missing_finder, now, heads, here, &tunnel.profile, coverage);
     }
     let head = site.entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
     debug_assert!(head.is_some(), "head {} of a placed ping is unknown to the surveyor", ping.head);
     let Some((.., mut sweep, mut frontier)) = head else { return };
-    missing_samples::note_ping(&mut driving.lacking, ping, &mut coverage.lacks);
+    missing_samples::note_ping(&mut driving.missing_finder, ping, &mut coverage.missing_samples);
     passages::note_passage(coverage, &frontier, &driving.now, (ping, &tunnel.profile));
     let mut context = WallContext { coverage, tunnel, tally, outputs: outputs.refs() };
     let suspected_m = wall::note_ping(&mut context, &mut sweep, (ping, class));

@@ -159,7 +159,7 @@ fn rejected(
     let aim = ping.origin.and_then(|origin| aim(context.tunnel, &origin, &point));
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
     store(context, sweep, &lost, false);
-    let Coverage { lacks, sections, .. } = &mut *context.coverage;
+    let Coverage { missing_samples, sections, .. } = &mut *context.coverage;
     // A head whose returns are all rejected counts as silent.
     if let Some(reach) = ping.reach
         && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
@@ -177,7 +177,13 @@ fn rejected(
         Hidden::Yes | Hidden::Beside => Cause::Occluded,
     };
     let may_be_wall = may_be_wall && ping.hidden == Hidden::No && !is_distrusted;
-    lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why: Causes::of(cause), may_be_wall });
+    missing_samples.add(MissingSample {
+        x_m,
+        arc_m,
+        head: number_of(ping.head),
+        why: Causes::of(cause),
+        may_be_wall,
+    });
     if let Some(section) = sections.get_mut(sections.index_of(x_m)) {
         section.doubtful += 1;
     }
@@ -212,8 +218,8 @@ fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
         Outcome::Lost(loss, _) => {
             digest.integer(1).integer(loss as u64);
         }
-        Outcome::Unplaced(lacking) => {
-            digest.integer(2).integer(lacking as u64);
+        Outcome::Unplaced(missing_finder) => {
+            digest.integer(2).integer(missing_finder as u64);
         }
     }
 }
@@ -268,8 +274,8 @@ mod tests {
             (self.tally.samples, self.tally.doubtful)
         }
 
-        fn lacks(&self) -> Vec<MissingSample> {
-            self.coverage.lacks.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
+        fn missing_samples(&self) -> Vec<MissingSample> {
+            self.coverage.missing_samples.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
         }
     }
 
@@ -288,11 +294,11 @@ mod tests {
             let mut bench = Bench::new();
             assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
             assert_eq!(bench.note(&PlacedPing { hidden, ..at(1, 1.5) }), (1, 0), "it waits");
-            assert_eq!((bench.note(&at(2, 3.0)), bench.lacks().len()), ((2, 1), 1));
-            let lack = bench.lacks()[0];
+            assert_eq!((bench.note(&at(2, 3.0)), bench.missing_samples().len()), ((2, 1), 1));
+            let missing = bench.missing_samples()[0];
             let Outcome::Sample { arc_m, .. } = at(1, 3.0).outcome else { panic!() };
-            assert!((lack.x_m - 5.1).abs() < 1e-9 && (lack.arc_m - arc_m).abs() < 1e-9, "{lack:?}");
-            assert_eq!(lack.why, Causes::of(cause));
+            assert!((missing.x_m - 5.1).abs() < 1e-9 && (missing.arc_m - arc_m).abs() < 1e-9, "{missing:?}");
+            assert_eq!(missing.why, Causes::of(cause));
             let section = bench.coverage.sections.get(20).unwrap();
             assert_eq!((section.samples, section.doubtful, section.passage.missing), (2, 1, 1));
             assert!(section.t_y_m.count == 1 && section.deviation.mean_m().is_some());
@@ -310,7 +316,7 @@ mod tests {
         }
         assert_eq!(found[0], (1, 0), "the first return waits");
         assert_eq!(found.last(), Some(&(24, 0)), "{found:?}");
-        assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
+        assert!(bench.missing_samples().is_empty() && bench.sweep.waiting.last_mut().is_none());
         // All samples are one angular step apart, so the head's pass covers the arc length of each sample.
         let crossed = |number: f64| {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.65).outcome else {
@@ -412,7 +418,7 @@ mod tests {
         end_returns(&mut world);
         let tally = *world.resource::<Tally>();
         assert_eq!((tally.samples, tally.doubtful), (1, 1));
-        let lacks = &world.resource::<Coverage>().lacks;
-        assert_eq!(lacks.between(5.0, 5.2).count(), 1);
+        let missing_samples = &world.resource::<Coverage>().missing_samples;
+        assert_eq!(missing_samples.between(5.0, 5.2).count(), 1);
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn metrics(shared: &Shared) -> String {
         "page_dropped_lines_total",
         "counter",
         "Events dropped because the queue was full.",
-        model.dropped().told as f64,
+        model.dropped().events as f64,
     );
     put("page_sections", "gauge", "Sections in the page's memory.", model.sections() as f64);
     if let Some(state) = model.state() {

@@ -18,7 +18,7 @@ fn heard(line: &mut dyn Line, count: usize) -> Vec<u8> {
     all
 }
 
-fn told(stand: &mut EmulatedPort, count: usize) -> Vec<u8> {
+fn received(stand: &mut EmulatedPort, count: usize) -> Vec<u8> {
     let mut all = Vec::new();
     for _ in 0..10_000 {
         match stand.read().unwrap() {
@@ -39,7 +39,7 @@ fn bytes_pass_both_ways_on_every_available_carrier() {
         let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let mut line = lines::open(stand.connect()).unwrap();
         line.write(&all).unwrap();
-        assert_eq!(told(&mut stand, 256), all, "{carrier:?} to the device");
+        assert_eq!(received(&mut stand, 256), all, "{carrier:?} to the device");
         assert!(stand.is_called());
         stand.write(&all).unwrap();
         assert_eq!(heard(line.as_mut(), 256), all, "{carrier:?} to the host");
@@ -53,7 +53,7 @@ fn reconnected_host_is_served_again() {
         for round in 0..3 {
             let mut line = lines::open(stand.connect()).unwrap();
             line.write(&[round]).unwrap();
-            assert_eq!(told(&mut stand, 1), [round]);
+            assert_eq!(received(&mut stand, 1), [round]);
             stand.write(&[round, 9]).unwrap();
             assert_eq!(heard(line.as_mut(), 2), [round, 9]);
             drop(line);
@@ -68,7 +68,7 @@ fn disappearing_device_is_detected() {
         let mut stand = stand;
         let mut line = lines::open(stand.connect()).unwrap();
         line.write(&[1]).unwrap();
-        assert_eq!(told(&mut stand, 1), [1]);
+        assert_eq!(received(&mut stand, 1), [1]);
         drop(stand);
         let error = line.read(WAIT, &mut [0; READ_BYTES]).unwrap_err();
         assert!(error.kind() != io::ErrorKind::TimedOut, "{carrier:?}: {error}");

@@ -17,15 +17,15 @@ const DROPS: usize = 12;
 /// Counts drops at a socket since the previous query.
 #[derive(Debug, Default)]
 pub(super) struct SocketDrops {
-    told: u64,
+    reported: u64,
 }
 
 impl SocketDrops {
     /// Returns the number of datagrams dropped at a socket since the previous call; 0 if the kernel doesn't report it.
     pub(super) fn new_ones(&mut self, socket: &UdpSocket) -> u64 {
-        let all = dropped(socket).unwrap_or(self.told);
-        let new = all.saturating_sub(self.told);
-        self.told = all;
+        let all = dropped(socket).unwrap_or(self.reported);
+        let new = all.saturating_sub(self.reported);
+        self.reported = all;
         new
     }
 }

@@ -152,7 +152,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     }
     let mut judging = Judging {
         store: &store,
-        lacks: &MissingSamples::default(),
+        missing_samples: &MissingSamples::default(),
         finder: &mut HoleFinder::default(),
         profile: &profile,
         tell: &mut |_, _| {},
@@ -185,7 +185,7 @@ fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>
         cell_m: 0.25,
         capacity: 20_000,
     };
-    let (mut store, mut sections, mut lacks) =
+    let (mut store, mut sections, mut missing_samples) =
         (SampleStore::new(layout), sections(), MissingSamples::default());
     let visit = Visit { number: 0, tie: 0, at: MonoNs(0), errors: [PassError::default(); 2] };
     for (x_m, arc_m) in
@@ -198,7 +198,7 @@ fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>
     }
     if let Some(may_be_wall) = may_be_wall {
         let why = Causes::of(Cause::MissingReturns);
-        lacks.add(MissingSample { x_m: 5.1, arc_m: 7.0, head: 0, why, may_be_wall });
+        missing_samples.add(MissingSample { x_m: 5.1, arc_m: 7.0, head: 0, why, may_be_wall });
     }
     let to_come = Some(Reach { from_m: 9.0, to_m: f64::INFINITY });
     let request = Request {
@@ -213,10 +213,11 @@ fn with_hole(edge_m: f64, may_be_wall: Option<bool>) -> (Verdict, Option<Unsure>
     };
     let all = Reach { from_m: 0.0, to_m: 10.0 };
     let at_the_end = Request { ended: Some(Ended(Some(all))), ..request };
-    for (request, lacks) in [(request, &lacks), (at_the_end, &MissingSamples::default())] {
+    for (request, missing_samples) in [(request, &missing_samples), (at_the_end, &MissingSamples::default())]
+    {
         let mut judging = Judging {
             store: &store,
-            lacks,
+            missing_samples,
             finder: &mut HoleFinder::default(),
             profile: &profile,
             tell: &mut |_, _| {},

@@ -85,8 +85,8 @@ fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
 #[test]
 fn turn_fails_condition_holds_only_while_the_forecast_exceeds_the_target() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };
-    let told = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
-    assert_eq!([told(0.6), told(0.4)], [Condition::TurnFails, Condition::Good]);
+    let condition_at = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
+    assert_eq!([condition_at(0.6), condition_at(0.4)], [Condition::TurnFails, Condition::Good]);
 }
 
 #[test]

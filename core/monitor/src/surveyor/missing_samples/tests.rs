@@ -71,22 +71,23 @@ fn simulated_losses_match_the_share_and_clustering_of_real_losses() {
 
 #[test]
 fn pings_without_a_fix_beyond_the_capacity_are_dropped_and_recorded() {
-    let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
+    let (mut missing_finder, mut missing_samples) =
+        (MissingSampleFinder::default(), MissingSamples::default());
     let unplaced = Outcome::Unplaced(headrace_fusion::NoFix::Chainage);
     let missing = Outcome::Lost(Loss::Missing, None);
     for (k, outcome) in (0..ROOM).zip([unplaced, missing].into_iter().cycle()) {
-        note_ping(&mut lacking, &away(k as u64, outcome), &mut lacks);
+        note_ping(&mut missing_finder, &away(k as u64, outcome), &mut missing_samples);
     }
-    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, false));
-    let [first, second] = [lacking.away[0], lacking.away[1]];
+    assert_eq!((missing_finder.away.len(), missing_finder.forgot), (ROOM, false));
+    let [first, second] = [missing_finder.away[0], missing_finder.away[1]];
     assert_eq!((first.is_lost, second.is_lost), (false, true), "a return without a fix isn't lost");
     assert!([first, second].iter().all(|ping| ping.why == Causes::of(Cause::PositionLost) && ping.head == 1));
-    note_ping(&mut lacking, &away(ROOM as u64, unplaced), &mut lacks);
-    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, true), "the dropping is recorded");
+    note_ping(&mut missing_finder, &away(ROOM as u64, unplaced), &mut missing_samples);
+    assert_eq!((missing_finder.away.len(), missing_finder.forgot), (ROOM, true), "the dropping is recorded");
 }
 
-fn lacks_of(lacks: &MissingSamples) -> Vec<MissingSample> {
-    lacks.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
+fn samples_of(missing_samples: &MissingSamples) -> Vec<MissingSample> {
+    missing_samples.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
 }
 
 fn all_of(causes: &[Cause]) -> Causes {
@@ -96,14 +97,15 @@ fn all_of(causes: &[Cause]) -> Causes {
 /// At angles assumed to be hidden, losses are due to occlusion, unless other pings there do detect the wall.
 #[test]
 fn loss_at_an_occluded_angle_is_a_missing_return_once_other_pings_there_detect_wall() {
-    let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
+    let (mut missing_finder, mut missing_samples) =
+        (MissingSampleFinder::default(), MissingSamples::default());
     let aim = Some(WallPoint { x_m: 3.0, arc_m: 2.0 });
     let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
     let mut causes = |pings: &[PlacedPing]| {
         for ping in pings {
-            note_ping(&mut lacking, ping, &mut lacks);
+            note_ping(&mut missing_finder, ping, &mut missing_samples);
         }
-        lacks_of(&lacks).last().map(|lack| lack.why)
+        samples_of(&missing_samples).last().map(|missing| missing.why)
     };
     assert_eq!(causes(&[lost(Loss::Missing)]), Some(Causes::of(Cause::MissingReturns)));
     assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
@@ -113,11 +115,15 @@ fn loss_at_an_occluded_angle_is_a_missing_return_once_other_pings_there_detect_w
     causes(&[heard; 40]);
     assert_eq!(causes(&[lost(Loss::Occluded)]), Some(Causes::of(Cause::MissingReturns)));
     assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
-    let before = lacks_of(&lacks).len();
+    let before = samples_of(&missing_samples).len();
     assert_eq!(before, 14, "pings with a return add none");
-    note_ping(&mut lacking, &PlacedPing { standing: true, ..lost(Loss::Missing) }, &mut lacks);
-    assert_eq!(lacks_of(&lacks).len(), before, "a stalled head misses nothing at its own angle");
-    assert!(lacking.stalled.has(1) && !lacking.stalled.has(0));
+    note_ping(
+        &mut missing_finder,
+        &PlacedPing { standing: true, ..lost(Loss::Missing) },
+        &mut missing_samples,
+    );
+    assert_eq!(samples_of(&missing_samples).len(), before, "a stalled head misses nothing at its own angle");
+    assert!(missing_finder.stalled.has(1) && !missing_finder.stalled.has(0));
 }
 
 /// The head looks to the left, at wall 3 m away, and the vehicle is turned to the left by 0.1 rad. The beam
@@ -129,14 +135,14 @@ fn lost_ping_is_recorded_with_its_causes_at_the_aimed_wall_point() {
     let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1);
     let pose = Pose { position: Point3::new(10.0, y_m, z_m), attitude };
     let drive = Drive { speed_mps: 0.3, healthy_gap_s: 2.0, ..Drive::default() };
-    let lack = |why: &[Cause], is_lost: bool, longest_m: f64, hidden: [u16; 2], hides: bool| {
+    let causes_of_missing = |why: &[Cause], is_lost: bool, longest_m: f64, hidden: [u16; 2], hides: bool| {
         let mut coverage = coverage();
         let turning = Turning { longest_m, hidden, ..Turning::default() };
         let hides = |_| hides;
         let placing = Placing { mount: &mount(), turning: &turning, profile: &profile, hidden: &hides };
         let ping = Away { at: MonoNs(0), head: 0, angle_rad: math::FRAC_PI_2, why: all_of(why), is_lost };
-        placing.lack(&pose, &ping, drive, &mut coverage);
-        let found = lacks_of(&coverage.lacks);
+        placing.add_missing(&pose, &ping, drive, &mut coverage);
+        let found = samples_of(&coverage.missing_samples);
         let x_m = 10.0 - 3.0 * math::sin(0.1) / math::cos(0.1);
         let arc_m = profile.arc_of([y_m + 3.0, z_m]);
         assert!((found[0].x_m - x_m).abs() < 1e-9 && (found[0].arc_m - arc_m).abs() < 1e-9, "{found:?}");
@@ -161,7 +167,7 @@ fn lost_ping_is_recorded_with_its_causes_at_the_aimed_wall_point() {
         (&[silent, missing], true, 5.0, seen_through, true, &[silent, missing]),
     ] {
         assert_eq!(
-            lack(why, is_lost, longest_m, counts, hides),
+            causes_of_missing(why, is_lost, longest_m, counts, hides),
             all_of(expected),
             "{why:?} {longest_m} {hides}"
         );
@@ -174,7 +180,7 @@ struct Dive {
     world: World,
     profile: Profile,
     coverage: Coverage,
-    lacking: MissingSampleFinder,
+    missing_finder: MissingSampleFinder,
 }
 
 const STEP_RAD: f64 = 0.0157;
@@ -191,14 +197,15 @@ impl Dive {
             Mounted { source: SourceId(0), info: SensorInfo { mount: mount(), kind: SensorKind::Head } };
         let (sweep, frontier) = (HeadSweep::default(), HeadFrontier::default());
         world.spawn((Head(0), mounted, HiddenAngles(Vec::new()), sweep, frontier));
-        let mut lacking = MissingSampleFinder::default();
+        let mut missing_finder = MissingSampleFinder::default();
         let (seen, last) = (Some((at(10.0), 1.0, STEP_RAD / 0.02, STEP_RAD)), Some(at(10.0)));
-        lacking.heads[0] = Turning { seen, pinged: last, moved: last, longest_m: 5.0, ..Turning::default() };
-        Self { world, coverage: coverage(), profile, lacking }
+        missing_finder.heads[0] =
+            Turning { seen, pinged: last, moved: last, longest_m: 5.0, ..Turning::default() };
+        Self { world, coverage: coverage(), profile, missing_finder }
     }
 
     /// Missing samples recorded by an advice update with or without a fix.
-    fn beat(&mut self, seconds: f64, has_fix: bool) -> Vec<MissingSample> {
+    fn update(&mut self, seconds: f64, has_fix: bool) -> Vec<MissingSample> {
         let [y_m, z_m] = self.profile.reference();
         let position = Point3::new(1.0 + 0.1 * seconds, y_m, z_m);
         let situation = Situation {
@@ -214,23 +221,23 @@ impl Dive {
         };
         let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
         let heads = state.get_mut(&mut self.world).unwrap();
-        let beat = (at(seconds), &situation);
+        let update = (at(seconds), &situation);
         let now = Drive { healthy_gap_s: 2.0, ..Drive::default() };
-        note_beat(&mut self.lacking, now, &heads, beat, &self.profile, &mut self.coverage);
-        lacks_of(&self.coverage.lacks)
+        note_update(&mut self.missing_finder, now, &heads, update, &self.profile, &mut self.coverage);
+        samples_of(&self.coverage.missing_samples)
     }
 
     /// Whether the missing samples belong to the pings expected after 10 s, in order, each at its expected
     /// place.
-    fn are_pings_after_10_s(&self, lacks: &[MissingSample], why: &[Cause]) -> bool {
+    fn are_pings_after_10_s(&self, missing_samples: &[MissingSample], why: &[Cause]) -> bool {
         let [y_m, z_m] = self.profile.reference();
-        (1_u32..).zip(lacks).all(|(ping, lack)| {
+        (1_u32..).zip(missing_samples).all(|(ping, missing)| {
             let after_s = 0.02 * f64::from(ping);
             let (sin, cos) = math::sin_cos(1.0 + STEP_RAD * f64::from(ping));
             let arc_m = self.profile.arc_of([y_m + 3.0 * sin, z_m - 3.0 * cos]);
-            let off_m = math::wrap_signed(lack.arc_m - arc_m, self.profile.perimeter_m());
+            let off_m = math::wrap_signed(missing.arc_m - arc_m, self.profile.perimeter_m());
             let x_m = 1.0 + 0.1 * (10.0 + after_s);
-            (lack.x_m - x_m).abs() < 1e-6 && off_m.abs() < 1e-6 && lack.why == all_of(why)
+            (missing.x_m - x_m).abs() < 1e-6 && off_m.abs() < 1e-6 && missing.why == all_of(why)
         })
     }
 }
@@ -238,16 +245,16 @@ impl Dive {
 #[test]
 fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
     let mut dive = Dive::new();
-    assert_eq!(dive.beat(10.2, true).len(), 0, "the head may still ping");
+    assert_eq!(dive.update(10.2, true).len(), 0, "the head may still ping");
     // After one second 50 samples are missing, and after two seconds 100.
-    let first = dive.beat(11.0, true);
+    let first = dive.update(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadSilent]), "{first:?}");
-    let second = dive.beat(12.0, true);
+    let second = dive.update(12.0, true);
     assert!(second.len() == 100 && dive.are_pings_after_10_s(&second, &[Cause::HeadSilent]));
     // The head pings, but is stalled.
     let mut dive = Dive::new();
-    dive.lacking.heads[0].pinged = Some(at(10.9));
-    let first = dive.beat(11.0, true);
+    dive.missing_finder.heads[0].pinged = Some(at(10.9));
+    let first = dive.update(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
 }
 
@@ -256,26 +263,26 @@ fn missing_samples_of_a_silent_head_are_at_its_extrapolated_angles() {
 #[test]
 fn simulated_pings_without_a_fix_are_placed_at_the_next_fix() {
     let mut dive = Dive::new();
-    dive.beat(10.0, true);
-    assert_eq!((dive.beat(11.0, false).len(), dive.lacking.away.len()), (0, 50));
-    let all = dive.beat(12.0, true);
-    assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
+    dive.update(10.0, true);
+    assert_eq!((dive.update(11.0, false).len(), dive.missing_finder.away.len()), (0, 50));
+    let all = dive.update(12.0, true);
+    assert_eq!((all.len(), dive.missing_finder.away.len(), dive.missing_finder.forgot), (100, 0, false));
     assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
-    assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
+    assert!(all[50..].iter().all(|missing| missing.why == Causes::of(Cause::HeadSilent)));
     // The driving figures of the missing samples have the mean speed between the two fixes.
     let section = dive.coverage.sections.get(8).unwrap();
     assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
     // If there are more pings without a fix than the capacity, the first pings are kept.
     let mut dive = Dive::new();
-    dive.beat(10.0, true);
-    dive.beat(10.0 + 0.02 * (ROOM as f64 + 500.0), false);
-    assert_eq!((dive.lacking.away.len(), dive.lacking.forgot), (ROOM, true));
-    assert_eq!(dive.lacking.away[ROOM - 1].at, at(10.0 + 0.02 * ROOM as f64));
+    dive.update(10.0, true);
+    dive.update(10.0 + 0.02 * (ROOM as f64 + 500.0), false);
+    assert_eq!((dive.missing_finder.away.len(), dive.missing_finder.forgot), (ROOM, true));
+    assert_eq!(dive.missing_finder.away[ROOM - 1].at, at(10.0 + 0.02 * ROOM as f64));
     let seen = |dive: &Dive| dive.coverage.sections.get(10).map(|section| section.passage.unseen);
     assert_eq!(seen(&dive), Some(false));
-    dive.beat(700.0, true);
+    dive.update(700.0, true);
     assert_eq!(
-        (seen(&dive), dive.lacking.forgot),
+        (seen(&dive), dive.missing_finder.forgot),
         (Some(true), false),
         "the missing samples there are unknown"
     );
@@ -286,10 +293,10 @@ fn simulated_pings_without_a_fix_are_placed_at_the_next_fix() {
 fn gap_in_the_log_keeps_only_the_latest_simulated_pings() {
     for (owed, is_forgotten) in [(ROOM, false), (ROOM + 1, true)] {
         let mut dive = Dive::new();
-        dive.beat(10.0, true);
-        let lacks = dive.beat(10.0 + 0.02 * owed as f64, true);
-        assert_eq!((lacks.len(), dive.lacking.forgot), (ROOM, is_forgotten));
-        let last_m = lacks.last().unwrap().x_m;
+        dive.update(10.0, true);
+        let missing_samples = dive.update(10.0 + 0.02 * owed as f64, true);
+        assert_eq!((missing_samples.len(), dive.missing_finder.forgot), (ROOM, is_forgotten));
+        let last_m = missing_samples.last().unwrap().x_m;
         assert!((last_m - (2.0 + 0.002 * owed as f64)).abs() < 1e-6, "{last_m}");
     }
 }
