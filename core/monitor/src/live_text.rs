@@ -1,7 +1,6 @@
 //! Live texts: first the place, then the problem, then the action. Terminals break the texts to their width.
 
 use super::alert_list::{AlertChange, ListedAlertJson};
-use super::dive_plan::texts::plan_texts;
 use super::head_descriptions::HeadDescriptions;
 use super::live_messages::LiveMessage;
 use super::live_state::{Condition, Lamp, LiveState, PositionDoubt, SensorState};
@@ -146,7 +145,6 @@ pub fn status_line(
             matches!(condition, Condition::Passed | Condition::GoingBack(_) | Condition::Outside(_));
         let counts = state.has_sonar() && state.speed_mps.is_some() && !any_speed;
         parts.extend(forecast.filter(|_| counts));
-        parts.extend(state.plan.iter().flat_map(|plan| plan_texts(plan, heads)));
     }
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }

@@ -135,29 +135,6 @@ fn following_the_go_back_advice_clears_every_missed_section() {
     assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
-/// The vehicle turns 2 m before the tunnel's end, so three steps are the whole plan but for the way home.
-#[test]
-fn following_the_next_three_steps_of_the_plan_clears_every_missed_section() {
-    let scene = |path: &str| {
-        let scene = missed_and_back(17.9, None);
-        let scene = scene.replace("[trajectory]", "tunnel.length_m = 20.0\n[trajectory]");
-        scene.replace("[effects]", &format!("{path}[effects]"))
-    };
-    let lines = told(&scene(""));
-    let states = of(&lines, "state");
-    let plan = states.iter().rev().map(|state| &state["plan"]).find(|plan| !plan.is_null()).unwrap();
-    let steps = plan["steps"].as_array().unwrap();
-    assert!((3..=5).contains(&plan["step_count"].as_u64().unwrap()), "{plan}");
-    let waypoint = |step: &Value| {
-        let (to_m, mps) = (figure(step, "to_m"), step["at_most_mps"].as_f64().unwrap_or(0.3));
-        format!("[[trajectory.waypoints]]\nchainage_m = {to_m}\nspeed_mps = {mps}\n")
-    };
-    let path: String = steps.iter().map(waypoint).collect();
-    let lines = told(&scene(&path));
-    let left_m = figure(&of(&lines, "end")[0]["summary"], "fail_m");
-    assert!(left_m < 0.1, "{left_m} m, {plan}");
-}
-
 /// The report's totals include missed sections even if the dive ends on the way back.
 #[test]
 fn dive_that_ends_on_the_way_back_reports_its_missed_sections() {

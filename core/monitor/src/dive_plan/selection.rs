@@ -58,8 +58,10 @@ impl Selection {
 }
 
 /// Search for the best selection by branch and bound.
-pub(super) struct Search<'a> {
+struct Search<'a> {
     offers: &'a [Option<Offer>],
+    /// Numbers of the possible passes: those that cover most per second come first.
+    order: &'a [usize],
     ahead: Option<Ahead>,
     time_s: f64,
     best: Selection,
@@ -68,34 +70,90 @@ pub(super) struct Search<'a> {
 /// Selection of passes that add at most `time_s` to the dive, and cover the most wall.
 ///
 /// At most one pass is shortened. This is the optimum: with two shortened passes, time moved from one to the other
-/// covers no less. Work is bounded by 2^`offers.len()` steps.
+/// covers no less. Work is bounded by 2^`offers.len()` steps; the bound leaves few of them.
 pub(super) fn select(offers: &[Option<Offer>], ahead: Option<Ahead>, time_s: f64) -> Selection {
     debug_assert!(offers.len() <= MOST_PASSES, "{} passes", offers.len());
-    let mut search = Search { offers, ahead, time_s, best: Selection::default() };
+    let (mut order, mut count) = ([0; MOST_PASSES], 0);
+    for (slot, (number, _)) in
+        order.iter_mut().zip(offers.iter().enumerate().filter(|(_, offer)| offer.is_some()))
+    {
+        (*slot, count) = (number, count + 1);
+    }
+    let order = order.get_mut(..count).unwrap_or_default();
+    let rate = |number: &usize| offers.get(*number).copied().flatten().map_or(0.0, |offer| offer.rate());
+    order.sort_unstable_by(|a, b| rate(b).total_cmp(&rate(a)).then(a.cmp(b)));
+    let mut search = Search { offers, order, ahead, time_s, best: Selection::default() };
     search.descend(0, Selection::default());
     search.best
 }
 
+impl Offer {
+    /// Length that is covered per second, m/s.
+    fn rate(&self) -> f64 {
+        self.missed_m / self.more_s.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Time that is left while passes of decreasing rates fill it, and the length that they cover, m.
+struct Filling {
+    left_s: f64,
+    covered_m: f64,
+    ahead: Option<Ahead>,
+}
+
+impl Filling {
+    fn fill(&mut self, length_m: f64, more_s: f64) {
+        let share = if more_s > self.left_s { self.left_s / more_s } else { 1.0 };
+        self.covered_m += share * length_m;
+        self.left_s -= share * more_s;
+    }
+
+    /// Fills time with the tunnel ahead if it covers more per second than `rate`, m/s.
+    fn fill_ahead(&mut self, rate: f64) {
+        let is_next = |ahead: &Ahead| ahead.length_m >= rate * ahead.more_s;
+        if let Some(ahead) = self.ahead.take_if(|ahead| is_next(ahead)) {
+            self.fill(ahead.length_m, ahead.more_s);
+        }
+    }
+}
+
 impl Search<'_> {
-    fn descend(&mut self, from: usize, so_far: Selection) {
+    fn offer(&self, place: usize) -> Option<(usize, Offer)> {
+        let number = *self.order.get(place)?;
+        Some((number, self.offers.get(number).copied().flatten()?))
+    }
+
+    /// Length that passes from a place of the order on cover at most, m, after a skipped one has been shortened.
+    fn bound_m(&self, from: usize, so_far: &Selection, skipped: Option<Offer>) -> f64 {
         let left_s = self.time_s - so_far.more_s;
-        let rest = self.offers.get(from..).unwrap_or_default();
-        let rest_m: f64 = rest.iter().flatten().map(|offer| offer.missed_m).sum();
-        let skipped = self.offers.iter().take(from).enumerate().filter(|(pass, _)| !so_far.has(*pass));
-        let part_m = skipped.filter_map(|(_, offer)| *offer).map(|offer| offer.missed_m).fold(0.0, f64::max);
-        let ahead_m = self.ahead.map_or(0.0, |ahead| ahead.within(left_s).1);
-        if so_far.covered_m + rest_m + part_m + ahead_m <= self.best.covered_m + ROUNDING_M {
+        let mut filling = Filling { left_s, covered_m: so_far.covered_m, ahead: self.ahead };
+        let rest = (from..self.order.len()).filter_map(|place| Some(self.offer(place)?.1));
+        for offer in skipped.into_iter().chain(rest) {
+            filling.fill_ahead(offer.rate());
+            filling.fill(offer.missed_m, offer.more_s);
+        }
+        filling.fill_ahead(0.0);
+        filling.covered_m
+    }
+
+    fn descend(&mut self, from: usize, so_far: Selection) {
+        let skipped =
+            (0..from).filter_map(|place| self.offer(place)).filter(|(number, _)| !so_far.has(*number));
+        let skipped = skipped.map(|(_, offer)| Some(offer)).chain([None]);
+        let most_m = skipped.map(|offer| self.bound_m(from, &so_far, offer)).fold(0.0, f64::max);
+        if most_m <= self.best.covered_m + ROUNDING_M {
             return;
         }
-        let Some(offer) = rest.first() else {
+        let left_s = self.time_s - so_far.more_s;
+        let Some((number, offer)) = self.offer(from) else {
             let full = self.with_rest(so_far, left_s);
             if full.is_better(&self.best) {
                 self.best = full;
             }
             return;
         };
-        if let Some(offer) = offer.filter(|offer| offer.more_s <= left_s) {
-            let whole = so_far.whole | 1 << from;
+        if offer.more_s <= left_s {
+            let whole = so_far.whole | 1 << number;
             let (covered_m, more_s) = (so_far.covered_m + offer.missed_m, so_far.more_s + offer.more_s);
             self.descend(from + 1, Selection { whole, covered_m, more_s, ..so_far });
         }
