@@ -8,6 +8,7 @@ mod access;
 mod address;
 mod commands;
 mod contents;
+mod crawler;
 mod crowd;
 #[cfg(feature = "tls")]
 mod tls;
