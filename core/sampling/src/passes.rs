@@ -142,7 +142,7 @@ impl Phasing {
                 Pattern::Sectors { sweep_s, uneven: AT_ONCE }
             }
             HeadLayout::PhaseShift if ahead.iter().any(Option::is_none) => Pattern::Loose,
-            HeadLayout::PhaseShift if in_step.len() < heads.len().min(2) => Pattern::Loose,
+            HeadLayout::PhaseShift if in_step.is_empty() && !heads.is_empty() => Pattern::Loose,
             HeadLayout::PhaseShift => Pattern::Turning(phases),
         };
         Self {
@@ -280,7 +280,7 @@ impl Phasing {
         Passes { heads, in_step, turns_s, pattern, parallax_s: 0.0, at_rest, lossy: false }
     }
 
-    /// Returns the largest set of heads in step, or all heads in sectors.
+    /// Returns the largest set of heads in step, empty if no two heads are, or all heads in sectors.
     pub fn in_step(&self) -> HeadSet {
         self.in_step
     }
@@ -288,7 +288,10 @@ impl Phasing {
 
 /// Largest set of heads that turn in one sense and at one rate, and the angle through which each of them turns until it
 /// next passes the vertical, as a share of a turn.
+///
+/// The set is empty if no two heads are in step.
 fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> (HeadSet, [f64; MAX_HEADS]) {
+    let turning = motions.iter().flatten().count();
     let in_step_with = |first: &HeadMotion| {
         let (sense, turn_s) = (body_rate(first).signum(), first.turn_period_s());
         let is_in_step = |motion: &HeadMotion| {
@@ -299,17 +302,15 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> (HeadSet, [f64; MAX_HEAD
             motions.iter().enumerate().filter(|(_, motion)| motion.as_ref().is_some_and(is_in_step));
         in_step.fold(HeadSet::default(), |set, (head, _)| set.with(head))
     };
-    // Of equally large sets, the slowest counts, because a head on its way back to its program is fast.
-    let sets = motions.iter().flatten().map(|first| (in_step_with(first), first.turn_period_s()));
-    let (in_step, _) = sets.fold((HeadSet::default(), 0.0), |most, set| {
-        if (set.0.len(), set.1) > (most.0.len(), most.1) { set } else { most }
-    });
+    let sets = motions.iter().flatten().map(in_step_with);
+    let in_step = sets.fold(HeadSet::default(), |most, set| if set.len() > most.len() { set } else { most });
+    let in_step = if in_step.len() < turning.min(2) { HeadSet::default() } else { in_step };
     // If the body-frame angles of the heads fall, they are mirrored, so that all angles grow.
     let growing = |(head, motion): (usize, &Option<HeadMotion>)| Some((head, (*motion)?));
-    let turning = || motions.iter().enumerate().filter_map(growing).filter(|(head, _)| in_step.has(*head));
-    let mirror = if turning().all(|(_, motion)| body_rate(&motion) < 0.0) { -1.0 } else { 1.0 };
+    let members = || motions.iter().enumerate().filter_map(growing).filter(|(head, _)| in_step.has(*head));
+    let mirror = if members().all(|(_, motion)| body_rate(&motion) < 0.0) { -1.0 } else { 1.0 };
     let mut phases = [0.0; MAX_HEADS];
-    for (head, motion) in turning() {
+    for (head, motion) in members() {
         if let Some(phase) = phases.get_mut(head) {
             *phase = math::wrap(-mirror * body_sign(&motion) * motion.angle_rad, TAU) / TAU;
         }

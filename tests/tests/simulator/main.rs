@@ -5,6 +5,7 @@
 mod advised;
 mod boulders;
 mod effects;
+mod instructed;
 #[cfg(feature = "mesh")]
 mod mesh_scene;
 mod scenes;

@@ -1,6 +1,6 @@
 //! Heads that return after a silence.
 
-use crate::head::MAX_HEADS;
+use crate::head::{HeadSet, MAX_HEADS};
 use crate::passes::{Phasing, Situation};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -11,15 +11,18 @@ const JOINS_WITHIN: DurNs = DurNs(10_000_000_000);
 
 /// Leaves out heads that have returned but have not joined their program yet.
 ///
-/// Such a head turns in coarse steps and at another rate than the heads in step. Its present motion says nothing about
-/// its next turns, so the advice goes by the other heads. A head that stays out of step counts after ten seconds.
+/// Such a head turns in coarse steps and at another rate than the other heads. Its present motion says nothing about its
+/// next turns, so the advice goes by the other heads. A head that stays out of step counts after ten seconds.
 #[derive(Debug, Clone, Default)]
 pub struct ReturningHeads {
-    /// Time since which each head has been present.
-    since: [Option<MonoNs>; MAX_HEADS],
+    /// Heads present at the latest update, and all heads that have ever been present.
+    present: HeadSet,
+    known: HeadSet,
+    /// Time of each head's last return.
+    returned: [Option<MonoNs>; MAX_HEADS],
 }
 
-stateful!(ReturningHeads { state: since; });
+stateful!(ReturningHeads { state: present, known, returned; });
 
 impl ReturningHeads {
     /// Returns the situation without heads that are on their way to their program.
@@ -27,12 +30,26 @@ impl ReturningHeads {
     /// Must be called at each advice update. Allocates: never.
     #[must_use]
     pub fn left_out(&mut self, at: MonoNs, situation: &Situation) -> Situation {
+        let mut steady = HeadSet::default();
+        let mut present = HeadSet::default();
+        for (head, returned) in self.returned.iter_mut().enumerate() {
+            if situation.heads.get(head).is_none_or(Option::is_none) {
+                continue;
+            }
+            if self.known.has(head) && !self.present.has(head) {
+                *returned = Some(at);
+            }
+            present = present.with(head);
+            if returned.is_none_or(|returned| at.since(returned).0 >= JOINS_WITHIN.0) {
+                steady = steady.with(head);
+            }
+        }
+        (self.present, self.known) = (present, self.known.union(present));
         let in_step = Phasing::of(situation).in_step();
+        let has_joined = |head: usize| in_step.has(head) && in_step.iter().any(|other| steady.has(other));
         let mut counted = *situation;
-        for (head, (slot, since)) in counted.heads.iter_mut().zip(&mut self.since).enumerate() {
-            *since = slot.and(Some(since.unwrap_or(at)));
-            let is_new = since.is_some_and(|since| at.since(since).0 < JOINS_WITHIN.0);
-            if is_new && !in_step.has(head) && !in_step.is_empty() {
+        for (head, slot) in counted.heads.iter_mut().enumerate() {
+            if !steady.is_empty() && !steady.has(head) && !has_joined(head) {
                 *slot = None;
             }
         }
