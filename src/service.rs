@@ -39,7 +39,7 @@ pub(crate) struct Service {
     messages: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
     every: DurNs,
-    told: Option<MonoNs>,
+    sent: Option<MonoNs>,
     recorded: RecordingState,
 }
 
@@ -61,17 +61,17 @@ impl Service {
             messages: Some(sender),
             thread: Some(thread),
             every: interval(),
-            told: None,
+            sent: None,
             recorded: RecordingState::default(),
         }))
     }
 
     /// Tells systemd at `now`, if it is time to, that the loop has made progress.
     fn progress(&mut self, now: MonoNs, status: impl FnOnce(&RecordingState) -> String) {
-        if self.told.is_some_and(|told| now.since(told) < self.every) {
+        if self.sent.is_some_and(|sent| now.since(sent) < self.every) {
             return;
         }
-        let is_first = self.told.replace(now).is_none();
+        let is_first = self.sent.replace(now).is_none();
         self.send(Message::Progress { is_first, status: status(&self.recorded) });
     }
 
@@ -224,9 +224,9 @@ mod tests {
 
     #[test]
     fn watchdog_of_two_seconds_is_fed_every_half_second() {
-        let told = messages("watchdog", 101, Some(2_000_000));
-        assert_eq!(told.len(), 6, "{told:?}");
-        assert!(told[..5].iter().all(|message| message.contains("WATCHDOG=1\n")), "{told:?}");
+        let sent = messages("watchdog", 101, Some(2_000_000));
+        assert_eq!(sent.len(), 6, "{sent:?}");
+        assert!(sent[..5].iter().all(|message| message.contains("WATCHDOG=1\n")), "{sent:?}");
     }
 
     #[test]

@@ -172,9 +172,9 @@ fn times_outside_the_dive_are_refused_without_changing_files() {
         for (from, output) in [("20min", "part.mcap"), ("99h", "new.mcap")] {
             let answer = folder.headrace(&["trim", log, "-o", output, "--from", from]);
             assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{}", answer.stderr);
-            let (_, told) = answer.stderr.split_once("the dive lasts from 0 s to ").unwrap();
-            let told_s: f64 = told.split_whitespace().next().unwrap().parse().unwrap();
-            assert!((told_s - span_s).abs() < 1.0, "{span_s}: {}", answer.stderr);
+            let (_, report) = answer.stderr.split_once("the dive lasts from 0 s to ").unwrap();
+            let stated_s: f64 = report.split_whitespace().next().unwrap().parse().unwrap();
+            assert!((stated_s - span_s).abs() < 1.0, "{span_s}: {}", answer.stderr);
         }
     }
     assert!(folder.read("part.mcap") == before && !folder.path("new.mcap").exists());

@@ -77,7 +77,7 @@ impl Adviser for Screen {
         }
     }
 
-    fn told(&mut self) -> Vec<PilotAdvice> {
+    fn advice(&mut self) -> Vec<PilotAdvice> {
         std::mem::take(&mut self.read)
     }
 }

@@ -100,7 +100,7 @@ impl Crawl {
             page: viewer.state.clone(),
             alerts: live.cloned().collect(),
             metres,
-            back: viewer.others.iter().rfind(|told| told["type"] == "back").cloned(),
+            back: viewer.others.iter().rfind(|message| message["type"] == "back").cloned(),
             screen: self.screen.page(),
         };
         for _ in 0..READINGS {

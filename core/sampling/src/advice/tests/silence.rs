@@ -104,7 +104,7 @@ impl Vehicle {
         let mut case = self.case(speed_mps);
         let mut advisor = case.advisor();
         let (mut returning, mut steady) = (ReturningHeads::default(), Hysteresis::new(self.target_m));
-        let beats = (0_i64..).map(|beat| beat as f64 * BEAT_S);
+        let updates = (0_i64..).map(|update| update as f64 * BEAT_S);
         let display = |at_s: f64| {
             self.turn(&mut case, at_s);
             let silent_s = fault.from_s + NOTICED_S..fault.from_s + fault.for_s;
@@ -125,7 +125,7 @@ impl Vehicle {
             let in_step = Phasing::of(&counted).in_step();
             (at_s, steady.show(at, in_step, advice).v_max_mps)
         };
-        beats.take_while(|at_s| *at_s < fault.over_s() + 40.0).map(display).collect()
+        updates.take_while(|at_s| *at_s < fault.over_s() + 40.0).map(display).collect()
     }
 }
 
