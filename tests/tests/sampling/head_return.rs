@@ -44,10 +44,8 @@ fn seen(vehicle: &str, speed_mps: f64, (head, from_s, for_s): (usize, f64, f64))
             let note = &mut |dive: &headrace_monitor::run::Loop| {
                 let view = dive.view();
                 let state = view.live_state();
-                let Some((entry, (begun, _))) = view.advised().entries.last().zip(view.span()) else {
-                    return;
-                };
-                let (at_s, limit_mps) = (entry.at.since(begun).as_secs_f64(), state.v_max_mps());
+                let Some(entry) = view.advised().entries.last() else { return };
+                let (at_s, limit_mps) = (view.clock().seconds(entry.at), state.v_max_mps());
                 let condition = state.condition();
                 seen.extend(limit_mps.map(|limit_mps| Seen { at_s, limit_mps, condition }));
             };
