@@ -132,6 +132,7 @@ pub struct Dropped {
     /// Number of dropped samples. Wall samples among these are sent again from the loop's store.
     pub samples: u64,
     /// Number of dropped events.
+    #[serde(rename = "told")]
     pub events: u64,
 }
 

@@ -137,13 +137,13 @@ fn check(seeds: core::ops::Range<u64>, most_m: f64) {
 }
 
 #[test]
-fn pilot_who_follows_the_main_instructions_misses_no_wall_despite_faults() {
+fn pilot_following_the_main_instructions_misses_no_wall_despite_faults() {
     check(0..5, 0.0);
 }
 
 /// Of 11 m per dive.
 #[test]
 #[ignore = "long: 50 dives"]
-fn pilot_who_follows_the_main_instructions_misses_at_most_2_m_in_50_dives_with_faults() {
+fn pilot_following_the_main_instructions_misses_at_most_2_m_in_50_dives_with_faults() {
     check(0..50, 2.0);
 }

@@ -252,7 +252,7 @@ impl ListedAlert {
             needs_acknowledgement: self.needs_acknowledgement(),
             from_m,
             to_m,
-            back_to_m: from_m.filter(|_| is_missed),
+            back_to_m: from_m.filter(|_| is_missed).map(|from_m| around.sections.back_to_m(from_m)),
             at_most_mps: at_most_mps.filter(|mps| *mps > 0.0),
             sensor: self.source.and_then(|source| Some(around.sources.get(source.index())?.id.clone())),
             count: self.count,

@@ -9,10 +9,14 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// line.
 const JOINS_WITHIN: DurNs = DurNs(10_000_000_000);
 
+/// A head on its way to its program takes steps that are longer than those of the other heads by at least this factor.
+const COARSE: f64 = 1.5;
+
 /// Leaves out heads that have returned but have not joined their program yet.
 ///
 /// Such a head turns in coarse steps and at another rate than the other heads. Its present motion says nothing about its
-/// next turns, so the advice goes by the other heads. A head that stays out of step counts after ten seconds.
+/// next turns, so the advice goes by the other heads. A head that stays out of step counts after ten seconds. A head
+/// that only stood still for a while goes on in its usual steps, so its passes count at once.
 #[derive(Debug, Clone, Default)]
 pub struct ReturningHeads {
     /// Heads present at the latest update, and all heads that have ever been present.
@@ -47,9 +51,13 @@ impl ReturningHeads {
         (self.present, self.known) = (present, self.known.union(present));
         let in_step = Phasing::of(situation).in_step();
         let has_joined = |head: usize| in_step.has(head) && in_step.iter().any(|other| steady.has(other));
+        let step_rad =
+            |head: usize| situation.heads.get(head).copied().flatten().map(|motion| motion.step_rad);
+        let usual_rad = steady.iter().filter_map(step_rad).fold(f64::INFINITY, f64::min);
+        let is_coarse = |head: usize| step_rad(head).is_some_and(|step_rad| step_rad > COARSE * usual_rad);
         let mut counted = *situation;
         for (head, slot) in counted.heads.iter_mut().enumerate() {
-            if !steady.is_empty() && !steady.has(head) && !has_joined(head) {
+            if !steady.has(head) && !has_joined(head) && is_coarse(head) {
                 *slot = None;
             }
         }
