@@ -322,7 +322,9 @@ impl Viewer {
                 // As on the page, known alerts get the state's figures.
                 for alert in value["alert_list"].as_array().into_iter().flatten() {
                     let known = alert["number"].as_u64().and_then(|number| self.alerts.get_mut(&number));
-                    known.into_iter().for_each(|known| known.clone_from(alert));
+                    if let Some(known) = known {
+                        known.clone_from(alert);
+                    }
                 }
                 self.state = value;
             }

@@ -64,13 +64,16 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
     Ok(most.filter(|_| several))
 }
 
-/// Returns the dive's clock of a log, as in a replay. Its reading position stays the same.
+/// Returns the clock of the messages to play, as [`of`] does, and the dive's clock.
 ///
-/// The clock starts with the first packet of a sensor. Packets of a clock other than `clock` don't count.
+/// The dive's clock starts with the first packet of a sensor. Packets of another clock don't count.
 ///
 /// Errors: the log can't be read.
-pub(crate) fn dive_clock(log: &mut DiveLog, clock: Option<Clock>) -> Result<DiveClock, LogError> {
-    let (place, mut found) = (log.place(), DiveClock::default());
+pub(crate) fn clocks_of(files: &[PathBuf]) -> Result<(Option<Clock>, DiveClock), LogError> {
+    // This reader's memory is freed before the log is played.
+    let mut log = DiveLog::open(files)?;
+    let clock = of(files, log.times())?;
+    let mut found = DiveClock::default();
     while found.zero().is_none() {
         let Some(LogMessage { kind, log_time, data, .. }) = log.next()? else { break };
         let MessageKind::Raw { source } = kind else { continue };
@@ -79,17 +82,14 @@ pub(crate) fn dive_clock(log: &mut DiveLog, clock: Option<Clock>) -> Result<Dive
             found.start(log_time);
         }
     }
-    log.go_to(&place)?;
-    Ok(found)
+    Ok((clock, found))
 }
 
 /// Returns the dive's clock of the log in these files.
 ///
 /// Errors: the log can't be read.
 pub fn clock_of(files: &[PathBuf]) -> Result<DiveClock, LogError> {
-    let mut log = DiveLog::open(files)?;
-    let clock = of(files, log.times())?;
-    dive_clock(&mut log, clock)
+    Ok(clocks_of(files)?.1)
 }
 
 /// Counts a message for its clock. Returns `false` if there are too many clocks.

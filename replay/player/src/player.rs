@@ -57,8 +57,8 @@ impl Player {
     ///
     /// Errors: see [`DiveLog::open`].
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
-        let mut reader = DiveLog::open(files)?;
-        let clock = clocks::of(files, reader.times())?;
+        let (clock, dive_clock) = clocks::clocks_of(files)?;
+        let reader = DiveLog::open(files)?;
         let ids: Vec<String> = reader.header().sources.iter().map(|source| source.id.clone()).collect();
         Ok(Self {
             sources: vec![None; ids.len()],
@@ -70,7 +70,7 @@ impl Player {
             unmatched: BTreeMap::new(),
             too_long: 0,
             clock,
-            dive_clock: clocks::dive_clock(&mut reader, clock)?,
+            dive_clock,
             is_started: false,
             astray: BTreeMap::new(),
             farthest: (0, Vec::new()),

@@ -553,12 +553,11 @@ fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
     // The driver reads once in each round, and also at intervals if nothing arrives. The limit detects a driver that is
     // due again at once in every round; a real thread would never wait.
     for round in 0..10_000 {
-        let due = match service.closed_until() {
-            Some(until) => until <= now,
-            None => {
-                let is_due = service.due().is_some_and(|due| due <= now);
-                round == 0 || !cable.to_host.is_empty() || !cable.is_open() || is_due
-            }
+        let due = if let Some(until) = service.closed_until() {
+            until <= now
+        } else {
+            let is_due = service.due().is_some_and(|due| due <= now);
+            round == 0 || !cable.to_host.is_empty() || !cable.is_open() || is_due
         };
         if !due {
             return;

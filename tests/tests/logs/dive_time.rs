@@ -17,7 +17,9 @@ fn with_notes(folder: &Folder) -> u64 {
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);
     let begun = messages[0].log_time + 7_000_000_000_000;
-    messages.iter_mut().for_each(|message| message.log_time += 7_000_000_000_000);
+    for message in &mut messages {
+        message.log_time += 7_000_000_000_000;
+    }
     let channel = Channel { id: 99, topic: format!("/raw/{CONSOLE_ID}"), ..(*messages[0].channel).clone() };
     let channel = Arc::new(channel);
     for (number, note_s) in (1..).zip(NOTES_S) {

@@ -3,6 +3,11 @@
 //!
 //! 50 dives: `cargo test -p headrace_tests --test simulator instructed -- --ignored --nocapture`
 
+#![expect(
+    clippy::disallowed_types,
+    reason = "the test reads the metres after the simulation, without a loop"
+)]
+
 use std::sync::{Arc, Mutex};
 
 use headrace_coverage::Metres;
@@ -103,7 +108,7 @@ fn faults(seed: u64) -> String {
             "[[effects.device_faults]]\nkind = \"{kind}\"\nsensors = [\"{sensor}\"]\nfrom_s = {from_s}\nfor_s = {for_s}\n"
         )
     };
-    (0..1 + usize::try_from(seed % 3).unwrap()).map(fault).collect()
+    (0..=usize::try_from(seed % 3).unwrap()).map(fault).collect()
 }
 
 /// Metres by verdict at the end of a dive with these faults.
@@ -117,8 +122,7 @@ fn metres(faults: &str) -> Metres {
     let screen = Screen::new(&scene, Arc::clone(&metres));
     let mut simulation = Simulation::new(&scene).unwrap().advised_by(Box::new(screen));
     while simulation.next_message().is_some() {}
-    let metres = *metres.lock().unwrap();
-    metres
+    *metres.lock().unwrap()
 }
 
 /// Runs dives with these seeds. At most `most_m` metres may be missed in all of them together.

@@ -344,7 +344,7 @@ fn unverified_mounts_raise_a_caution_after_the_grace_period_until_they_are_verif
         let at = MonoNs(at_s * 1_000_000_000);
         (state.at, state.now) = (Some(at), at);
         bench.with(|list, to| {
-            list.update(&AdviceUpdate { at, state: &state, setting: None, unverified_mounts }, to)
+            list.update(&AdviceUpdate { at, state: &state, setting: None, unverified_mounts }, to);
         });
         let found = bench.list.iter().find(|alert| alert.kind == ListKind::MountsUnverified);
         found.map(|alert| (alert.priority, alert.state == AlertState::Active))

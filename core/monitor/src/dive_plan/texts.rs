@@ -5,14 +5,9 @@ use crate::head_descriptions::HeadDescriptions;
 use crate::pilot_text::{limit_text, short_text, station};
 use headrace_coverage::Action;
 
-/// The next steps of a plan, numbered, and whether it fits into the remaining time.
-pub fn plan_texts(plan: &DivePlan, heads: &HeadDescriptions) -> Vec<String> {
-    let steps = (1..).zip(plan.steps.iter().flatten());
-    let steps = steps.map(|(number, step)| format!("{number}. {}", step_text(step, heads)));
-    steps.chain([fits_text(plan)]).collect()
-}
-
 /// Instruction for a step, such as "back to 0+008.2 at any speed".
+///
+/// A step into the tunnel ahead states no speed, because the displayed limit applies there.
 pub fn step_text(step: &DiveStep, heads: &HeadDescriptions) -> String {
     let (from, to) = (decimetre_station(step.from_m), decimetre_station(step.to_m));
     let speed = step.at_most_mps.map_or_else(String::new, |mps| format!(" at most {}", limit_text(mps)));
@@ -20,7 +15,7 @@ pub fn step_text(step: &DiveStep, heads: &HeadDescriptions) -> String {
         StepKind::Go if step.to_m < step.from_m => format!("back to {to} at any speed"),
         StepKind::Go => format!("on to {to} at any speed"),
         StepKind::Home => "back to the portal at any speed".to_owned(),
-        StepKind::GoOn => format!("go on from {from}{speed}"),
+        StepKind::GoOn => format!("go on from {from}"),
         StepKind::Inspect => {
             let roll = match step.roll {
                 Roll::Level => "",
@@ -81,6 +76,14 @@ mod tests {
     use super::*;
     use headrace_coverage::{Cause, Causes, RunId};
 
+    /// The next steps of a plan, numbered, and whether it fits into the remaining time.
+    fn plan_texts(plan: &DivePlan) -> String {
+        let steps = (1..).zip(plan.steps.iter().flatten());
+        let steps = steps
+            .map(|(number, step)| format!("{number}. {}", step_text(step, &HeadDescriptions::default())));
+        steps.chain([fits_text(plan)]).collect::<Vec<_>>().join("  ")
+    }
+
     fn texts(left_s: Option<f64>) -> String {
         let pass = Pass {
             run: RunId(0),
@@ -95,12 +98,12 @@ mod tests {
         };
         let start = Start { x_m: 31.0, home_m: 0.0, transit_mps: 0.2, left_s, begun: None };
         let onward = Onward { from_m: 31.0, to_m: 60.0, at_most_mps: 0.1 };
-        plan_texts(&plan(&start, &[pass], Some(onward)), &HeadDescriptions::default()).join("  ")
+        plan_texts(&plan(&start, &[pass], Some(onward)))
     }
 
     #[test]
-    fn plan_is_told_as_three_steps_and_whether_it_fits() {
-        let steps = "1. go on from 0+031.0 at most 0.10 m/s  2. back to 0+008.2 at any speed  3. inspect 0+008.2 to \
+    fn text_of_a_plan_has_three_steps_and_says_whether_it_fits() {
+        let steps = "1. go on from 0+031.0  2. back to 0+008.2 at any speed  3. inspect 0+008.2 to \
                      0+012.0 at most 0.092 m/s, in the middle and steady";
         assert_eq!(texts(None), format!("{steps}  takes 11 min"));
         assert_eq!(texts(Some(4800.0)), format!("{steps}  fits in the 1 h 20 min left"));

@@ -101,7 +101,8 @@ pub struct PlanStepJson {
     pub from_m: f64,
     /// Chainage at which the step ends, m.
     pub to_m: f64,
-    /// Largest speed, m/s; `None` for any speed, or if no speed is known to meet the target.
+    /// Largest speed, m/s; `None` for any speed, for the tunnel ahead, where the displayed limit applies, or if no speed
+    /// is known to meet the target.
     pub at_most_mps: Option<f64>,
     /// Roll of the vehicle: `level`, `left` or `right`.
     pub roll: Roll,
@@ -118,7 +119,7 @@ impl PlanJson {
             text: step_text(step, around.heads),
             from_m: step.from_m,
             to_m: step.to_m,
-            at_most_mps: step.at_most_mps,
+            at_most_mps: step.at_most_mps.filter(|_| step.kind != StepKind::GoOn),
             roll: step.roll,
             run: step.run.map(|run| run.0),
             ends_s: step.ends_s,

@@ -178,10 +178,10 @@ describe("one truth", () => {
     it(`shows the next three steps of the plan, the first one largest, at ${width} px`, () => on({}, async ({ mock, page }) => {
       const step = (text, from_m, to_m) => ({ text, from_m, to_m });
       const steps = [step("back to 0+008.2 at any speed", 20, 8.2), step("inspect 0+008.2 to 0+018.8 at most 0.092 m/s", 8.2, 18.8),
-        step("go on from 0+020.0 at most 0.10 m/s", 20, 60)];
+        step("go on from 0+020.0", 20, 60)];
       mock.control({ world: { legs, over: { plan: { steps, fits: "fits in the 1 h 20 min left", all_fits: true } } } });
       const shown = page.locator(".back .steps .leg");
-      await shown.nth(2).filter({ hasText: "3. go on from 0+020.0 at most 0.10 m/s" }).waitFor();
+      await shown.nth(2).filter({ hasText: "3. go on from 0+020.0" }).waitFor();
       assert.equal(await shown.count(), 3);
       assert.equal(await page.locator(".back .count").innerText(), "fits in the 1 h 20 min left");
       const sizes = await shown.evaluateAll((all) => all.map((each) => Number.parseFloat(getComputedStyle(each).fontSize)));

@@ -50,7 +50,7 @@ const back = { legs: [{ from_m: 16.25, to_m: 10.75, at_most_mps: 0.0925, why: "t
 const plan = { fits: "fits in the 1 h 20 min left", all_fits: true, steps: [
   { kind: "go", text: "back to 0+008.2 at any speed", from_m: 20, to_m: 8.2 },
   { kind: "inspect", text: "inspect 0+008.2 to 0+018.8 at most 0.092 m/s", from_m: 8.2, to_m: 18.8 },
-  { kind: "go_on", text: "go on from 0+020.0 at most 0.10 m/s", from_m: 20, to_m: 60 }] };
+  { kind: "go_on", text: "go on from 0+020.0", from_m: 20, to_m: 60 }] };
 const going = { world: { ...back, condition: "going_back", speed_mps: -0.2, over: { plan, outstanding: "5.50 m missed, from 0+010.75",
   speeds: { speed: "0.200", limit: null, margin: null }, echosounders: [{ id: "echo_right", range_m: 0.42, age_s: 0.1, from: [-2, 3], to: [-2.42, 3.05] }] } } };
 const slow = { speeds: { speed: "0.106", limit: "0.094", margin: "0.012 too fast" } };

@@ -63,7 +63,10 @@ impl Crawl {
         viewer.send(&json!({"do": "play", "command": "seek", "to_s": at_s}));
         viewer.until("the jump", |viewer| {
             let is_ready = viewer.others.iter().any(|other| other["type"] == "ready");
-            viewer.hello["instance"] != before && is_ready
+            // The state may follow after the message that the page is ready.
+            let now_s = viewer.state["now_s"].as_f64();
+            let is_there = now_s.is_some_and(|now_s| (now_s - at_s).abs() < 0.05);
+            viewer.hello["instance"] != before && is_ready && is_there
         });
     }
 

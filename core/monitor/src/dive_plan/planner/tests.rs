@@ -79,7 +79,7 @@ fn vehicle_that_follows_the_first_step_makes_every_pass_in_the_planned_time() {
             } else if !is_slow || !is_within {
                 *reached = None;
             }
-            if *passes >= 1 + u32::from(entry.is_rolled) {
+            if *passes > u32::from(entry.is_rolled) {
                 dive.missed.retain(|left| left.run != entry.run);
             }
         }

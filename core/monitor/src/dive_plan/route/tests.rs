@@ -58,14 +58,12 @@ fn driven(x_m: f64, order: &[(Job, bool)], part: Option<(usize, f64)>) -> (f64, 
     (time_s + at_m.abs() / TRANSIT_MPS, sum_m)
 }
 
+/// Takes jobs in an order, each with whether it is driven inward.
+type Visit<'a> = dyn FnMut(&[(Job, bool)]) + 'a;
+
 /// Calls `visit` for every order and direction of every subset of the jobs. The last job of `jobs` is driven inward
 /// only if `has_ahead`.
-fn all_orders(
-    jobs: &[Job],
-    has_ahead: bool,
-    order: &mut Vec<(usize, bool)>,
-    visit: &mut dyn FnMut(&[(Job, bool)]),
-) {
+fn all_orders(jobs: &[Job], has_ahead: bool, order: &mut Vec<(usize, bool)>, visit: &mut Visit<'_>) {
     let resolved: Vec<(Job, bool)> =
         order.iter().map(|(number, is_inward)| (jobs[*number], *is_inward)).collect();
     visit(&resolved);
@@ -123,7 +121,7 @@ fn most_m(x_m: f64, jobs: &[Job], has_ahead: bool, time_s: f64) -> f64 {
             }
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..40 {
-                let middle = (low + high) / 2.0;
+                let middle = f64::midpoint(low, high);
                 let fits = driven(x_m, order, Some((number, middle))).0 <= time_s;
                 (low, high) = if fits { (middle, high) } else { (low, middle) };
             }
