@@ -64,13 +64,12 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
     Ok(most.filter(|_| several))
 }
 
-/// Returns the clock of the messages to play, as [`of`] does, and the dive's clock.
+/// Returns the dive's clock of the log in these files, as in a replay.
 ///
-/// The dive's clock starts with the first packet of a sensor. Packets of another clock don't count.
+/// The clock starts with the first packet of a sensor. Packets of a clock that isn't played don't count.
 ///
 /// Errors: the log can't be read.
-pub(crate) fn clocks_of(files: &[PathBuf]) -> Result<(Option<Clock>, DiveClock), LogError> {
-    // This reader's memory is freed before the log is played.
+pub fn clock_of(files: &[PathBuf]) -> Result<DiveClock, LogError> {
     let mut log = DiveLog::open(files)?;
     let clock = of(files, log.times())?;
     let mut found = DiveClock::default();
@@ -82,14 +81,7 @@ pub(crate) fn clocks_of(files: &[PathBuf]) -> Result<(Option<Clock>, DiveClock),
             found.start(log_time);
         }
     }
-    Ok((clock, found))
-}
-
-/// Returns the dive's clock of the log in these files.
-///
-/// Errors: the log can't be read.
-pub fn clock_of(files: &[PathBuf]) -> Result<DiveClock, LogError> {
-    Ok(clocks_of(files)?.1)
+    Ok(found)
 }
 
 /// Counts a message for its clock. Returns `false` if there are too many clocks.

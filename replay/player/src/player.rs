@@ -1,5 +1,6 @@
 //! Provides a recorded dive as a source of packets for the loop.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -30,7 +31,7 @@ pub struct Player {
     too_long: u64,
     /// The clock with the most messages, if the log has several clocks.
     clock: Option<Clock>,
-    dive_clock: DiveClock,
+    dive_clock: OnceCell<DiveClock>,
     /// Whether the dive's clock has started with a packet of one of the loop's sensors.
     is_started: bool,
     /// Messages with timestamps of another clock, by source id: count and first timestamp.
@@ -57,8 +58,8 @@ impl Player {
     ///
     /// Errors: see [`DiveLog::open`].
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
-        let (clock, dive_clock) = clocks::clocks_of(files)?;
         let reader = DiveLog::open(files)?;
+        let clock = clocks::of(files, reader.times())?;
         let ids: Vec<String> = reader.header().sources.iter().map(|source| source.id.clone()).collect();
         Ok(Self {
             sources: vec![None; ids.len()],
@@ -70,7 +71,7 @@ impl Player {
             unmatched: BTreeMap::new(),
             too_long: 0,
             clock,
-            dive_clock,
+            dive_clock: OnceCell::new(),
             is_started: false,
             astray: BTreeMap::new(),
             farthest: (0, Vec::new()),
@@ -136,8 +137,15 @@ impl Player {
     }
 
     /// Returns the dive's clock, the same as the loop's.
+    ///
+    /// Before the first packet is played, the log's beginning is read for it. If that fails, the clock has no zero, and
+    /// playing the log returns the error.
     pub fn dive_clock(&self) -> DiveClock {
-        self.dive_clock
+        let read = || {
+            let paths: Vec<PathBuf> = self.files().iter().map(|file| file.path.clone()).collect();
+            clocks::clock_of(&paths).unwrap_or_default()
+        };
+        *self.dive_clock.get_or_init(read)
     }
 
     /// Returns the number of messages sent to the loop so far.
@@ -177,7 +185,7 @@ impl Player {
     }
 
     fn loss_text(&self, loss: &Loss) -> String {
-        loss.in_dive_time(self.dive_clock).to_string()
+        loss.in_dive_time(self.dive_clock()).to_string()
     }
 
     /// Returns losses and omissions so far, as text. The cut-off end of the last file is left out.
@@ -219,7 +227,7 @@ impl Player {
             }
             if !self.is_started && self.ids.get(index).is_none_or(|id| id != CONSOLE_ID) {
                 // The log may begin with a sensor that the vehicle file doesn't have.
-                (self.dive_clock, self.is_started) = (DiveClock::new(Some(message.log_time)), true);
+                (self.dive_clock, self.is_started) = (DiveClock::new(Some(message.log_time)).into(), true);
             }
             self.bytes.clear();
             self.bytes.extend_from_slice(message.data);

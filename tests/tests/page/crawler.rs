@@ -35,7 +35,6 @@ fn with_golden(name: &str) -> Folder {
 }
 
 #[test]
-#[ignore = "not yet reliable: on a busy machine it may wait for a state of the page"]
 fn screens_agree_at_random_moments_of_golden_dives() {
     let mut found = Vec::new();
     for (seed, name) in (1..).zip(["too-fast", "adrift", "stalls"]) {
@@ -66,7 +65,6 @@ fn screens_agree_at_200_random_moments_of_20_random_dives() {
 
 /// Each change makes one screen contradict the others.
 #[test]
-#[ignore = "not yet reliable: on a busy machine it may wait for a state of the page"]
 fn crawler_finds_every_changed_figure() {
     // At this moment, a limit applies and a missed stretch is outstanding.
     let moment = Crawl::start(&with_golden("too-fast")).visit(20.733, &mut contradictions);

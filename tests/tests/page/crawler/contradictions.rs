@@ -104,8 +104,9 @@ fn within_state(state: &Value, found: &mut Found) {
     };
     for ill in ["stalled", "deaf", "withheld"] {
         for id in is_sensor(ill) {
+            let is_listed = live(state).iter().any(|alert| alert["sensor"] == id);
             found.check(
-                line.contains(id) || state["old"] == true,
+                line.contains(id) || is_listed || state["old"] == true,
                 "faulty sensor of the line",
                 (ill, id, line),
             );
