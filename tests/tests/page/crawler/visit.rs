@@ -91,7 +91,13 @@ impl Crawl {
         self.viewer.send(&json!({"do": "play", "command": "step"}));
         let line = self.lines.visit(from_s);
         let viewer = &mut self.viewer;
-        viewer.until("the moment", |viewer| viewer.state["now_s"] == line["now_s"]);
+        let listed = line["alert_list"].as_array().unwrap();
+        let numbers: Vec<u64> = listed.iter().filter_map(|alert| alert["number"].as_u64()).collect();
+        // The list of alerts may follow after the state.
+        viewer.until("the moment", |viewer| {
+            let has_alerts = numbers.iter().all(|number| viewer.alerts.contains_key(number));
+            viewer.state["now_s"] == line["now_s"] && has_alerts
+        });
         let section_m = viewer.hello["section_m"].as_f64().unwrap();
         let mut metres = [0.0; 5];
         for section in viewer.sections.values() {
