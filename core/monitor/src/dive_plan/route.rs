@@ -249,7 +249,7 @@ struct Route {
 
 /// The plan that covers the most wall within the remaining time, in the least time.
 ///
-/// `passes` are disjoint and ascending, at most [`MOST_PASSES`]. Speeds above the transit speed count as the transit
+/// `passes` are disjoint and ascending, at most `MOST_PASSES`. Speeds above the transit speed count as the transit
 /// speed. Allocates: never.
 pub fn plan(start: &Start, passes: &[Pass], onward: Option<Onward>) -> DivePlan {
     let mut writer = Writer::new(start);
