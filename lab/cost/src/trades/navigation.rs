@@ -12,7 +12,7 @@ use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::DurNs;
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
 use headrace_simulator::{START, Scenery};
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
