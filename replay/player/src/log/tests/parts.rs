@@ -1,6 +1,7 @@
 //! Recordings in parts, which are read as one log. Missing and foreign parts are reported.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use headrace_geometry::time::DurNs;
 
@@ -12,8 +13,10 @@ pub(super) struct Folder(pub(super) PathBuf);
 
 impl Folder {
     pub(super) fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("headrace-parts-{}-{name}", std::process::id()));
-        std::fs::remove_dir_all(&path).ok();
+        // Tests run in parallel, and two of them may use the same name.
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("headrace-parts-{}-{count}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
