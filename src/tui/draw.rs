@@ -27,6 +27,9 @@ const LEAST: (u16, u16) = (40, 10);
 /// Minimum size of the screen at which the allowed speed is also shown in large digits.
 const LARGE: (u16, u16) = (90, 34);
 
+/// Minimum height of the screen at which the plan is shown, rows.
+const ROWS_WITH_PLAN: u16 = 20;
+
 /// Playback state of a replay.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Playing {
@@ -117,6 +120,9 @@ impl Page {
         self.banner(shot, area, &mut rows);
         panels::speed(shot, self.ink, &mut rows);
         panels::place(shot, self.ink, &mut rows);
+        if area.height >= ROWS_WITH_PLAN {
+            panels::plan(shot, &mut rows);
+        }
         self.panels(shot, &mut rows);
         if self.help {
             self.show_help(area, to);

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
+use headrace_monitor::dive_plan::route::DivePlan;
+use headrace_monitor::dive_plan::texts::{fits_text, step_text};
 use headrace_monitor::head_descriptions::HeadDescriptions;
 use headrace_monitor::live_messages::LiveMessage;
 use headrace_monitor::live_state::{Condition, LiveState, SensorState};
@@ -39,6 +41,8 @@ pub(super) struct ScreenFrame {
     pub(super) status: PilotLine,
     /// Text about the factor that limits the speed.
     pub(super) reason: String,
+    /// Whether the plan for the rest of the dive fits into the remaining time, and its next steps; empty without a plan.
+    pub(super) plan: Vec<String>,
     pub(super) sensors: Vec<SensorRow>,
     pub(super) alerts: Vec<AlertRow>,
     /// Number of alerts that aren't in the list.
@@ -145,6 +149,7 @@ impl FrameBuilder {
             stopped,
             status: status_line(&state, profile, heads, &name),
             reason,
+            plan: state.plan.as_ref().map_or_else(Vec::new, |plan| plan_texts(plan, heads)),
             sensors: self.sensors(&state, dive),
             alerts,
             alerts_hidden,
@@ -204,6 +209,13 @@ impl FrameBuilder {
             cells: indexes.into_iter().filter_map(cell).collect(),
         }
     }
+}
+
+/// Whether the plan fits into the remaining time, and its next steps, numbered.
+fn plan_texts(plan: &DivePlan, heads: &HeadDescriptions) -> Vec<String> {
+    let steps = (1..).zip(plan.steps.iter().flatten());
+    let steps = steps.map(|(number, step)| format!("{number}. {}", step_text(step, heads)));
+    core::iter::once(fits_text(plan)).chain(steps).collect()
 }
 
 /// Text about the reason that limits the speed, unless the condition states it already.

@@ -13,6 +13,7 @@ use ratatui::text::{Line, Span};
 
 use super::alerts::AlertRow;
 use super::frame::{ScreenFrame, SensorRow};
+use super::mode::Stop;
 use super::screen_buffer::{Palette, Rows};
 use super::wall::{Cell, Extent, HOURS, Known, Strip, Wall};
 use crate::output::append;
@@ -117,6 +118,15 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     rows.line(Line::from(spans));
     let style = if state.metres.fail_m > 0.0 { ink.style(Lamp::Red) } else { Style::default() };
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
+}
+
+/// Draws the next steps of the plan for the rest of the dive, if there is a plan.
+pub(super) fn plan(shot: &ScreenFrame, rows: &mut Rows<'_>) {
+    if shot.plan.is_empty() || shot.stopped == Some(Stop::Ended) {
+        return;
+    }
+    let parts: Vec<&str> = shot.plan.iter().map(String::as_str).collect();
+    rows.text(&format!("PLAN   {}", fitted(&parts, columns_after_label(rows))), Style::default());
 }
 
 /// Text with the length of each verdict in metres: failed, unsure and uninspected lengths come first. Dots stand for

@@ -222,38 +222,34 @@ pub(crate) fn short_text(action: Action, heads: &HeadDescriptions) -> String {
     text.to_owned()
 }
 
-/// Text of an action for a missed stretch: go back to a chainage, m, then pass at no more than a speed, m/s.
+/// Text of an action for a missed stretch: inspect it again from a chainage, m, at no more than a speed, m/s. The plan of
+/// the dive says when.
 ///
 /// The speed is zero if no known speed meets the target.
 pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadDescriptions) -> String {
-    let back = format!("go back to {}", station(back_to_m));
+    let again = format!("inspect again from {}", station(back_to_m));
     let text = match action {
         // No speed is stated, because the known speed applies only to the present mode and range setting.
-        Action::FinerMode => return format!("slower won't help: {}, then {back}", heads.set_finer()),
-        Action::LongerRange => return format!("set {}, then {back}", heads.longer_range()),
+        Action::FinerMode => return format!("slower won't help: {}, then {again}", heads.set_finer()),
+        Action::LongerRange => return format!("set {}, then {again}", heads.longer_range()),
         // A speed is stated, because a lower speed helps in other parts of the stretch.
-        Action::HigherGain if at_most_mps > 0.0 => format!("{back}, then with a higher gain,"),
+        Action::HigherGain if at_most_mps > 0.0 => format!("{again}, with a higher gain"),
         Action::HigherGain => return "slower won't help: raise the gain, or declare an opening".to_owned(),
-        Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
-        Action::Slower => back,
-        Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
-        Action::Middle => format!("{back}, then in the middle and steady,"),
+        Action::Slower => again,
+        Action::OtherSide => format!("{again}, rolled left, then right"),
+        Action::Middle => format!("{again}, in the middle and steady"),
         // The exact speed is stated, because below this speed, heads at different places along the hull are out of
         // phase again.
         Action::InPhase if at_most_mps > 0.0 => {
-            return format!("{back}, then with the heads in phase, at {}", limit_text(at_most_mps));
+            return format!("{again}, with the heads in phase, at {}", limit_text(at_most_mps));
         }
-        Action::InPhase => format!("{back}, then with the heads in phase,"),
-        Action::Head => format!("{back}, then with that head repaired,"),
-        Action::HeadBack => format!("restore the silent sensor, then {back},"),
-        Action::Position => format!("once the position is back, {back},"),
-        Action::Again => format!("{back}, then drive right through it,"),
+        Action::InPhase => format!("{again}, with the heads in phase"),
+        Action::Head => format!("{again}, with that head repaired"),
+        Action::HeadBack => format!("restore the silent sensor, then {again}"),
+        Action::Position => format!("once the position is back, {again}"),
+        Action::Again => format!("{again}, right through it"),
     };
-    if at_most_mps > 0.0 {
-        format!("{text} at most {}", limit_text(at_most_mps))
-    } else {
-        text.trim_end_matches(',').to_owned()
-    }
+    if at_most_mps > 0.0 { format!("{text}, at most {}", limit_text(at_most_mps)) } else { text }
 }
 
 /// Text of the remedy for a stretch that a lower speed does not help.
@@ -514,29 +510,29 @@ mod tests {
             };
             assert!(with.ends_with(speed) && with.contains("m/s") != speed.is_empty(), "{with:?}");
         }
-        assert_eq!(at(Action::Slower, 0.25), "go back to 1+240.50, then at most 0.25 m/s");
+        assert_eq!(at(Action::Slower, 0.25), "inspect again from 1+240.50, at most 0.25 m/s");
         assert_eq!(
             at(Action::Middle, 0.25),
-            "go back to 1+240.50, then in the middle and steady, at most 0.25 m/s"
+            "inspect again from 1+240.50, in the middle and steady, at most 0.25 m/s"
         );
-        assert_eq!(at(Action::Again, 0.0), "go back to 1+240.50, then drive right through it");
+        assert_eq!(at(Action::Again, 0.0), "inspect again from 1+240.50, right through it");
         assert_eq!(
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25, &two()),
-            "go back to 1+240.50, then at most 0.25 m/s; and again, rolled left, then right"
+            "inspect again from 1+240.50, at most 0.25 m/s; and again, rolled left, then right"
         );
         // A lower speed helps in other parts of the stretch, so the text doesn't state that slower won't
         // help.
         let lossy = [Action::HigherGain, Action::Slower];
         assert_eq!(
             actions_text(&lossy, 1240.5, 0.25, &two()),
-            "go back to 1+240.50, then with a higher gain, at most 0.25 m/s"
+            "inspect again from 1+240.50, with a higher gain, at most 0.25 m/s"
         );
         assert_eq!(
             actions_text(&lossy, 1240.5, 0.0, &two()),
             "slower won't help: raise the gain, or declare an opening"
         );
         let lost = [Action::Slower, Action::Position];
-        let back = "once the position is back, go back to 1+240.50";
+        let back = "once the position is back, inspect again from 1+240.50";
         assert_eq!(actions_text(&lost, 1240.5, 0.25, &two()), format!("{back}, at most 0.25 m/s"));
         assert_eq!(actions_text(&lost, 1240.5, 0.0, &two()), format!("{back}; and slower"));
     }

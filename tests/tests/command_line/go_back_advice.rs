@@ -125,7 +125,7 @@ fn following_the_go_back_advice_clears_every_missed_section() {
     assert!(end(&lines) > 5.0);
     let flag = of(&lines, "flag")[0];
     let text = flag["text"].as_str().unwrap();
-    let words = text.split("go back to 0+").nth(1).unwrap();
+    let words = text.split("inspect again from 0+").nth(1).unwrap();
     let back_m: f64 = words.split(',').next().unwrap().parse().unwrap();
     let at_most_mps: f64 =
         words.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();

@@ -133,7 +133,7 @@ fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     }
     let texts: Vec<String> = texts.into_values().collect();
     assert!(
-        texts.iter().any(|text| text.starts_with("MISSED 0+005") && text.contains("go back to")),
+        texts.iter().any(|text| text.starts_with("MISSED 0+005") && text.contains("inspect again from")),
         "{texts:#?}"
     );
     let different: BTreeSet<&String> = texts.iter().collect();

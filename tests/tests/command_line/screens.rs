@@ -58,7 +58,7 @@ fn piped_output_has_no_colours_and_no_broken_lines() {
     let answer = folder.headrace(&["replay", "dive.mcap"]);
     assert!(!answer.stdout.contains(['\x1b', '\r']));
     let missed = answer.stdout.lines().find(|line| line.contains("MISSED: too fast")).unwrap();
-    assert!(missed.contains(" -> go back to "), "{missed}");
+    assert!(missed.contains(" -> inspect again from "), "{missed}");
     insta::assert_snapshot!(answer.stdout.split("digest").next().unwrap());
 }
 

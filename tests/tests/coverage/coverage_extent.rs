@@ -344,7 +344,7 @@ fn dive_mostly_without_a_position_exits_with_1() {
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
     let gap = answer.stdout.lines().find(|line| line.contains("NO POSITION: scanned for"));
     assert!(
-        gap.is_some_and(|gap| gap.contains("-> once the position is back, go back to ")),
+        gap.is_some_and(|gap| gap.contains("-> once the position is back, inspect again from ")),
         "{}",
         answer.stdout
     );

@@ -48,7 +48,7 @@ fn read(dive: &Loop) -> Option<PilotAdvice> {
     // If all is well, the condition itself states the speed.
     let instruction = if line.action.is_empty() { &line.what[0] } else { &line.action };
     let alerts = view.live_state_json().alert_list;
-    let back = alerts.first().filter(|alert| alert.advice.contains("go back to "));
+    let back = alerts.first().filter(|alert| alert.advice.contains("inspect again from "));
     let missed_m = back.and_then(|alert| Some([alert.from_m?, alert.to_m?])).into_iter().collect();
     let stand = ["stop", "hold still", "stand still"].iter().any(|words| instruction.starts_with(words));
     Some(PilotAdvice { at, v_max_mps: speed_mps(instruction), stand, missed_m })

@@ -162,13 +162,13 @@ fn pilot_line_breaks_between_words_and_before_the_action() {
         place: "0+014.25".to_owned(),
         speed: String::new(),
         what: vec!["MISSED: too fast (0.32 m/s), holes over 0.5 m at 8:00".to_owned()],
-        action: "go back to 0+014.25, then at most 0.09 m/s".to_owned(),
+        action: "inspect again from 0+014.25, at most 0.09 m/s".to_owned(),
         lamp: None,
     };
     insta::assert_snapshot!(line.broken(60).join("\n"), @r"
     0+014.25   MISSED: too fast (0.32 m/s), holes over 0.5 m at
                8:00
-               -> go back to 0+014.25, then at most 0.09 m/s
+               -> inspect again from 0+014.25, at most 0.09 m/s
     ");
     assert_eq!(line.broken(200), [line.text()]);
     let widths = |columns: usize| line.broken(columns).iter().map(|l| l.chars().count()).max().unwrap();

@@ -62,7 +62,7 @@ export class World {
   missed(from_m) {
     return this.raise({ priority: "alarm", class: "coverage", kind: "missed", from_m, to_m: from_m + 6.25, back_to_m: from_m - 2,
       at_most_mps: 0.08, text: `MISSED ${station(from_m).slice(0, -3)} to ${station(from_m + 6.25).slice(0, -3)}, crown left: too fast`,
-      advice: `go back to ${station(from_m - 2).slice(0, -3)}, then at most 0.08 m/s` });
+      advice: `inspect again from ${station(from_m - 2).slice(0, -3)}, at most 0.08 m/s` });
   }
 
   raise(over) {

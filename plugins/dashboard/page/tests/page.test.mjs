@@ -385,7 +385,7 @@ describe("alerts", () => {
     const missed = page.locator(".alert", { hasText: "MISSED 0+149" });
     await missed.waitFor();
     assert.equal(await missed.count(), 1);
-    assert.match(await missed.innerText(), /go back to 0\+147, then at most 0\.08 m\/s/);
+    assert.match(await missed.innerText(), /inspect again from 0\+147, at most 0\.08 m\/s/);
     const other = await again();
     await other.page.locator(".alert.open", { hasText: "MISSED 0+149" }).waitFor();
     await missed.getByRole("button", { name: /Ack alert/ }).click();

@@ -130,7 +130,7 @@ fn missed_stretch_is_announced_once_when_raised_and_once_when_cleared() {
     let made = taken(&mut view, "judgements", 1, &raised);
     assert_eq!(
         made["alerts"][0]["message"],
-        "ch 0+010.00  too fast (0.30 m/s): holes over 0.5 m at 12 o'clock; go back to 0+009.50"
+        "ch 0+010.00  too fast (0.30 m/s): holes over 0.5 m at 12 o'clock; inspect again from 0+009.50"
     );
     assert_eq!((&made["alerts"][0]["level"], &made["sections"][0]["flagged"]), (&3.into(), &true.into()));
     let grown = [run(RunChange::Changed), section(2, 41, Judgement::Raised, Verdict::Fail)];

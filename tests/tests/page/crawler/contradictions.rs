@@ -184,7 +184,7 @@ fn legs(moment: &Moment, alert: &Value, found: &mut Found) {
     let leg = back["legs"].as_array().unwrap().iter().find(same);
     if let Some(leg) = leg.filter(|_| alert["state"] == "active") {
         let (advice, back_m) = (text(alert, "/advice").unwrap(), number(leg, "/back_to_m").unwrap());
-        let is_stated = !advice.contains("go back to ") || advice.contains(&station(back_m));
+        let is_stated = !advice.contains("inspect again from ") || advice.contains(&station(back_m));
         found.check(is_stated, "place to go back to", (advice, back_m));
         found.check(leg["at_most_mps"] == alert["at_most_mps"], "speed of the way back", (leg, alert));
     }
