@@ -28,7 +28,7 @@ const LEAST: (u16, u16) = (40, 10);
 const LARGE: (u16, u16) = (90, 34);
 
 /// Minimum height of the screen at which the plan is shown, rows.
-const ROWS_WITH_PLAN: u16 = 20;
+const ROWS_WITH_PLAN: u16 = 24;
 
 /// Playback state of a replay.
 #[derive(Debug, Clone, Copy)]
