@@ -106,7 +106,7 @@ impl Resuming {
         }
         let gap = set_clock(longest);
         let to = longest.last + gap;
-        let clock = clock_of(&longest.files)?;
+        let clock = clock_of_first(&longest.files);
         let last_part = longest.last_part().display().to_string();
         let stated = |recording: Unfinished| {
             let seconds = to.since(recording.last).as_secs_f64();
@@ -159,7 +159,7 @@ impl Resuming {
 
     /// Begins to rebuild the dive's state, and makes the loop of `dive` only record until then.
     ///
-    /// Errors: the log can't be opened, or the loop can't be armed.
+    /// Errors: the loop can't be armed, or the thread can't be started.
     pub(crate) fn begin(&self, vehicle: &VehicleConfig, dive: &mut Dive) -> Result<Rebuild, Failure> {
         let next_tick = self.recordings.iter().map(|interrupted| interrupted.recording.next_tick()).max();
         dive.armed.hold(next_tick.unwrap_or(0));
@@ -260,6 +260,12 @@ fn is_same_vehicle(recorded: &LogInfo, vehicle: &VehicleConfig, text: &str) -> b
     };
     lines(recorded.vehicle_toml.as_deref().unwrap_or_default()) == lines(text)
         && vehicle.attachments.iter().all(attached)
+}
+
+/// The clock of a dive. It starts in the first part with a packet of a sensor, and later parts aren't opened.
+fn clock_of_first(files: &[PathBuf]) -> DiveClock {
+    let clock = |file: &PathBuf| clock_of(std::slice::from_ref(file)).ok();
+    files.iter().filter_map(clock).find(|clock| clock.zero().is_some()).unwrap_or_default()
 }
 
 /// Sets the dive's clock so that it continues the clock of the interrupted dive. Returns the time without data.

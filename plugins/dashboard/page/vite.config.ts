@@ -7,7 +7,8 @@ const proxy = { "/feed": to, "/samples": to, "/state.json": to, "/login": to, "/
 
 // Two files with fixed names beside index.html, so that the program always embeds the same list of files.
 export default defineConfig({
-  base: "/",
+  // Relative: BlueOS serves the page below a path of its own.
+  base: "./",
   server: { proxy },
   preview: { proxy },
   build: {

@@ -72,15 +72,15 @@ impl Rebuild {
     /// `saved` is the path of a state saved during the dive. If it fits the log and this program, only the rest of the
     /// log is replayed.
     ///
-    /// Errors: the log can't be opened, or the thread can't be started.
+    /// Errors: the thread can't be started.
     pub fn start(mut dive: Loop, files: Vec<PathBuf>, saved: PathBuf) -> Result<Self, LogError> {
-        let mut player = Player::open(&files)?;
-        player.connect(dive.sources());
         let (packets, live) = unbounded();
         let progress = Arc::new(Progress::default());
         let shared = Arc::clone(&progress);
         let thread = std::thread::Builder::new().name("rebuild".to_owned());
         let thread = thread.spawn(move || {
+            let mut player = Player::open(&files)?;
+            player.connect(dive.sources());
             let mut source = Rejoined {
                 player,
                 live,

@@ -1,4 +1,4 @@
-//! Checks the archive that `deploy/blueos-image` makes for BlueOS.
+//! Checks the archive that `deploy/blueos-image` makes for BlueOS, and the wheel that `deploy/wheel` makes for pip.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -70,6 +70,34 @@ fn blueos_image_contains_the_program() {
     let read = |label: &str| serde_json::from_str::<Value>(labels[label].as_str().unwrap()).unwrap();
     assert!(read("authors")[0]["name"].is_string() && read("company")["name"].is_string());
     assert_eq!(read("permissions")["HostConfig"]["NetworkMode"], "host");
+}
+
+/// The wheel's list of files states the program's digest, and pip makes the program executable.
+#[test]
+fn wheel_contains_the_program() {
+    let folder = Folder::new();
+    let at = |name: &str| folder.path(name);
+    std::fs::write(at("program"), program()).unwrap();
+    let make = || {
+        let mut command = Command::new("python3");
+        command.arg(root().join("deploy/wheel")).arg(at("program")).args(["1.2.3", "aarch64"]);
+        command.arg(at("")).env("SOURCE_DATE_EPOCH", "1800000000").output().ok()
+    };
+    let Some(output) = make() else { return headrace_tests::skipped("python3 is not there") };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let name = "headrace_program-1.2.3-py3-none-manylinux2014_aarch64.musllinux_1_1_aarch64.whl";
+    let first = digest(at(name));
+    make();
+    assert_eq!(digest(at(name)), first, "the same bytes");
+    let read = "import csv, sys, zipfile, hashlib, base64
+wheel = zipfile.ZipFile(sys.argv[1])
+for name, digest, size in csv.reader(wheel.read('headrace_program-1.2.3.dist-info/RECORD').decode().splitlines()):
+    content = wheel.read(name)
+    found = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).decode().rstrip('=')
+    assert name.endswith('/RECORD') or (digest, size) == ('sha256=' + found, str(len(content))), name
+assert wheel.read('headrace_program-1.2.3.data/scripts/headrace') == open(sys.argv[2], 'rb').read()";
+    let read = Command::new("python3").args(["-c", read]).args([at(name), at("program")]).output().unwrap();
+    assert!(read.status.success(), "{}", String::from_utf8_lossy(&read.stderr));
 }
 
 /// The image contains no libraries. The script therefore refuses programs that need a library. It also refuses files

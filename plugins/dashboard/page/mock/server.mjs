@@ -107,6 +107,8 @@ export async function serve(options = {}) {
     return { alerts: world.alerts, notes: world.notes, at_m: world.at_m, playback: world.playback, clients: clients.size, seq };
   };
 
+  // Path below which a proxy serves the program.
+  const below = options.below ?? "";
   const allowed = (request) => token === null || (request.headers.cookie ?? "").includes(`mock=${token}`);
   const http = createServer((request, response) => {
     const url = new URL(request.url, "http://localhost");
@@ -121,6 +123,8 @@ export async function serve(options = {}) {
       return undefined;
     }
     if (closed) return request.socket.destroy();
+    if (!url.pathname.startsWith(`${below}/`)) return answer(404, "text/plain", "not found");
+    url.pathname = url.pathname.slice(below.length).replace(/^\/widget(?=\/assets\/)/, "");
     if (url.pathname === "/login") {
       if (spent) return answer(429, "text/plain", "too many wrong tokens");
       const right = url.searchParams.get("token") === token;
@@ -155,7 +159,7 @@ export async function serve(options = {}) {
   });
   const sockets = new WebSocketServer({ noServer: true, handleProtocols: () => "headrace.feed.1" });
   http.on("upgrade", (request, socket, head) => {
-    if (closed) return socket.destroy();
+    if (closed || !request.url.startsWith(`${below}/feed`)) return socket.destroy();
     if (!allowed(request)) return socket.end("HTTP/1.1 401 Unauthorized\r\nconnection: close\r\n\r\n");
     sockets.handleUpgrade(request, socket, head, (client) => {
       const query = new URL(request.url, "http://localhost").searchParams;

@@ -96,6 +96,14 @@ describe("display", () => {
     }
   });
 
+  it("works below a path that a proxy adds", async () => {
+    for (const path of ["/extension/headrace/", "/extension/headrace/widget/wall"]) {
+      await on({ below: "/extension/headrace" }, async ({ page }) => {
+        await page.waitForFunction(() => performance.getEntriesByType("resource").some(({ name }) => name.includes("/extension/headrace/samples?")));
+      }, { path });
+    }
+  });
+
   it("shows everything except the wall without WebGL2", () => on({}, async ({ page }) => {
     await page.locator(".missing", { hasText: "no WebGL2" }).waitFor();
     await condition(page, "good");

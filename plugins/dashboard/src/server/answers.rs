@@ -41,6 +41,7 @@ pub(super) fn router(shared: Arc<Shared>) -> Router {
         .route("/widget/wall", get(page))
         .route("/widget/alerts", get(page))
         .route("/assets/{*path}", get(asset))
+        .route("/widget/assets/{*path}", get(asset))
         .route("/feed", get(socket))
         .route("/feed.jsonl", get(lines))
         .route("/samples", get(samples))
@@ -140,7 +141,8 @@ async fn asset(Path(path): Path<String>) -> Response {
 ///
 /// Only this token counts. A cookie sent with the request is from an earlier login and is ignored.
 async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMap, uri: Uri) -> Response {
-    let home = [(header::LOCATION, "/")];
+    // Relative, because a proxy may serve the page below a path.
+    let home = [(header::LOCATION, "./")];
     if shared.access.tokens.is_none() {
         return (StatusCode::SEE_OTHER, home).into_response();
     }

@@ -18,7 +18,7 @@ pub(super) fn service() -> Value {
         "webpage": "",
         "api": "",
         "new_page": true,
-        "works_in_relative_paths": false,
+        "works_in_relative_paths": true,
         "extras": {"cockpit": EXTRAS},
     })
 }

@@ -9,7 +9,6 @@ use std::time::SystemTime;
 use headrace_geometry::time::{DiveClock, MonoNs};
 
 use super::backlog::Tally;
-use super::dive_log::DiveLog;
 use super::error::LogError;
 use super::format::Tick;
 use super::loss::{Loss, LossKind};
@@ -84,7 +83,7 @@ impl Unfinished {
             // Some file systems have no locks.
             Ok((Err(TryLockError::Error(_)), _)) | Err(_) => None,
         };
-        let span = DiveLog::open(&files)?.times();
+        let span = span_of(&files);
         let mut reader = LogReader::open(&last_file)?;
         let topics: BTreeMap<u16, String> =
             reader.channels().map(|channel| (channel.id, channel.topic.to_owned())).collect();
@@ -195,6 +194,15 @@ impl Unfinished {
     pub(super) fn tally(&self, header: &LogHeader) -> Tally {
         Tally::of(&self.progress, header, self.last)
     }
+}
+
+/// Returns the first and last log time of a recording's files. Only the first and last files with data are opened: a dive
+/// goes on after a failure within 2 s, even if it has hundreds of parts.
+fn span_of(files: &[PathBuf]) -> Option<(MonoNs, MonoNs)> {
+    let times = |file: &PathBuf| LogReader::open(file).ok()?.times();
+    let (first, _) = files.iter().find_map(times)?;
+    let (_, last) = files.iter().rev().find_map(times)?;
+    Some((first, last))
 }
 
 /// Returns the last part of a recording and its metadata, if the recording has data, did not end in order, and isn't being

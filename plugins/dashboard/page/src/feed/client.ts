@@ -31,10 +31,13 @@ export function start(): void {
     );
     return;
   }
-  feed = new Feed(store, new URL(location.href));
+  feed = new Feed(store, base());
   feed.start();
   document.addEventListener("visibilitychange", () => feed?.send({ do: "rate", hz: document.hidden || prefs.slow ? 1 : 5 }));
 }
+
+/** The program's address. A proxy may serve it below a path. Widgets are one folder deeper. */
+const base = (): URL => new URL(location.pathname.includes("/widget/") ? ".." : ".", location.href);
 
 /** Sends a command; returns whether it was sent. */
 export function send(command: Command): boolean {
@@ -52,7 +55,7 @@ export const beginVoice = (id: number, by: string): boolean => send({ do: "voice
 
 /** Sends the recording of a voice note. If the program refuses it, throws the reason. */
 export async function sendVoice(id: number, seconds: number, sound: Blob): Promise<void> {
-  const url = new URL(`/voice/${id}`, location.href);
+  const url = new URL(`voice/${id}`, base());
   url.searchParams.set("seconds", String(seconds));
   const sent = fetch(url, { method: "POST", body: sound, headers: { "content-type": sound.type }, credentials: "same-origin" });
   const response = await sent.catch(() => { throw new Error("the voice note is not sent: not connected to the program"); });
@@ -68,7 +71,7 @@ export async function voiceOf(id: number): Promise<Blob> {
     if (!sound) throw new Error("its recording isn't in this file");
     return sound;
   }
-  const response = await fetch(new URL(`/voice/${id}`, location.href), { credentials: "same-origin" });
+  const response = await fetch(new URL(`voice/${id}`, base()), { credentials: "same-origin" });
   if (!response.ok) throw new Error((await response.text()).trim());
   return response.blob();
 }
@@ -98,7 +101,7 @@ export function stepFile(by: number): void {
 /** Returns the samples between two chainages, from the program or the file, and the thinning step. */
 export async function samples(from_m: number, to_m: number, signal: AbortSignal): Promise<{ frame: Frame; oneOf: number }> {
   if (dive) return { frame: fromFile(dive, from_m, to_m), oneOf: store.hello?.thinned ? 2 : 1 };
-  const url = new URL("/samples", location.href);
+  const url = new URL("samples", base());
   url.searchParams.set("from_m", from_m.toFixed(2));
   url.searchParams.set("to_m", to_m.toFixed(2));
   const response = await fetch(url, { signal, credentials: "same-origin" });

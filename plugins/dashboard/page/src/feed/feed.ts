@@ -40,7 +40,7 @@ export class Feed {
 
   /** Sends the token, which the server stores as a cookie. Returns the reason of a refusal, or an empty text. */
   async login(token: string): Promise<string> {
-    const url = new URL("/login", this.base);
+    const url = new URL("login", this.base);
     url.searchParams.set("token", token);
     const response = await fetch(url, { redirect: "manual", credentials: "same-origin" });
     if (response.status === 429) return "Too many wrong tokens from here: wait some seconds and try again.";
@@ -52,7 +52,7 @@ export class Feed {
 
   private connect(): void {
     clearTimeout(this.timer);
-    const url = new URL("/feed", this.base);
+    const url = new URL("feed", this.base);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
     if (this.store.instance !== "") {
       url.searchParams.set("instance", this.store.instance);
@@ -104,7 +104,7 @@ export class Feed {
     this.lost(reason);
     if (opened) return;
     try {
-      const response = await fetch(new URL("/state.json", this.base), { credentials: "same-origin" });
+      const response = await fetch(new URL("state.json", this.base), { credentials: "same-origin" });
       if (response.status === 401 && this.store.link.phase !== "open") {
         clearTimeout(this.timer);
         this.phase("refused", "");
