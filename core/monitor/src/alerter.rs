@@ -6,7 +6,7 @@ use super::alert_list::{AdviceUpdate, AlertList, AlertOutputs, MOST_LISTED, RunI
 use super::console::command::Command;
 use super::console::packets::ReceivedCommand;
 use super::dive_plan::planner::{Now, PlanSettings, Planner};
-use super::dive_plan::route::StepKind;
+use super::dive_plan::route::{DiveStep, StepKind};
 use super::live_state::{LiveState, PositionDoubt, PositionState, source_bits};
 use super::merge::MAX_TICK_PACKETS;
 use super::messages::{Doubts, Event, Notice, PlacedItem, Placement, Standing, Update};
@@ -169,12 +169,17 @@ impl Alerter {
 
     /// Plans the rest of the dive. While the vehicle goes back, its destination is that of the plan.
     fn plan(&mut self, at: MonoNs, situation: &Situation, standing: &Standing) {
-        let v_max_mps = self.state.v_max_mps().filter(|_| self.state.position == PositionState::Ok);
-        let now = Now { at, situation, v_max_mps, left_s: self.list.time_left_s(at) };
+        let is_sure = self.state.position == PositionState::Ok;
+        let v_max_mps = self.state.v_max_mps().filter(|_| is_sure);
+        let now = Now { at, situation, is_sure, v_max_mps, left_s: self.list.time_left_s(at) };
         self.state.plan = self.planner.update(&now, &standing.missed, self.state.plan);
         let next = self.state.plan.and_then(|plan| plan.steps.first().copied().flatten());
-        let back = next.filter(|step| step.kind == StepKind::Go && step.to_m < step.from_m);
-        self.state.back_to_m = self.state.back_to_m.map(|to_m| back.map_or(to_m, |step| step.to_m));
+        self.state.back_to_m = self.state.back_to_m.and_then(|to_m| match next {
+            // On a pass outward the limit applies.
+            Some(DiveStep { kind: StepKind::Inspect, from_m, to_m, .. }) if to_m < from_m => None,
+            Some(DiveStep { kind: StepKind::Go, from_m, to_m, .. }) if to_m < from_m => Some(to_m),
+            _ => Some(to_m),
+        });
     }
 
     pub(super) fn save(&self, to: &mut Saver) {

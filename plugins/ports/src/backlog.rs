@@ -80,19 +80,33 @@ impl ReadTimes {
         if let Some(last) = self.last {
             self.reads = self.reads.saturating_add(1);
             let weight = 1.0 / f64::from(self.reads).min(AVERAGED);
-            // One long gap says little about the device's period.
-            let longest_ns = (2.0 * UNUSUAL * self.gap_ns).max(SHORTEST.0 as f64);
-            let longest_ns = if self.reads > KNOWN_AFTER { longest_ns } else { f64::INFINITY };
-            let gap_ns = (received.since(last).0 as f64).clamp(0.0, longest_ns);
+            // One long gap or one long read says little about the device's usual messages.
+            let is_known = self.reads > KNOWN_AFTER;
+            let most = |usual: f64| if is_known { 2.0 * UNUSUAL * usual } else { f64::INFINITY };
+            let gap_ns = received.since(last).0 as f64;
+            let gap_ns = gap_ns.clamp(0.0, most(self.gap_ns).max(SHORTEST.0 as f64));
             self.gap_ns += weight * (gap_ns - self.gap_ns);
-            self.bytes += weight * (bytes as f64 - self.bytes);
+            self.bytes += weight * ((bytes as f64).min(most(self.bytes)) - self.bytes);
         }
         self.last = Some(received);
     }
 
     /// Takes all bytes that waited until `now`. Returns their times; `None` if they did not arrive late.
+    ///
+    /// If the program itself was late, the read says nothing about the device. Otherwise the device may have changed its
+    /// period or its messages, so the read counts like any other.
     pub(crate) fn take_waiting(&mut self, now: MonoNs, bytes: usize, is_late: bool) -> Option<Spread> {
-        let after = self.last.replace(now)?;
+        let spread = self.spread(now, bytes, is_late);
+        if is_late {
+            self.last = Some(now);
+        } else {
+            self.take(now, bytes);
+        }
+        spread
+    }
+
+    fn spread(&self, now: MonoNs, bytes: usize, is_late: bool) -> Option<Spread> {
+        let after = self.last?;
         let gap_ns = now.since(after).0 as f64;
         let messages = bytes as f64 / self.bytes.max(1.0);
         if !is_late && messages < LEAST_MESSAGES.max(LEAST_SHARE * gap_ns / self.gap_ns.max(1.0)) {
@@ -178,6 +192,24 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn device_that_changes_its_period_and_its_messages_soon_gets_the_times_of_arrival_again() {
+        let mut times = ReadTimes::default();
+        // Ten answers of 13 bytes in quick succession, then a profile of 236 bytes every 100 ms.
+        (0..10).for_each(|k| times.take(at_ms(4 * k), 13));
+        let is_spread = |k: i64| {
+            let now = at_ms(100 * k);
+            let is_burst = times.may_be_burst(now, false);
+            if !is_burst {
+                times.take(now, 236);
+            }
+            is_burst && times.take_waiting(now, 236, false).is_some()
+        };
+        let spread: Vec<bool> = (1..60).map(is_spread).collect();
+        let last = spread.iter().rposition(|is_spread| *is_spread);
+        assert!(last.is_some_and(|last| last < 16), "{last:?}: {spread:?}");
     }
 
     #[test]

@@ -416,7 +416,8 @@ impl LineService {
         let Some((received, count)) = read else { return Ok(()) };
         open.knock_at = now + KNOCK_PERIOD;
         let bytes = buffer.get(..count).unwrap_or_default();
-        if open.times.may_be_burst(received, is_late) {
+        // The kernel states when it received a CAN frame, also if the frame is read late.
+        if !self.is_on(&[Carrier::Can]) && open.times.may_be_burst(received, is_late) {
             return self.read_waiting(open, (received, bytes), is_late);
         }
         open.times.take(received, count);
@@ -462,8 +463,7 @@ impl LineService {
         parts: &[(MonoNs, Vec<u8>)],
         spread: &Spread,
     ) -> io::Result<()> {
-        let is_stream = |connect: &Connect| matches!(connect.carrier(), Carrier::Serial | Carrier::Tcp);
-        let is_stream = self.connect.as_ref().is_ok_and(is_stream);
+        let is_stream = self.is_on(&[Carrier::Serial, Carrier::Tcp]);
         let mut before = 0;
         for (_, bytes) in parts {
             let part_bytes = if is_stream { spread.part_bytes() } else { bytes.len().max(1) };
@@ -473,6 +473,11 @@ impl LineService {
             }
         }
         Ok(())
+    }
+
+    /// Whether the line's connection is on one of these carriers.
+    fn is_on(&self, carriers: &[Carrier]) -> bool {
+        self.connect.as_ref().is_ok_and(|connect| carriers.contains(&connect.carrier()))
     }
 
     fn read_once(

@@ -39,7 +39,7 @@ impl Missed {
         }
     }
 
-    /// One pass over both stretches, at the lower speed.
+    /// One pass over both stretches, at the lower speed, with the changes that either of them needs.
     fn joined(&self, other: &Self) -> Self {
         let speeds = [self.at_most_mps, other.at_most_mps].into_iter().filter(|mps| *mps > 0.0);
         Self {
@@ -48,6 +48,10 @@ impl Missed {
             missed_m: self.missed_m + other.missed_m,
             at_most_mps: speeds.reduce(f64::min).unwrap_or(0.0),
             is_rolled: self.is_rolled || other.is_rolled,
+            changes: Changes {
+                causes: self.changes.causes.union(other.changes.causes),
+                is_beyond_speed: self.changes.is_beyond_speed || other.changes.is_beyond_speed,
+            },
             ..if self.near_m <= other.near_m { *self } else { *other }
         }
     }
@@ -104,6 +108,7 @@ impl MissedList {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use headrace_coverage::Causes;
 
     fn missed(near_m: f64, far_m: f64, at_most_mps: f64) -> Missed {
         Missed {
@@ -131,6 +136,17 @@ mod tests {
         let found: Vec<_> =
             list.iter().map(|entry| (entry.near_m, entry.far_m, entry.at_most_mps, entry.missed_m)).collect();
         assert_eq!(found, [(5.0, 15.0, 0.09, 3.0), (20.0, 24.0, 0.1, 1.0)]);
+    }
+
+    #[test]
+    fn pass_over_two_stretches_has_the_changes_of_both() {
+        let with = |cause, is_beyond_speed| Changes { causes: Causes::of(cause), is_beyond_speed };
+        let mut list = MissedList::default();
+        list.add(Missed { changes: with(Cause::TooFast, false), ..missed(5.0, 9.0, 0.09) });
+        list.add(Missed { changes: with(Cause::MissingReturns, true), ..missed(8.0, 15.0, 0.0) });
+        let causes = Causes::of(Cause::TooFast).with(Cause::MissingReturns);
+        let found: Vec<_> = list.iter().map(|entry| entry.changes).collect();
+        assert_eq!(found, [Changes { causes, is_beyond_speed: true }]);
     }
 
     #[test]

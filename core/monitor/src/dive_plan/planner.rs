@@ -11,6 +11,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::HeadMotion;
 use headrace_sampling::passes::{Phasing, Situation};
 
+/// Chainage of the portal, at which a dive ends, m.
+const PORTAL_M: f64 = 0.0;
 /// Interval between two plans, unless the missed stretches change.
 const EVERY: DurNs = DurNs(1_000_000_000);
 /// Distance from the end of a pass within which the pass begins, m.
@@ -45,6 +47,8 @@ pub(crate) struct PlanSettings {
 pub(crate) struct Now<'a> {
     pub(crate) at: MonoNs,
     pub(crate) situation: &'a Situation,
+    /// Whether the position is known well enough.
+    pub(crate) is_sure: bool,
     /// Largest speed, m/s; `None` if the position is doubtful, or no speed meets the target.
     pub(crate) v_max_mps: Option<f64>,
     /// Remaining time, s; `None` if it is unlimited.
@@ -106,8 +110,10 @@ impl Planner {
         };
         let speed_mps = now.situation.speed_mps;
         let progress = &mut self.progress;
-        let [first_m, least_m, most_m] = progress.visited_m.unwrap_or([x_m; 3]);
-        progress.visited_m = Some([first_m, least_m.min(x_m), most_m.max(x_m)]);
+        if now.is_sure || progress.visited_m.is_none() {
+            let [first_m, least_m, most_m] = progress.visited_m.unwrap_or([x_m; 3]);
+            progress.visited_m = Some([first_m, least_m.min(x_m), most_m.max(x_m)]);
+        }
         if speed_mps > -SLOW_MPS {
             progress.inward_mps = now.v_max_mps.or(progress.inward_mps);
         }
@@ -118,7 +124,7 @@ impl Planner {
         let mut passes = self.passes(now.situation, missed);
         let had = self.progress.begun;
         self.follow(x_m, speed_mps, &passes, before);
-        let begun = self.begun(x_m, &mut passes);
+        let begun = self.begun(x_m, now.left_s, &mut passes);
         let now_missed = (missed.iter().count(), missed.iter().map(|entry| entry.missed_m).sum::<f64>());
         let is_due = self.progress.planned.is_none_or(|(at, count, missed_m)| {
             now.at.since(at).0 >= EVERY.0 || count != now_missed.0 || (missed_m - now_missed.1).abs() > 1e-9
@@ -129,8 +135,13 @@ impl Planner {
             return before;
         }
         self.progress.planned = Some((now.at, now_missed.0, now_missed.1));
-        let start =
-            Start { x_m, home_m: 0.0, transit_mps: self.settings.transit_mps, left_s: now.left_s, begun };
+        let start = Start {
+            x_m,
+            home_m: PORTAL_M,
+            transit_mps: self.settings.transit_mps,
+            left_s: now.left_s,
+            begun,
+        };
         let (list, count) = passes.packed(start.x_m);
         Some(plan(&start, list.get(..count).unwrap_or_default(), self.onward(x_m)))
     }
@@ -162,7 +173,8 @@ impl Planner {
             let pass = entry.pass(inward_mps, last.1);
             let is_half = self.progress.rolled == Some(pass.run) && pass.roll == Roll::Left;
             let roll = if is_half { Roll::Right } else { pass.roll };
-            *slot = Some(Pass { far_m: pass.far_m.min(farthest_m), roll, ..pass });
+            let far_m = pass.far_m.min(farthest_m);
+            *slot = Some(Pass { near_m: pass.near_m.max(PORTAL_M).min(far_m), far_m, roll, ..pass });
         }
         passes
     }
@@ -196,14 +208,19 @@ impl Planner {
     }
 
     /// The rest of the pass that the vehicle is making. Its stretch is removed from `passes`, unless a second pass is
-    /// due.
-    fn begun(&mut self, x_m: f64, passes: &mut PassList) -> Option<DiveStep> {
+    /// due. `None` if the remaining time does not suffice for it and for the way home.
+    fn begun(&mut self, x_m: f64, left_s: Option<f64>, passes: &mut PassList) -> Option<DiveStep> {
         let Begun { is_inward, .. } = self.progress.begun?;
         let slot = passes.at(x_m).and_then(|number| passes.0.get_mut(number))?;
         let pass = (*slot)?;
         let (to_m, mps) =
             if is_inward { (pass.far_m, pass.inward_mps) } else { (pass.near_m, pass.outward_mps) };
         let is_over = if is_inward { x_m >= to_m } else { x_m <= to_m };
+        let takes_s = (to_m - x_m).abs() / mps.min(self.settings.transit_mps)
+            + (to_m - PORTAL_M).abs() / self.settings.transit_mps;
+        if !is_over && left_s.is_some_and(|left_s| left_s < takes_s) {
+            return None;
+        }
         if is_over && pass.roll == Roll::Left {
             (self.progress.rolled, self.progress.begun) = (Some(pass.run), None);
             *slot = Some(Pass { roll: Roll::Right, ..pass });

@@ -208,7 +208,7 @@ impl Pass {
 
     /// Share of the pass that covers no missed wall.
     fn run_up_share(&self) -> f64 {
-        1.0 - self.missed_m / (self.far_m - self.near_m)
+        (1.0 - self.missed_m / (self.far_m - self.near_m)).max(0.0)
     }
 
     fn offer(&self, way: Way, more_s: f64) -> Offer {

@@ -24,9 +24,11 @@ pub struct ReturningHeads {
     known: HeadSet,
     /// Time of each head's last return.
     returned: [Option<MonoNs>; MAX_HEADS],
+    /// Smallest step of the heads that had not just returned, at the latest update with such heads.
+    usual_rad: Option<f64>,
 }
 
-stateful!(ReturningHeads { state: present, known, returned; });
+stateful!(ReturningHeads { state: present, known, returned, usual_rad; });
 
 impl ReturningHeads {
     /// Returns the situation without heads that are on their way to their program.
@@ -53,7 +55,9 @@ impl ReturningHeads {
         let has_joined = |head: usize| in_step.has(head) && in_step.iter().any(|other| steady.has(other));
         let step_rad =
             |head: usize| situation.heads.get(head).copied().flatten().map(|motion| motion.step_rad);
-        let usual_rad = steady.iter().filter_map(step_rad).fold(f64::INFINITY, f64::min);
+        // If all heads return together, their steps before the silence tell.
+        self.usual_rad = steady.iter().filter_map(step_rad).reduce(f64::min).or(self.usual_rad);
+        let usual_rad = self.usual_rad.unwrap_or(f64::INFINITY);
         let is_coarse = |head: usize| step_rad(head).is_some_and(|step_rad| step_rad > COARSE * usual_rad);
         let mut counted = *situation;
         for (head, slot) in counted.heads.iter_mut().enumerate() {

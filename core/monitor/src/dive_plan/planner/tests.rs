@@ -38,7 +38,7 @@ impl Dive {
         let situation = Situation { speed_mps: self.speed_mps, ..situation(Some(self.x_m)) };
         let at = MonoNs(0) + DurNs::from_secs_f64(STEP_S * f64::from(self.updates));
         self.updates += 1;
-        let now = Now { at, situation: &situation, v_max_mps: Some(0.1), left_s: self.left_s };
+        let now = Now { at, situation: &situation, is_sure: true, v_max_mps: Some(0.1), left_s: self.left_s };
         self.plan = self.planner.update(&now, &list, self.plan);
         self.plan?.steps[0]
     }
@@ -131,7 +131,7 @@ fn no_plan_is_made_without_a_position_or_a_missed_stretch() {
     let mut dive = Dive::at(30.0, &[]);
     assert_eq!(dive.update(), None);
     let now_without = situation(None);
-    let now = Now { at: MonoNs(0), situation: &now_without, v_max_mps: None, left_s: None };
+    let now = Now { at: MonoNs(0), situation: &now_without, is_sure: false, v_max_mps: None, left_s: None };
     let mut list = MissedList::default();
     list.add(missed(0, 10.0, 20.0, false));
     assert_eq!(dive.planner.update(&now, &list, None), None);

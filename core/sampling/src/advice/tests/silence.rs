@@ -129,6 +129,27 @@ impl Vehicle {
     }
 }
 
+/// The heads' supply fails, and all heads go home together when it returns.
+#[test]
+fn heads_that_all_return_together_count_once_they_turn_in_their_usual_steps() {
+    for vehicle in &VEHICLES {
+        let usual = vehicle.case(vehicle.planned_mps).situation;
+        let silent = Situation { heads: usual.heads.map(|_| None), ..usual };
+        let mut homing = usual;
+        for motion in homing.heads.iter_mut().flatten() {
+            (motion.rate_radps, motion.step_rad) = (motion.rate_radps.signum() * 2.8, 0.042);
+        }
+        let mut returning = ReturningHeads::default();
+        let mut counted = |at_s: i64, situation: &Situation| {
+            let at = MonoNs(0) + DurNs::from_millis(1000 * at_s);
+            returning.left_out(at, situation).heads.iter().flatten().count()
+        };
+        let all = counted(0, &usual);
+        assert!(all > 0 && counted(1, &silent) == 0);
+        assert_eq!([counted(6, &homing), counted(7, &homing), counted(8, &usual)], [0, 0, all]);
+    }
+}
+
 /// Numbers from a seed.
 fn drawn(seed: &mut u64, from: f64, to: f64) -> f64 {
     *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
