@@ -72,7 +72,7 @@ fn blueos_image_contains_the_program() {
     assert_eq!(read("permissions")["HostConfig"]["NetworkMode"], "host");
 }
 
-/// The wheel's list of files states the program's digest, and pip makes the program executable.
+/// The wheel's list of files states the digest of each file.
 #[test]
 fn wheel_contains_the_program() {
     let folder = Folder::new();

@@ -116,6 +116,27 @@ fn recorder_dropped_without_an_orderly_end_can_be_continued() {
 }
 
 #[test]
+fn parts_between_the_first_and_the_last_are_not_opened_before_a_dive_goes_on() {
+    let folder = Folder::new("between");
+    let recording = folder.0.join("dive.mcap");
+    let rotation = Rotation { every: None, dive: "one".to_owned() };
+    record(Recorder::create(&recording, &header(true), &rotation, QUEUE_BYTES, None).unwrap(), 0..50);
+    let cut_to_3_quarters = |path: &Path| cut(path, std::fs::metadata(path).unwrap().len() * 3 / 4);
+    cut_to_3_quarters(&recording);
+    for part in [2, 3] {
+        go_on(&recording);
+        cut_to_3_quarters(&folder.part(part));
+    }
+    let span = || Unfinished::read(&recording).unwrap().unwrap().span;
+    let (before, files) = (span(), files_of(std::slice::from_ref(&recording)).unwrap());
+    assert_eq!(before, DiveLog::open(&files).unwrap().times());
+    // Opening all parts finds that one of them occurs twice.
+    std::fs::copy(folder.part(3), folder.part(2)).unwrap();
+    assert!(DiveLog::open(&files).is_err());
+    assert_eq!(span(), before);
+}
+
+#[test]
 fn part_cut_within_its_header_does_not_prevent_the_continuation() {
     let folder = Folder::new("header");
     let recording = folder.0.join("dive.mcap");
