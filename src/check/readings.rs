@@ -161,10 +161,15 @@ mod tests {
         readings
     }
 
-    /// Values of this pattern have the standard deviation 1 within a few percent.
+    /// Pseudorandom values with the standard deviation 1: sums of twelve hashes (`SplitMix64`), each from 0 to 1.
     fn gaussian(number: u64) -> f64 {
-        let uniform = |n: u64| (n.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 11) as f64 / (1_u64 << 53) as f64;
-        (0..12).map(|k| uniform(12 * number + k + 1)).sum::<f64>() - 6.0
+        let hash = |seed: u64| {
+            let mixed = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            (mixed ^ (mixed >> 31)) >> 11
+        };
+        (1..=12).map(|k| hash(12 * number + k) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0
     }
 
     #[test]
