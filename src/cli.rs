@@ -3,6 +3,7 @@
 mod common_options;
 mod logs;
 mod page;
+mod setup;
 mod value_parsers;
 
 use std::ffi::OsString;
@@ -19,14 +20,15 @@ use tracing::level_filters::LevelFilter;
 use crate::watch::Show;
 
 use value_parsers::{
-    address, chainage, drift, hours, layout, length, place, rotation, seconds, seconds_range, section,
-    sound_speed, speed_mps, target, udp_address, yaw,
+    address, chainage, drift, hours, layout, place, rotation, seconds, seconds_range, section, sound_speed,
+    speed_mps, test_seconds, udp_address, yaw,
 };
 
 pub(crate) use common_options::{Completions, Man, Overwrite, Threads};
 pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
-pub(crate) use value_parsers::{Speed, speed, time};
+pub(crate) use setup::{GivenPort, Setup, mount};
+pub(crate) use value_parsers::{Speed, length, speed, target, time};
 
 /// Value of the option `--resume` of `run` if no path is given.
 pub(crate) const LAST: &str = "last";
@@ -209,11 +211,22 @@ pub(crate) enum Command {
         after_help = "Example:\n  headrace devices\n  headrace devices --probe --address tcp:192.168.0.5:4040\n  headrace devices --vehicle vehicle.toml"
     )]
     Devices(Devices),
+    /// Write a vehicle file for the attached devices: find them, ask for tunnel, target and mounts, and check the
+    /// file.
+    ///
+    /// Serial ports and the ports given without a plugin are probed, as by devices --probe, so don't use it
+    /// during a dive. Every question has an option. Without a terminal, a missing answer is an error. Exit codes
+    /// are those of check; 1 if no device is found.
+    #[command(
+        after_help = "Example:\n  headrace setup\n  headrace setup --tunnel circle,radius_m=2 --length 400 --target 0.5 --port tcp:192.168.0.5:4040 --mount sonar_0=0.3,0,0,ahead"
+    )]
+    Setup(Setup),
     /// Check a vehicle or scene file: list all errors and warnings, and the resulting plan.
     ///
-    /// Exit code 2 with errors. Warnings don't affect it.
+    /// Exit code 2 with errors. Warnings don't affect it. With --devices it is 1 if the vehicle isn't ready to
+    /// dive.
     #[command(
-        after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml\n  headrace check deploy/scenes/demo.toml"
+        after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml\n  headrace check deploy/scenes/demo.toml\n  headrace check vehicle.toml --devices --folder /var/lib/headrace"
     )]
     Check(Check),
     /// Query hundreds of dives in SQL, each replayed once.
@@ -550,6 +563,16 @@ pub(crate) struct Devices {
 pub(crate) struct Check {
     /// Vehicle file, or scene file.
     pub(crate) file: PathBuf,
+    /// Also run the vehicle's devices as in a dive, without recording. Compare rate, gaps, noise and clock of
+    /// each with the file and data sheets, and test the computer's disk and CPU.
+    #[arg(long)]
+    pub(crate) devices: bool,
+    /// Duration of the devices' test, seconds.
+    #[arg(long = "for", value_name = "SECONDS", default_value = "120", value_parser = test_seconds, requires = "devices")]
+    pub(crate) duration: f64,
+    /// Folder to which dives are recorded. Its disk is tested.
+    #[arg(long, value_name = "DIR", default_value = ".", requires = "devices")]
+    pub(crate) folder: PathBuf,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

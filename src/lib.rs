@@ -47,12 +47,14 @@ mod resume;
 mod screen;
 mod sensor_lines;
 mod service;
+mod setup;
 mod simulate;
 mod smooth;
 mod summary;
 mod terminal;
 mod trim;
 mod tui;
+mod tunnel_option;
 mod vehicle_file;
 mod verify;
 mod watch;
@@ -97,6 +99,7 @@ pub fn main() -> ExitCode {
         Command::Emulate(args) => emulate::emulate(&args),
         Command::Devices(args) => inventory::devices(&args),
         Command::Check(args) => check::check(&args),
+        Command::Setup(args) => setup::setup(&args),
         Command::Campaign(args) => external_commands::run(&external_commands::CAMPAIGN, None, &args),
         Command::Batch(args) => external_commands::run(&external_commands::CAMPAIGN, Some("--batch"), &args),
         Command::Completions(args) => manual::completions(&args),

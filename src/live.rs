@@ -223,7 +223,11 @@ fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> 
 }
 
 /// Starts a thread per connection. The thread runs the drivers of its sensors.
-fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Supervisor, Failure> {
+pub(crate) fn supervisor(
+    dive: &mut Dive,
+    vehicle: &VehicleConfig,
+    begun: MonoNs,
+) -> Result<Supervisor, Failure> {
     let mut programs = vehicle.programs().map_err(Failure::Plan)?.into_iter();
     let excluded = vehicle.excluded_from_lines();
     let mut served = Vec::new();

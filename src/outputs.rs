@@ -46,6 +46,8 @@ pub(crate) enum Kind {
     Page,
     /// The recording of a voice note. The file doesn't show to which note it belongs.
     Voice,
+    /// A vehicle file. People edit it.
+    Vehicle,
 }
 
 impl Kind {
@@ -64,6 +66,7 @@ impl Kind {
             Self::Manual => "isn't a page of headrace's manual",
             Self::Page => "isn't an exported dive",
             Self::Voice => "may be another recording",
+            Self::Vehicle => "may have been edited",
         }
     }
 
@@ -74,7 +77,7 @@ impl Kind {
             log.is_ok_and(|log| log.header().metadata.contains_key(key))
         };
         match self {
-            Self::Dive | Self::Voice => false,
+            Self::Dive | Self::Voice | Self::Vehicle => false,
             Self::Simulation => logged(SIMULATED),
             Self::Import => logged(IMPORTED),
             Self::Trimmed => logged(TRIMMED),

@@ -74,7 +74,8 @@ pub(crate) fn attached(
     Ok((text, vehicle))
 }
 
-fn parse(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Failure> {
+/// Parses a vehicle file's text. `load` loads the files that it refers to.
+pub(crate) fn parse(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Failure> {
     let vehicle = VehicleConfig::parse(Document::new(name, text), &KINDS, load)?;
     log(name, &vehicle);
     Ok(vehicle)

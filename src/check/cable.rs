@@ -75,9 +75,7 @@ impl Cable {
 /// Keys about the cable that the vehicle file doesn't set. Their defaults apply.
 fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
     let Ok(root) = Document::new("", text).root() else { return Vec::new() };
-    let navigation = root.section("navigation").ok().flatten();
-    let is_said = |key: &&str| navigation.as_ref().is_some_and(|section| section.keys().contains(key));
-    let slack = ["slack_sd_m", "slack_time_s"].into_iter().filter(|key| !is_said(key));
+    let slack = ["slack_sd_m", "slack_time_s"].into_iter().filter(|key| !sets_navigation(text, key));
     let mut missing: Vec<String> = slack.map(|key| format!("navigation.{key}")).collect();
     let sensors = root.sections("sensors").unwrap_or_default();
     let counter = vehicle.sensors.iter().position(|sensor| sensor.sense() == Sense::Tether);
@@ -88,4 +86,10 @@ fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
         missing.push(format!("sensors[{number}].step_m"));
     }
     missing
+}
+
+/// Whether the vehicle file's table `[navigation]` has this key.
+pub(super) fn sets_navigation(text: &str, key: &str) -> bool {
+    let navigation = Document::new("", text).root().and_then(|root| root.section("navigation"));
+    navigation.ok().flatten().is_some_and(|section| section.keys().contains(&key))
 }

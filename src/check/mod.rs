@@ -1,10 +1,19 @@
-//! `headrace check`: reports all errors in a vehicle or scene file, and the plan that results from it.
+//! `headrace check`: reports all errors in a vehicle or scene file, and the plan that results from it. With `--devices`
+//! it also tests the vehicle's devices.
 
 mod cable;
+mod computer;
+mod expected;
 mod outlook;
+mod readings;
+mod results;
+mod self_test;
+
+use std::path::{Path, PathBuf};
 
 use headrace_config::{ConfigErrors, Document};
 use headrace_devices::KINDS;
+use headrace_geometry::time::DurNs;
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_simulator::{Scene, SceneError, Simulation, position_error_model};
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
@@ -14,10 +23,11 @@ use crate::cli::Check;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::logging::complain;
-use crate::output::{deliver, show};
+use crate::output::{deliver, say, show};
 use crate::vehicle_file;
 use cable::Cable;
 use outlook::Outlook;
+use self_test::Results;
 
 /// An error or warning, with its file and line.
 struct Found {
@@ -37,10 +47,30 @@ struct Readable {
     cable: Option<Cable>,
 }
 
+/// Checks a file as `headrace check FILE` does. Returns the exit code.
+pub(crate) fn file(path: &Path) -> Result<u8, Failure> {
+    check(&Check {
+        file: path.to_owned(),
+        devices: false,
+        duration: 0.0,
+        folder: PathBuf::new(),
+        json: false,
+    })
+}
+
+/// Mode in which the vehicle's heads meet the target at the largest speed, and this speed less a margin, m/s. `text` is
+/// the text of the vehicle file.
+pub(crate) fn best_mode(vehicle: VehicleConfig, text: &str) -> Option<(&'static str, f64)> {
+    Readable::new(vehicle, ("vehicle.toml", text), &mut Vec::new()).outlook?.best_mode()
+}
+
 /// Runs `headrace check`.
 pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     let (name, text) = (args.file.display().to_string(), files::read(&args.file)?);
     let mut found = Vec::new();
+    if args.devices && is_scene(&text) {
+        return Err(Failure::Usage(format!("check: {name} is a scene; --devices needs a vehicle file")));
+    }
     let readable = if is_scene(&text) {
         scene(args, (&name, &text), &mut found)?
     } else {
@@ -48,23 +78,41 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
         let vehicle = parsed.map_err(|errors| found.extend(all(&errors))).ok();
         vehicle.map(|vehicle| Readable::new(vehicle, (&name, &text), &mut found))
     };
-    if args.json {
-        deliver(&json(readable.as_ref(), &found).to_string())?;
-    }
     for one in &found {
         let grade = if one.grade == Grade::Warning { "warning: " } else { "" };
         complain(&format!("headrace: {grade}{}:{}: {}: {}", one.file, one.line, one.key, one.problem));
     }
     let count = |grade: Grade| found.iter().filter(|one| one.grade == grade).count();
-    if let Some(readable) = readable.as_ref().filter(|_| !args.json && count(Grade::Error) == 0) {
-        show(&readable.text());
+    let valid = readable.as_ref().filter(|_| count(Grade::Error) == 0);
+    if let Some(valid) = valid.filter(|_| !args.json) {
+        show(&valid.text());
         show(&match count(Grade::Warning) {
             0 => "no errors\n".to_owned(),
             1 => "no errors, 1 warning\n".to_owned(),
             warnings => format!("no errors, {warnings} warnings\n"),
         });
     }
-    Ok(if count(Grade::Error) > 0 { failure::USAGE } else { failure::OK })
+    let valid = valid.filter(|_| args.devices);
+    let results = valid.map(|valid| self_test(args, &valid.vehicle, &text)).transpose()?;
+    if args.json {
+        deliver(&json(readable.as_ref(), &found, results.as_ref()).to_string())?;
+    } else if let Some(results) = &results {
+        show(&results.text());
+    }
+    Ok(match &results {
+        _ if count(Grade::Error) > 0 => failure::USAGE,
+        Some(results) if !results.is_ready() => failure::FAILED,
+        _ => failure::OK,
+    })
+}
+
+/// Runs the vehicle's devices, and compares them with the vehicle file.
+fn self_test(args: &Check, vehicle: &VehicleConfig, text: &str) -> Result<Results, Failure> {
+    if !args.json {
+        let seconds = args.duration;
+        say(&format!("testing the devices for {seconds} s; heads turn, so keep the vehicle at rest"));
+    }
+    self_test::run((vehicle, text), DurNs::from_secs_f64(args.duration), &args.folder)
 }
 
 /// Whether a text is a scene: true if it names a vehicle file or has a trajectory.
@@ -195,7 +243,7 @@ fn placed(finding: Finding, name: &str, text: &str) -> Found {
     Found { grade, file: name.to_owned(), line, key, problem }
 }
 
-fn json(readable: Option<&Readable>, found: &[Found]) -> Value {
+fn json(readable: Option<&Readable>, found: &[Found], results: Option<&Results>) -> Value {
     let of = |grade: Grade| -> Vec<Value> {
         let one =
             |one: &Found| json!({"file": one.file, "line": one.line, "key": one.key, "problem": one.problem});
@@ -218,6 +266,7 @@ fn json(readable: Option<&Readable>, found: &[Found]) -> Value {
             ("duration_s", json!(readable.scene.as_ref().map(|(_, duration_s)| duration_s))),
             ("cable", json!(readable.cable.as_ref().map(Cable::json))),
             ("plan", json!(readable.outlook.as_ref().map(Outlook::json))),
+            ("devices", json!(results.map(Results::json))),
         ];
         shown.extend(entries.map(|(key, value)| (key.to_owned(), value)));
     }

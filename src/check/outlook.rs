@@ -94,6 +94,12 @@ impl Outlook {
         self.own.as_ref().and_then(|own| own.v_max_mps)
     }
 
+    /// The mode with the largest speed, and this speed less a margin for heads out of phase, m/s.
+    pub(super) fn best_mode(&self) -> Option<(&'static str, f64)> {
+        let best = self.best.as_ref()?;
+        Some((best.mode, down(HELD_SHARE * best.v_max_mps?)))
+    }
+
     /// Problems that the plan reveals.
     pub(super) fn findings(&self, vehicle: &VehicleConfig) -> Vec<Finding> {
         let warning = |key: &str, problem| Finding { grade: Grade::Warning, key: key.to_owned(), problem };

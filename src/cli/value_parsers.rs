@@ -121,7 +121,7 @@ pub(super) fn source_line(text: &str) -> Result<(String, String), String> {
     })
 }
 
-pub(super) fn target(text: &str) -> Result<f64, String> {
+pub(crate) fn target(text: &str) -> Result<f64, String> {
     within(text, "metres", 0.01, 20.0)
 }
 
@@ -133,7 +133,7 @@ pub(super) fn sound_speed(text: &str) -> Result<f64, String> {
     within(text, "m/s", 1300.0, 1700.0)
 }
 
-pub(super) fn length(text: &str) -> Result<f64, String> {
+pub(crate) fn length(text: &str) -> Result<f64, String> {
     within(text, "metres", 0.1, 1.0e5)
 }
 
@@ -160,6 +160,11 @@ fn within(text: &str, unit: &str, least: f64, most: f64) -> Result<f64, String> 
 
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     within(text, "seconds", 0.0, 1.0e7)
+}
+
+/// Duration of a self-test. A clock's drift needs ten seconds.
+pub(super) fn test_seconds(text: &str) -> Result<f64, String> {
+    within(text, "seconds", 10.0, 120.0)
 }
 
 pub(super) fn seconds_range(text: &str) -> Result<[f64; 2], String> {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_config::{Document, Loader};
+use headrace_config::Document;
 use headrace_devices::KINDS;
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::site::Site;
@@ -19,6 +19,7 @@ use headrace_vehicle::TunnelConfig;
 use crate::cli::Plan;
 use crate::failure::Failure;
 use crate::files;
+use crate::tunnel_option;
 use crate::vehicle_file;
 
 /// Plugin of the heads that are assumed without a vehicle file.
@@ -44,7 +45,8 @@ type Head = (HeadSpec, Vec<HeadMode>);
 impl Case {
     /// Creates the case from the options, which override the vehicle file.
     pub(super) fn of(args: &Plan) -> Result<Self, Failure> {
-        let tunnel = args.tunnel.as_deref().map(tunnel).transpose()?;
+        let load = files::beside(Path::new(""));
+        let tunnel = args.tunnel.as_deref().map(|tunnel| tunnel_option::parse(tunnel, &load)).transpose()?;
         match (&args.vehicle, tunnel) {
             (Some(path), tunnel) => Self::of_vehicle(path, tunnel, args),
             (None, Some(tunnel)) => Ok(Self::new(tunnel, ideal_heads(args)?, args)),
@@ -99,42 +101,9 @@ impl Case {
             range_m,
             question,
             errors: None,
-            inputs: tunnel_file(args),
+            inputs: args.tunnel.as_deref().and_then(tunnel_option::file).into_iter().collect(),
         }
     }
-}
-
-/// Whether a tunnel's name is the name of a polyline file.
-fn is_file(name: &str) -> bool {
-    Path::new(name).extension().is_some_and(|extension| extension == "csv")
-}
-
-/// Files that describe the tunnel; empty if it isn't read from a file.
-fn tunnel_file(args: &Plan) -> Vec<PathBuf> {
-    let name = args.tunnel.as_deref().and_then(|tunnel| tunnel.split(',').next()).map(str::trim);
-    name.filter(|name| is_file(name)).map(PathBuf::from).into_iter().collect()
-}
-
-/// A tunnel from `NAME`, `NAME,KEY=VALUE,...` with the keys of a vehicle file, or a polyline file.
-fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
-    let mut parts = text.split(',');
-    let name = parts.next().unwrap_or_default().trim();
-    let begin = if is_file(name) {
-        format!("profile = \"polyline\"\nfile = {name:?}\n")
-    } else {
-        format!("profile = {name:?}\n")
-    };
-    let line = |part: &str| {
-        let (key, value) = part.split_once('=').unwrap_or((part, "?"));
-        let value = value.trim();
-        let is_number = value.parse::<f64>().is_ok();
-        let value = if is_number { value.to_owned() } else { format!("{value:?}") };
-        format!("{} = {value}\n", key.trim())
-    };
-    let table: String = std::iter::once(begin).chain(parts.map(line)).collect();
-    let load: Loader<'_> = &files::beside(Path::new(""));
-    let root = Document::new("--tunnel", &table).root()?;
-    Ok(TunnelConfig::from_section(&root, load)?)
 }
 
 /// Heads of a vehicle, each with its modes. `range_m` overrides the range setting.

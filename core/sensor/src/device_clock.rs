@@ -31,10 +31,11 @@ const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
 /// Largest plausible difference between the minimum delays in two stretches of time.
 ///
-/// It is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. No clock drifts by more than
-/// `MOST_DRIFT`. If a stretch's delay is larger, its stamp waited in a queue and is not kept.
+/// It is `MOST_SHIFT_NS` plus `MOST_DRIFT` times the time between the stretches. If a stretch's delay is larger, its
+/// stamp waited in a queue and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
-const MOST_DRIFT: f64 = 500e-6;
+/// Largest drift of a working clock against the host's clock, a ratio.
+pub const MOST_DRIFT: f64 = 500e-6;
 
 /// Longest plausible delay by a queue, ns. If delays are implausible for longer, a new clock epoch begins.
 const LONGEST_QUEUE_NS: i64 = 30_000_000_000;

@@ -25,6 +25,8 @@ mod restarts;
 #[cfg(target_os = "linux")]
 mod run_ports;
 #[cfg(target_os = "linux")]
+mod setup;
+#[cfg(target_os = "linux")]
 mod soak;
 mod splits;
 #[cfg(target_os = "linux")]

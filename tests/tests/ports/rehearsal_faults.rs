@@ -12,14 +12,14 @@ use rustix::process::Signal;
 use crate::rehearsal::{Running, headrace, scene};
 
 /// A running program with its output. It also has the program's input, if the program reads commands.
-struct Piped {
+pub(crate) struct Piped {
     process: Running,
     commands: ChildStdin,
     lines: std::io::Lines<BufReader<ChildStdout>>,
 }
 
 impl Piped {
-    fn start(folder: &Folder, arguments: &[&str]) -> Self {
+    pub(crate) fn start(folder: &Folder, arguments: &[&str]) -> Self {
         let mut command = headrace();
         command.args(arguments).current_dir(folder.path(""));
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -30,14 +30,14 @@ impl Piped {
     }
 
     /// Starts a rehearsal that takes its commands from a pipe.
-    fn emulator(folder: &Folder) -> Self {
+    pub(crate) fn emulator(folder: &Folder) -> Self {
         folder.write("scene.toml", scene(30.0));
         Self::start(folder, &["emulate", "--stand", "0", "--out", "rehearsal", "scene.toml"])
     }
 
     /// Waits for a line that begins with `start` and contains `text`.
     #[track_caller]
-    fn until(&mut self, start: &str, text: &str) -> String {
+    pub(crate) fn until(&mut self, start: &str, text: &str) -> String {
         let line = self
             .lines
             .by_ref()
@@ -46,9 +46,15 @@ impl Piped {
         line.unwrap_or_else(|| panic!("no line {start:?} with {text:?}"))
     }
 
+    /// Waits for the program's end; returns its exit code and its remaining output.
+    pub(crate) fn end(&mut self) -> (Option<i32>, String) {
+        let lines: Vec<String> = self.lines.by_ref().map_while(Result::ok).collect();
+        (self.process.0.wait().unwrap().code(), lines.join("\n"))
+    }
+
     /// Sends a command, and waits until the program shows the command's effect.
     #[track_caller]
-    fn order(&mut self, line: &str, id: &str, effect: &str) {
+    pub(crate) fn order(&mut self, line: &str, id: &str, effect: &str) {
         writeln!(self.commands, "{line}").unwrap();
         self.until(id, effect);
     }

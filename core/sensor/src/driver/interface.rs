@@ -114,6 +114,8 @@ pub trait Probe: Send {
     /// Processes received bytes, in pieces of any size.
     fn heard(&mut self, bytes: &[u8]);
 
-    /// Returns the identity that the device has reported.
+    /// Returns the identity that the device has reported: parts separated by ", ".
+    ///
+    /// A part `key = value` is a line for the device's table in a vehicle file.
     fn identity(&self) -> Option<String>;
 }

@@ -76,7 +76,7 @@ pub use reader::{ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageK
 pub use recorder::{Recorder, RecorderHandle, RecorderPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
 pub use rotate::{Every, Rotation, files_of, in_the_way};
-pub use space::LeftOut;
+pub use space::{LeftOut, WARN_BELOW_BYTES};
 pub use storage::{Disk, Storage, StoredFile};
 pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};
 pub use unfinished::{Interrupted, Unfinished};

@@ -12,7 +12,7 @@ use std::time::Duration;
 use headrace_geometry::time::MonoNs;
 
 /// Free bytes below which the user is warned. This space lasts for some hours of a dive.
-const WARN_BELOW_BYTES: u64 = 1 << 30;
+pub const WARN_BELOW_BYTES: u64 = 1 << 30;
 /// Free bytes below which echoes are dropped. The messages that are still recorded take days to fill this space.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
 /// Maximum length of a sonar packet that is kept, bytes. Longer packets are echoes, shorter ones have only ranges.
