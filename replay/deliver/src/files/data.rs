@@ -31,6 +31,9 @@ pub struct Date {
     pub day: u16,
 }
 
+/// Standard deviation of a position if the navigation method states none, m.
+pub const UNKNOWN_SD_M: f64 = 1000.0;
+
 /// A return on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
@@ -38,7 +41,7 @@ pub struct Point {
     pub position_m: [f64; 3],
     /// Range from the head.
     pub range_m: f64,
-    /// Standard deviation of the position, in its least certain direction.
+    /// Standard deviation of the position, in its least certain direction; [`UNKNOWN_SD_M`] if unknown.
     pub position_sd_m: f64,
     /// Clock position, hours, looking inwards along the tunnel.
     pub clock_h: f64,

@@ -17,8 +17,9 @@ const LAYERS: [(&str, u8); 3] = [(DESIGN, 8), (MEASURED, 1), (LABELS, 7)];
 const CLOSED: u8 = 1;
 const POLYLINE_3D: u8 = 8;
 const VERTEX_3D: u8 = 32;
-/// Height of labels, m, and their share of a section's height.
+/// Height of labels, and least distance of a profile's stations with a label, m.
 const LABEL_M: f64 = 0.25;
+const LABEL_STEP_M: f64 = 10.0;
 /// Columns of a sheet.
 const SHEET_COLUMNS: usize = 10;
 /// Largest coordinate, m. Doubles resolve it far below a millimetre.
@@ -81,9 +82,9 @@ impl<W: Write> Drawing<W> {
         groups.iter().try_for_each(|(code, value)| self.group(*code, value))
     }
 
-    /// Writes a coordinate of entity `number` in mm.
-    fn place(&mut self, position_m: [f64; 3]) -> Result<(), FileError> {
-        for (code, value) in [10, 20, 30].into_iter().zip(position_m) {
+    /// Writes a position in mm as three groups. `code` is that of x.
+    fn place(&mut self, code: u16, position_m: [f64; 3]) -> Result<(), FileError> {
+        for (code, value) in [code, code + 10, code + 20].into_iter().zip(position_m) {
             let place = || format!("coordinate of entity {} of {}", self.entities, self.what);
             let millimetres = steps(value, PER_M, [-LARGEST_MM, LARGEST_MM], place)?;
             let mut text = Vec::new();
@@ -100,20 +101,27 @@ impl<W: Write> Drawing<W> {
         }
         let flags = POLYLINE_3D | if is_closed { CLOSED } else { 0 };
         self.groups(&[(0, "POLYLINE"), (8, layer), (66, "1"), (70, &flags.to_string())])?;
-        self.place([0.0; 3])?;
+        self.place(10, [0.0; 3])?;
         for corner in corners_m {
             self.groups(&[(0, "VERTEX"), (8, layer), (70, &VERTEX_3D.to_string())])?;
-            self.place(*corner)?;
+            self.place(10, *corner)?;
         }
         self.groups(&[(0, "SEQEND"), (8, layer)])?;
         self.entities += 1;
         Ok(())
     }
 
-    fn label(&mut self, position_m: [f64; 3], text: &str) -> Result<(), FileError> {
+    /// Writes a label, centred at a position and turned by `turn_deg`.
+    fn label(&mut self, position_m: [f64; 3], turn_deg: u8, text: &str) -> Result<(), FileError> {
         self.groups(&[(0, "TEXT"), (8, LABELS)])?;
-        self.place(position_m)?;
-        self.groups(&[(40, &LABEL_M.to_string()), (1, &escaped(text))])?;
+        self.place(10, position_m)?;
+        self.groups(&[
+            (40, &LABEL_M.to_string()),
+            (1, &escaped(text)),
+            (50, &turn_deg.to_string()),
+            (72, "1"),
+        ])?;
+        self.place(11, position_m)?;
         self.entities += 1;
         Ok(())
     }
@@ -193,7 +201,7 @@ fn draw_section<W: Write>(
     }
     let hole = section.hole_m.map_or(String::new(), |hole_m| format!("  D {hole_m:.3} m"));
     let label = format!("{}  {}{hole}", section.station, section.verdict);
-    drawing.label(to_drawing([0.0, -3.0 * LABEL_M]), &label)
+    drawing.label(to_drawing([0.0, -3.0 * LABEL_M]), 0, &label)
 }
 
 /// Writes floor and crown along the tunnel: chainage to the right, z upwards. Returns the number of entities.
@@ -212,8 +220,13 @@ pub fn write_profile(
         draw_line(&mut drawing, DESIGN, stations.iter().map(|at| (at.chainage_m, edge(&at.design))))?;
         draw_line(&mut drawing, MEASURED, stations.iter().map(|at| (at.chainage_m, edge(&at.measured))))?;
     }
-    for station in stations {
-        drawing.label([station.chainage_m, -3.0 * LABEL_M, 0.0], &station.station)?;
+    let mut next_m = f64::NEG_INFINITY;
+    for station in stations.iter().filter(|station| {
+        let is_due = station.chainage_m >= next_m;
+        next_m = if is_due { station.chainage_m + LABEL_STEP_M } else { next_m };
+        is_due
+    }) {
+        drawing.label([station.chainage_m, -6.0 * LABEL_M, 0.0], 90, &station.station)?;
     }
     drawing.finish()
 }

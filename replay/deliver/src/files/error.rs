@@ -42,7 +42,7 @@ pub enum FileError {
 
 impl FileError {
     /// Returns a function that adds the contents of the file to a stream's error.
-    pub(super) fn io(what: &'static str) -> impl Fn(io::Error) -> Self {
+    pub(crate) fn io(what: &'static str) -> impl Fn(io::Error) -> Self {
         move |source| Self::Io { what, source }
     }
 

@@ -21,7 +21,7 @@ const WKT: u16 = 1 << 4;
 /// Extra values of a point: name, unit, type and scale. Source: table 24.
 const EXTRA: [(&str, &str, u8, f64); 5] = [
     ("range_m", "range from the head, m", UNSIGNED_32, 0.001),
-    ("position_sd_m", "sd of the position, m", UNSIGNED_32, 0.001),
+    ("position_sd_m", "sd of position, m, 1000: unknown", UNSIGNED_32, 0.001),
     ("clock_h", "clock position, h", UNSIGNED_16, 0.01),
     ("head", "number of the head", UNSIGNED_8, 1.0),
     ("doubtful", "1: may not be wall", UNSIGNED_8, 1.0),

@@ -12,6 +12,7 @@ use super::palette;
 
 const PICTURE: &str = "map as PNG";
 const DATA: &str = "map as TIFF";
+const WORLD: &str = "world file of the map";
 /// Value of pixels that were not measured.
 pub const NO_DATA: f32 = -9999.0;
 /// Largest deviation in a file, m.
@@ -49,10 +50,14 @@ impl WallMap<'_> {
     }
 }
 
-/// Returns the six lines of the world file. They give pixel size and centre of the upper left pixel.
-pub fn world_file(map: &WallMap) -> String {
+/// Writes a world file: size of a pixel and centre of the upper left one.
+///
+/// Errors: the map is empty; the stream fails.
+pub fn write_world_file(mut write: impl Write, map: &WallMap) -> Result<(), FileError> {
+    map.check(WORLD)?;
     let ([width_m, height_m], [x_m, arc_m]) = (map.pixel_m, map.upper_left_m());
-    format!("{width_m}\n0\n0\n-{height_m}\n{:.6}\n{:.6}\n", x_m + width_m / 2.0, arc_m - height_m / 2.0)
+    let [x_m, arc_m] = [x_m + width_m / 2.0, arc_m - height_m / 2.0];
+    write!(write, "{width_m}\n0\n0\n-{height_m}\n{x_m:.6}\n{arc_m:.6}\n").map_err(FileError::io(WORLD))
 }
 
 /// Writes the map as a picture. Its colours saturate at a deviation of `limit_m`. Memory grows with a row only.

@@ -23,23 +23,23 @@ enum Cell<'a> {
 struct Table<W: Write> {
     write: BufWriter<W>,
     what: &'static str,
-    columns: &'static [&'static str],
+    columns: &'static str,
     line: Vec<u8>,
     rows: u64,
 }
 
 impl<W: Write> Table<W> {
-    fn new(write: W, what: &'static str, columns: &'static [&'static str]) -> Result<Self, FileError> {
+    fn new(write: W, what: &'static str, columns: &'static str) -> Result<Self, FileError> {
         let mut table = Self { write: BufWriter::new(write), what, columns, line: Vec::new(), rows: 0 };
-        let header = format!("{}\r\n", columns.join(","));
+        let header = format!("{columns}\r\n");
         table.write.write_all(header.as_bytes()).map_err(FileError::io(what))?;
         Ok(table)
     }
 
     fn row(&mut self, cells: &[Cell]) -> Result<(), FileError> {
-        debug_assert_eq!(cells.len(), self.columns.len(), "one cell per column");
+        debug_assert_eq!(cells.len(), self.columns.split(',').count(), "one cell per column");
         self.line.clear();
-        for (cell, column) in cells.iter().zip(self.columns) {
+        for (cell, column) in cells.iter().zip(self.columns.split(',')) {
             match *cell {
                 Cell::Text(text) => self.line.extend(quoted(text).as_bytes()),
                 Cell::Number(None, _) => {}
@@ -81,7 +81,7 @@ fn quoted(text: &str) -> String {
 ///
 /// Errors: a number is not finite; the stream fails.
 pub fn write_sections(write: impl Write, sections: &[Section]) -> Result<u64, FileError> {
-    let columns = &["station", "chainage_m", "verdict", "hole_m", "hole_sd_m"];
+    let columns = "station,chainage_m,verdict,hole_m,hole_sd_m";
     let mut table = Table::new(write, "sections as CSV", columns)?;
     for section in sections {
         table.row(&[
@@ -99,7 +99,7 @@ pub fn write_sections(write: impl Write, sections: &[Section]) -> Result<u64, Fi
 ///
 /// Errors: a number is not finite; the stream fails.
 pub fn write_outlines(write: impl Write, sections: &[Section]) -> Result<u64, FileError> {
-    let columns = &["station", "chainage_m", "outline", "piece", "y_m", "z_m"];
+    let columns = "station,chainage_m,outline,piece,y_m,z_m";
     let mut table = Table::new(write, "outlines as CSV", columns)?;
     for section in sections {
         let design = std::iter::once((("design", 0_u32), &section.design_m));
@@ -125,18 +125,8 @@ pub fn write_outlines(write: impl Write, sections: &[Section]) -> Result<u64, Fi
 ///
 /// Errors: a number is not finite; the stream fails.
 pub fn write_profile(write: impl Write, stations: &[ProfileStation]) -> Result<u64, FileError> {
-    let columns = &[
-        "station",
-        "chainage_m",
-        "floor_z_m",
-        "crown_z_m",
-        "left_y_m",
-        "right_y_m",
-        "design_floor_z_m",
-        "design_crown_z_m",
-        "design_left_y_m",
-        "design_right_y_m",
-    ];
+    let columns = "station,chainage_m,floor_z_m,crown_z_m,left_y_m,right_y_m,\
+                   design_floor_z_m,design_crown_z_m,design_left_y_m,design_right_y_m";
     let cells = |edges: &Edges| {
         [edges.floor_m, edges.crown_m, edges.left_m, edges.right_m].map(|value| Cell::Number(value, M))
     };
@@ -154,17 +144,7 @@ pub fn write_profile(write: impl Write, stations: &[ProfileStation]) -> Result<u
 ///
 /// Errors: a number is not finite; the stream fails.
 pub fn write_findings(write: impl Write, findings: &[Finding]) -> Result<u64, FileError> {
-    let columns = &[
-        "from_station",
-        "to_station",
-        "from_m",
-        "to_m",
-        "clock_from_h",
-        "clock_to_h",
-        "kind",
-        "cause",
-        "text",
-    ];
+    let columns = "from_station,to_station,from_m,to_m,clock_from_h,clock_to_h,kind,cause,text";
     let mut table = Table::new(write, "findings as CSV", columns)?;
     for finding in findings {
         table.row(&[
@@ -182,48 +162,31 @@ pub fn write_findings(write: impl Write, findings: &[Finding]) -> Result<u64, Fi
     table.finish()
 }
 
-/// Writes one row per point of the track. Returns the number of rows. Memory does not grow with their number.
-///
-/// Errors: a number is not finite; the stream fails.
-pub fn write_track(
-    write: impl Write,
-    points: impl Iterator<Item = Result<TrackPoint, FileError>>,
-) -> Result<u64, FileError> {
-    let columns = &[
-        "time_s",
-        "chainage_m",
-        "y_m",
-        "z_m",
-        "roll_deg",
-        "pitch_deg",
-        "yaw_deg",
-        "chainage_sd_m",
-        "lateral_sd_m",
-        "tilt_sd_deg",
-        "yaw_sd_deg",
-    ];
-    let mut table = Table::new(write, "track as CSV", columns)?;
-    for point in points {
-        let point = point?;
+/// Writes the track row by row, as the replay goes on. Memory does not grow with it.
+pub struct TrackWriter<W: Write>(Table<W>);
+
+impl<W: Write> TrackWriter<W> {
+    /// Begins the table.
+    pub fn new(write: W) -> Result<Self, FileError> {
+        let columns = "time_s,chainage_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg,chainage_sd_m,lateral_sd_m,tilt_sd_deg,\
+                       yaw_sd_deg";
+        Table::new(write, "track as CSV", columns).map(Self)
+    }
+
+    /// Writes a row.
+    ///
+    /// Errors: a number is not finite; the stream fails.
+    pub fn add(&mut self, point: &TrackPoint) -> Result<(), FileError> {
         let [x, y, z] = point.position_m.map(|value| Cell::Number(Some(value), M));
         let [roll, pitch, yaw] = point.attitude_deg.map(|value| Cell::Number(Some(value), DEG));
-        let sds_m = [point.chainage_sd_m, point.lateral_sd_m].map(|value| Cell::Number(value, M));
-        let sds_deg = [point.tilt_sd_deg, point.yaw_sd_deg].map(|value| Cell::Number(value, DEG));
-        let [along, lateral] = sds_m;
-        let [tilt, turn] = sds_deg;
-        table.row(&[
-            Cell::Number(Some(point.time_s), S),
-            x,
-            y,
-            z,
-            roll,
-            pitch,
-            yaw,
-            along,
-            lateral,
-            tilt,
-            turn,
-        ])?;
+        let [along, lateral] = [point.chainage_sd_m, point.lateral_sd_m].map(|value| Cell::Number(value, M));
+        let [tilt, turn] = [point.tilt_sd_deg, point.yaw_sd_deg].map(|value| Cell::Number(value, DEG));
+        let time = Cell::Number(Some(point.time_s), S);
+        self.0.row(&[time, x, y, z, roll, pitch, yaw, along, lateral, tilt, turn])
     }
-    table.finish()
+
+    /// Ends the table. Returns the number of rows.
+    pub fn finish(self) -> Result<u64, FileError> {
+        self.0.finish()
+    }
 }
