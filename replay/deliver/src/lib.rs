@@ -1,0 +1,4 @@
+//! What a dive hands over: figures, the report as HTML and PDF, and files for other programs.
+
+pub mod pictures;
+pub mod report;
