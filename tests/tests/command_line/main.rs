@@ -6,6 +6,7 @@ mod bad_input;
 mod check;
 #[cfg(unix)]
 mod conventions;
+mod deliver;
 mod go_back_advice;
 mod logging;
 mod mavlink_out;

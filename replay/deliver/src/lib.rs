@@ -1,0 +1,5 @@
+//! What a dive hands over: figures, the report as HTML and PDF, and files for other programs.
+
+pub mod document;
+pub mod pictures;
+pub mod report;
