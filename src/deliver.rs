@@ -1,9 +1,12 @@
-//! `headrace deliver`: the report of a recorded dive for the owner of the plant, as HTML, PDF and JSON.
+//! `headrace deliver`: the report of a recorded dive for the owner of the plant, as HTML, PDF and JSON, and files for
+//! other programs.
 
 use std::path::{Path, PathBuf};
 
 use headrace_config::Document;
+use headrace_deliver::collect::{self, Collector};
 use headrace_deliver::document::{html, pdf};
+use headrace_deliver::files::data::FileInfo;
 use headrace_deliver::report::{About, Delivery, Wall};
 use headrace_replay::drive::Pace;
 use headrace_replay::log::files_of;
@@ -36,9 +39,17 @@ pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
     let dive = Assembly::of(&vehicle, &text).kept(true).assemble()?;
     player.connect(dive.armed.sources());
     let mut wall = Wall::new(&dive.armed);
+    let program = concat!("headrace ", env!("CARGO_PKG_VERSION")).to_owned();
+    // Date and identity follow from the replay.
+    let info = FileInfo { title: about.title(), program, date: None, id: [0; 16] };
+    let mut collector = Collector::new(&args.output, &info)?;
     let feed = (&mut player as _, Pace::default());
     let threads = args.threads.of_replay();
-    let mut report = dive.run_on(threads, feed, &mut Watch::quiet(), &mut |dive| wall.take(dive))?;
+    let mut report = dive.run_on(threads, feed, &mut Watch::quiet(), &mut |dive| {
+        wall.take(dive);
+        collector.take(dive);
+    })?;
+    collector.finish(&args.output)?;
     note_losses(&mut report, log, &player);
     state_utc(&mut report, utc_of_zero_s);
     let delivery =
@@ -48,6 +59,7 @@ pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
     let pdf = pdf(&document);
     files::write(&pdf_file, &pdf.bytes)?;
     files::write_json(&json_file, &report)?;
+    collect::write_files(&args.output, &info, &delivery)?;
     say(&format!("report {}, {} and {}", html_file.display(), pdf_file.display(), json_file.display()));
     if !pdf.unknown.is_empty() {
         let letters: String = pdf.unknown.iter().collect();
@@ -74,8 +86,8 @@ fn claimed(args: &Deliver, inputs: impl IntoIterator<Item = PathBuf>) -> Result<
     outputs::folder(folder)?;
     let files = FILES.map(|name| folder.join(name));
     let mut claims = Claims::reading(inputs, &args.overwrite);
-    for file in &files {
-        claims.claim("-o", file, Kind::Delivered)?;
+    for file in files.iter().cloned().chain(collect::FILES.map(|name| folder.join(name))) {
+        claims.claim("-o", &file, Kind::Delivered)?;
     }
     Ok(files)
 }

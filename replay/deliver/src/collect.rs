@@ -99,7 +99,9 @@ impl<'a> Collector<'a> {
         let (Outcome::Sample { point, arc_m }, Some(origin)) = (ping.outcome, ping.origin) else { return };
         let range_m = (point - origin).norm();
         // The largest errors of position and of angle at this range, taken as independent.
-        let sd_m = |[angle_rad, position_m]: [f64; 2]| (position_m * position_m + square(angle_rad * range_m)).sqrt();
+        let sd_m = |[angle_rad, position_m]: [f64; 2]| {
+            (position_m * position_m + square(angle_rad * range_m)).sqrt()
+        };
         let point = Point {
             position_m: [point.x(), point.y(), point.z()],
             range_m,

@@ -7,6 +7,7 @@ mod check;
 #[cfg(unix)]
 mod conventions;
 mod deliver;
+mod deliver_files;
 mod go_back_advice;
 mod logging;
 mod mavlink_out;

@@ -24,6 +24,18 @@ pub struct About {
     pub crew: Option<String>,
 }
 
+impl About {
+    /// Title of the delivery, with plant and tunnel if they are stated.
+    pub fn title(&self) -> String {
+        let places: Vec<&str> =
+            [&self.plant, &self.tunnel].into_iter().flatten().map(String::as_str).collect();
+        match places.as_slice() {
+            [] => "Sonar inspection".to_owned(),
+            places => format!("Sonar inspection: {}", places.join(", ")),
+        }
+    }
+}
+
 /// Data for the report.
 pub struct Delivery<'a> {
     /// Facts that the log doesn't contain.
@@ -55,14 +67,8 @@ impl Delivery<'_> {
         blocks.extend(sensors(report));
         blocks.extend(self.settings());
         blocks.extend(unknown(report));
-        let places: Vec<&str> =
-            [&about.plant, &about.tunnel].into_iter().flatten().map(String::as_str).collect();
-        let title = match places.as_slice() {
-            [] => "Sonar inspection".to_owned(),
-            places => format!("Sonar inspection: {}", places.join(", ")),
-        };
         numbered(&mut blocks);
-        Document { title, footer: format!("Digest {}", report.digest), blocks }
+        Document { title: about.title(), footer: format!("Digest {}", report.digest), blocks }
     }
 
     fn cover(&self) -> Vec<Block> {

@@ -71,12 +71,12 @@ fn cross_sections(report: &Report, wall: &Wall, extent_m: [f64; 2], every_m: Opt
 }
 
 /// Distance between the cross-sections of an extent, if none is asked for.
-fn usual_step_m(length_m: f64) -> f64 {
+pub(super) fn usual_step_m(length_m: f64) -> f64 {
     STEPS_M.into_iter().find(|step_m| length_m / step_m <= MOST_SECTIONS).unwrap_or(STEPS_M[9])
 }
 
 /// Multiples of `every_m` within an extent.
-fn places_m([from_m, to_m]: [f64; 2], every_m: f64) -> Vec<f64> {
+pub(super) fn places_m([from_m, to_m]: [f64; 2], every_m: f64) -> Vec<f64> {
     let first = -math::floor_to_i64(-from_m / every_m);
     let places = (first..).map(|number| number as f64 * every_m);
     places.take_while(|x_m| *x_m < to_m).collect()

@@ -3,6 +3,7 @@
 mod chapters;
 mod figures;
 mod measured;
+mod shapes;
 mod tables;
 mod wall;
 

@@ -81,9 +81,8 @@ impl Delivery<'_> {
         let (columns, step_m) = self.columns(MOST_COLUMNS);
         let perimeter_m = self.wall.profile.perimeter_m();
         let height_m = perimeter_m / SECTORS as f64;
-        let sector_of_row: Vec<usize> = (0..SECTORS)
-            .map(|row| self.wall.sector(perimeter_m - (row as f64 + 0.5) * height_m))
-            .collect();
+        let sector_of_row: Vec<usize> =
+            (0..SECTORS).map(|row| self.wall.sector(perimeter_m - (row as f64 + 0.5) * height_m)).collect();
         let deviation_m = |column: u32, row: u32| {
             let x_m = from_m + f64::from(column) * step_m;
             let sector = *sector_of_row.get(usize::try_from(row).ok()?)?;
@@ -142,7 +141,8 @@ impl Delivery<'_> {
         }
         findings.extend(report.wall_stretches.iter().map(|stretch| {
             let [mean, inmost, outmost] = [stretch.mean_m, stretch.inmost_m, stretch.outmost_m];
-            let text = format!("deviation {mean:.2} m, from {inmost:.2} to {outmost:.2} m, outwards positive");
+            let text =
+                format!("deviation {mean:.2} m, from {inmost:.2} to {outmost:.2} m, outwards positive");
             Finding { text, ..finding([stretch.from_m, stretch.to_m], "outside the design") }
         }));
         findings.sort_by(|a, b| a.chainages_m[0].total_cmp(&b.chainages_m[0]));
@@ -195,7 +195,8 @@ fn pieces(corners: &[Option<Yz>]) -> Vec<Vec<Yz>> {
 
 /// Triangles between a ring of a part and the one before it; none for the first ring.
 fn band(ring: usize) -> impl Iterator<Item = [u32; 3]> {
-    let corner = |ring: usize, sector: usize| u32::try_from(SECTORS * ring + sector % SECTORS).unwrap_or(u32::MAX);
+    let corner =
+        |ring: usize, sector: usize| u32::try_from(SECTORS * ring + sector % SECTORS).unwrap_or(u32::MAX);
     (1..=ring).last().into_iter().flat_map(move |ring| {
         (0..SECTORS).flat_map(move |sector| {
             let [here, beside] = [sector, sector + 1].map(|sector| corner(ring - 1, sector));

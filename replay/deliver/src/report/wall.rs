@@ -68,14 +68,19 @@ impl Wall {
         reason = "a sum of deviations needs no more than single precision"
     )]
     fn add(&mut self, x_m: f64, point: Yz, arc_m: f64) {
-        let hours = math::wrap(self.profile.hour(arc_m) - 6.0, 12.0);
-        let sector = usize::try_from(math::floor_to_i64(hours * PER_HOUR)).unwrap_or(0).min(SECTORS - 1);
+        let sector = self.sector(arc_m);
         let section = math::floor_to_i64(x_m / self.section_m);
         let cells = self.sections.entry(section).or_insert_with(|| Box::new([Cell::default(); SECTORS]));
         if let Some(cell) = cells.get_mut(sector) {
             cell.samples += 1;
             cell.sum_m += off_m(&self.profile, point, arc_m) as f32;
         }
+    }
+
+    /// Sector at an arc length.
+    pub(super) fn sector(&self, arc_m: f64) -> usize {
+        let hours = math::wrap(self.profile.hour(arc_m) - 6.0, 12.0);
+        usize::try_from(math::floor_to_i64(hours * PER_HOUR)).unwrap_or(0).min(SECTORS - 1)
     }
 
     /// Samples of the sections whose middle is in a range of chainage, in `count` sectors from number `first`.
