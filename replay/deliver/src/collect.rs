@@ -49,7 +49,8 @@ pub struct Collector<'a> {
     /// Standard deviations of angles and of positions at the latest advice update, rad and m.
     sd: Option<[f64; 2]>,
     ticks: u64,
-    error: Option<FileError>,
+    /// Name of the file that failed first, and its error.
+    error: Option<(&'static str, FileError)>,
 }
 
 impl<'a> Collector<'a> {
@@ -73,12 +74,12 @@ impl<'a> Collector<'a> {
         }
     }
 
-    fn tick(&mut self, dive: &Loop) -> Result<(), FileError> {
+    fn tick(&mut self, dive: &Loop) -> Result<(), (&'static str, FileError)> {
         let view = dive.view();
         for item in &view.placed().items {
             match &item.placement {
                 Placement::Ping(ping) => self.ping(dive, ping),
-                Placement::Update(update) => self.update(dive, update)?,
+                Placement::Update(update) => self.update(dive, update).map_err(|error| (TRACK, error))?,
             }
         }
         let mut words = view.surveyor().digests().pings.words();
@@ -88,7 +89,7 @@ impl<'a> Collector<'a> {
             let Some(mut point) = self.waiting.remove(&[received, source]) else { continue };
             point.is_doubtful = record.kind == Some(RecordKind::Doubtful);
             if point.is_doubtful || record.kind == Some(RecordKind::Sample) {
-                self.points.add(&point)?;
+                self.points.add(&point).map_err(|error| (POINTS, error))?;
             }
         }
         Ok(())
@@ -135,13 +136,10 @@ impl<'a> Collector<'a> {
     ///
     /// Errors: the first error since the beginning.
     pub fn finish(self, folder: &Path) -> Result<(), PathError> {
-        let error = self.error.map_or(Ok(()), Err);
-        let at = |name: &str| {
-            let path = folder.join(name);
-            |source| PathError { path, source }
-        };
-        error.and_then(|()| self.points.finish()).map_err(at(POINTS))?;
-        self.track.finish().map_err(at(TRACK))?;
+        let at = |(name, source)| PathError { path: folder.join(name), source };
+        self.error.map_or(Ok(()), Err).map_err(at)?;
+        self.points.finish().map_err(|error| at((POINTS, error)))?;
+        self.track.finish().map_err(|error| at((TRACK, error)))?;
         Ok(())
     }
 }

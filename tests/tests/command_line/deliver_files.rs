@@ -12,7 +12,8 @@ fn delivered(name: &str) -> Folder {
 }
 
 fn deliver(folder: &Folder) {
-    let answer = folder.headrace(&["deliver", "dive.mcap", "-o", "out", "--force", "--plant", "Žižka \"Süd\""]);
+    let answer =
+        folder.headrace(&["deliver", "dive.mcap", "-o", "out", "--force", "--plant", "Žižka \"Süd\""]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
 }
 

@@ -173,7 +173,7 @@ fn variable_records(info: &FileInfo, compression: Option<&LazVlr>) -> std::io::R
     Ok(records)
 }
 
-/// What the public header block is made of.
+/// Contents of the public header block.
 struct Header<'a> {
     info: &'a FileInfo,
     records: &'a VariableRecords,
