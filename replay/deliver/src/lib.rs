@@ -1,4 +1,4 @@
-//! What a dive hands over: figures, the report as HTML and PDF, and files for other programs.
+//! Results of a dive for others: figures, the report as HTML and PDF, and files for other programs.
 
 pub mod collect;
 pub mod document;

@@ -22,8 +22,9 @@ fn deliver(folder: &Folder, further: &[&str]) -> String {
 
 /// Texts of the report's elements of one kind, such as the cells of its tables.
 fn texts<'a>(page: &'a str, element: &str) -> Vec<&'a str> {
-    let (begin, end) = (format!("<{element}>"), format!("</{element}>"));
-    page.split(&begin).skip(1).map(|rest| rest.split_once(&end).unwrap().0).collect()
+    let (begin, end) = (format!("<{element}"), format!("</{element}>"));
+    let within = |rest: &'a str| rest.split_once('>').unwrap().1.split_once(&end).unwrap().0;
+    page.split(&begin).skip(1).map(within).collect()
 }
 
 /// The report's text without its figures. Digests and checksums are left out.
@@ -113,7 +114,7 @@ fn numbers_of_the_report_are_those_of_the_json() {
 }
 
 #[test]
-fn report_states_what_was_missed_and_what_is_not_known() {
+fn report_states_missed_stretches_and_limits_of_the_inspection() {
     let folder = golden("too-fast");
     folder.write(
         "about.toml",
@@ -165,6 +166,10 @@ fn delivery_without_its_facts_or_an_empty_folder_is_refused() {
     refused(&["--about", "none.toml"], "none.toml");
     folder.write("about.toml", "plnat = \"Ceran\"\n");
     refused(&["--about", "about.toml"], "about.toml:1: plnat");
+    for broken in [&b"plant = \"\xff\""[..], b"plant", b"crew = \"A. Berg\"", &[0; 100]] {
+        folder.write("about.toml", broken);
+        refused(&["--about", "about.toml"], "about.toml");
+    }
     assert!(!folder.path("out").exists());
     std::fs::create_dir(folder.path("out")).unwrap();
     folder.write("out/other.txt", "mine");

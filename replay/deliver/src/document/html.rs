@@ -22,9 +22,10 @@ table { border-collapse: collapse; margin: 0 0 4mm; font-size: 8.5pt; font-varia
 thead { display: table-header-group; }
 tr { break-inside: avoid; }
 th, td { padding: 1mm 4mm 1mm 0; text-align: left; vertical-align: top; border-bottom: .4pt solid #999; }
+th.number, td.number { text-align: right; }
 th { border-bottom: .8pt solid #000; vertical-align: bottom; }
 figure { margin: 2mm 0 5mm; break-inside: avoid; }
-svg { display: block; width: 100%; height: auto; }
+svg { display: block; width: 100%; height: auto; font-family: inherit; }
 figcaption { font-size: 8.5pt; color: #333; margin-top: 1mm; }
 .page { break-after: page; }
 @media print { body { max-width: none; padding: 0; } }
@@ -64,10 +65,15 @@ fn append(text: &mut String, block: &Block) {
             };
             writeln!(text, "<dl>\n{}</dl>", values.iter().map(pair).collect::<String>())
         }
-        Block::Table(Table { columns, rows }) => {
+        Block::Table(table) => {
+            let Table { columns, rows } = table;
+            let numbers: Vec<bool> = (0..columns.len()).map(|column| table.is_number(column)).collect();
             let row = |cells: &Vec<String>, tag: &str| {
-                let cells = cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell)));
-                format!("<tr>{}</tr>\n", cells.collect::<String>())
+                let cell = |(cell, is_number): (&String, &bool)| {
+                    let class = if *is_number { " class=\"number\"" } else { "" };
+                    format!("<{tag}{class}>{}</{tag}>", escaped(cell))
+                };
+                format!("<tr>{}</tr>\n", cells.iter().zip(&numbers).map(cell).collect::<String>())
             };
             let rows: String = rows.iter().map(|cells| row(cells, "td")).collect();
             writeln!(

@@ -45,6 +45,14 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
 }
 
+impl Table {
+    /// Whether a column has numbers alone, which are aligned to the right.
+    pub(super) fn is_number(&self, column: usize) -> bool {
+        let mut cells = self.rows.iter().filter_map(|row| row.get(column)).filter(|cell| *cell != "-");
+        cells.all(|cell| cell.parse::<f64>().is_ok())
+    }
+}
+
 impl Document {
     /// Returns the document's text, one line for each paragraph, row and caption.
     pub fn text(&self) -> String {

@@ -64,6 +64,13 @@ pub fn pdf(document: &Document) -> Pdf {
     Pdf { bytes: written(pages.done, document), unknown }
 }
 
+/// Lines of a cell, which end at `right_pt`, if it is given.
+struct Cell {
+    left_pt: f64,
+    right_pt: Option<f64>,
+    lines: Vec<String>,
+}
+
 /// Pages filled from top to bottom.
 struct Pages {
     done: Vec<Content>,
@@ -148,29 +155,27 @@ impl Pages {
         let names_pt = values.iter().map(|(name, _)| TEXT.width_pt(name)).fold(0.0, f64::max).min(NAMES_PT);
         let left_pt = MARGIN_PT + names_pt + 16.0;
         for (name, value) in values {
-            let columns = [
-                (MARGIN_PT, TEXT.broken(name, NAMES_PT)),
-                (left_pt, TEXT.broken(value, ROOM_PT + MARGIN_PT - left_pt)),
-            ];
-            self.row(&columns, TEXT);
+            let cell = |left_pt: f64, lines: Vec<String>| Cell { left_pt, right_pt: None, lines };
+            let value = TEXT.broken(value, ROOM_PT + MARGIN_PT - left_pt);
+            self.row(&[cell(MARGIN_PT, TEXT.broken(name, NAMES_PT)), cell(left_pt, value)], TEXT);
             self.at_pt += 2.0;
         }
         self.at_pt += 8.0;
     }
 
-    /// Writes cells side by side. Each cell has a left end and lines. Rows that are higher than a page are divided.
-    fn row(&mut self, cells: &[(f64, Vec<String>)], font: Font) {
+    /// Writes cells side by side. Rows that are higher than a page are divided.
+    fn row(&mut self, cells: &[Cell], font: Font) {
         let line_pt = font.size_pt * LEADING;
-        let most = cells.iter().map(|(_, lines)| lines.len()).max().unwrap_or(0);
+        let most = cells.iter().map(|cell| cell.lines.len()).max().unwrap_or(0);
         if most as f64 * line_pt < END_PT - MARGIN_PT {
             self.keep(most as f64 * line_pt);
         }
         for number in 0..most {
             self.keep(line_pt);
-            for (left_pt, lines) in cells {
-                if let Some(line) = lines.get(number) {
-                    text(&mut self.content, [*left_pt, self.at_pt + font.size_pt], line, font);
-                }
+            for Cell { left_pt, right_pt, lines } in cells {
+                let Some(line) = lines.get(number) else { continue };
+                let left_pt = right_pt.map_or(*left_pt, |right_pt| right_pt - font.width_pt(line));
+                text(&mut self.content, [left_pt, self.at_pt + font.size_pt], line, font);
             }
             self.at_pt += line_pt;
         }
@@ -179,23 +184,26 @@ impl Pages {
     fn table(&mut self, table: &Table) {
         let widths = column_widths(table, [CELL_HEAD, CELL], ROOM_PT);
         let end_pt = MARGIN_PT + widths.iter().sum::<f64>() + GAP_PT * (widths.len() as f64 - 1.0);
-        let cells = |row: &[String], font: Font| -> Vec<(f64, Vec<String>)> {
+        let numbers: Vec<bool> = (0..widths.len()).map(|column| table.is_number(column)).collect();
+        let cells = |row: &[String], font: Font| -> Vec<Cell> {
             let mut left_pt = MARGIN_PT;
-            row.iter()
-                .zip(&widths)
-                .map(|(cell, width_pt)| {
-                    let lines = (left_pt, font.broken(cell, *width_pt));
-                    left_pt += width_pt + GAP_PT;
-                    lines
-                })
-                .collect()
+            let cell = |((text, width_pt), is_number): ((&String, &f64), &bool)| {
+                let lines = font.broken(text, *width_pt);
+                left_pt += width_pt + GAP_PT;
+                Cell {
+                    left_pt: left_pt - width_pt - GAP_PT,
+                    right_pt: is_number.then_some(left_pt - GAP_PT),
+                    lines,
+                }
+            };
+            row.iter().zip(&widths).zip(&numbers).map(cell).collect()
         };
         let head = cells(&table.columns, CELL_HEAD);
         self.keep(KEPT_PT);
         self.table_head(&head, end_pt);
         for row in &table.rows {
             let cells = cells(row, CELL);
-            let most = cells.iter().map(|(_, lines)| lines.len()).max().unwrap_or(0);
+            let most = cells.iter().map(|cell| cell.lines.len()).max().unwrap_or(0);
             if self.at_pt + most as f64 * CELL.size_pt * LEADING + 5.0 > END_PT {
                 self.break_page();
                 self.table_head(&head, end_pt);
@@ -208,7 +216,7 @@ impl Pages {
         self.at_pt += 12.0;
     }
 
-    fn table_head(&mut self, head: &[(f64, Vec<String>)], end_pt: f64) {
+    fn table_head(&mut self, head: &[Cell], end_pt: f64) {
         self.row(head, CELL_HEAD);
         self.at_pt += 2.0;
         self.rule(end_pt, 0.8);

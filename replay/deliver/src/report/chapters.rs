@@ -9,6 +9,9 @@ use super::wall::Wall;
 use super::{figures, measured};
 use crate::document::{Block, Document, Table};
 
+/// Maximum number of rows in the table of verdicts by chainage.
+const MOST_ROWS: usize = 400;
+
 /// Facts about a dive that its log doesn't contain. Facts that aren't stated are left out of the report.
 #[derive(Debug, Clone, Default)]
 pub struct About {
@@ -181,7 +184,7 @@ fn no_inspection(why: &NotInspectedReport) -> String {
 fn inspected(report: &Report, wall: &Wall, extent_m: [f64; 2]) -> Vec<Block> {
     let target_m = report.target_m;
     vec![
-        heading("What was inspected"),
+        heading("Inspected tunnel"),
         Block::Paragraph(format!(
             "The wall passes where the largest circle without a sample has a diameter of at most {target_m} m, with a \
              confidence of {} standard deviations. There, any feature of at least this size was hit by the sonar at least \
@@ -243,8 +246,16 @@ fn coverage(report: &Report, wall: &Wall, extent_m: [f64; 2]) -> Vec<Block> {
         ),
         Block::Values(values.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()),
         Block::Subheading("Verdicts by chainage".to_owned()),
-        Block::Table(tables::by_chainage(report)),
     ];
+    let by_chainage = tables::by_chainage(report);
+    if by_chainage.rows.len() > MOST_ROWS {
+        let count = by_chainage.rows.len();
+        blocks.push(Block::Paragraph(format!(
+            "The verdict changes {count} times: see sections in report.json."
+        )));
+    } else {
+        blocks.push(Block::Table(by_chainage));
+    }
     if report.survey.empty as usize > report.survey.holidays.len() {
         let listed = report.survey.holidays.len();
         blocks.push(Block::Paragraph(format!("The first figure shows the first {listed} empty squares.")));
@@ -253,8 +264,7 @@ fn coverage(report: &Report, wall: &Wall, extent_m: [f64; 2]) -> Vec<Block> {
 }
 
 fn sensors(report: &Report) -> Vec<Block> {
-    let mut blocks =
-        vec![Block::PageBreak, heading("Sensors and data"), Block::Table(tables::sensors(report))];
+    let mut blocks = vec![heading("Sensors and data"), Block::Table(tables::sensors(report))];
     let losses: Vec<String> = report.log.iter().flat_map(|log| &log.losses).cloned().collect();
     blocks.push(Block::Subheading("Lost data".to_owned()));
     if losses.is_empty() {
@@ -285,11 +295,11 @@ fn sensors(report: &Report) -> Vec<Block> {
     blocks
 }
 
-/// What the dive leaves unknown.
+/// Chapter on everything that the dive leaves unknown.
 fn unknown(report: &Report) -> Vec<Block> {
     let sum = &report.summary;
     let mut items = vec![format!(
-        "Features smaller than {} m: they may lie between the samples of wall that passed.",
+        "Features smaller than {} m, which may lie between the samples of wall that passed.",
         report.target_m
     )];
     for (length_m, what) in [
@@ -307,17 +317,23 @@ fn unknown(report: &Report) -> Vec<Block> {
         items.push("The wall in and behind declared openings.".to_owned());
     }
     if report.begun_utc.is_none() {
-        items.push("Date and time of the dive by the program: its clock was not recorded.".to_owned());
+        items
+            .push("Date and time of the dive by the program, because its clock was not recorded.".to_owned());
     }
     if report.lost_data() {
-        items.push("What the lost data would have shown.".to_owned());
+        items.push("The content of the lost data.".to_owned());
     }
     items.push(
-        "The condition of the wall beyond its shape: sonar measures distances, not material or cracks."
-            .to_owned(),
+        "Material, cracks and condition of the wall, because the sonar measures distances only.".to_owned(),
     );
-    items.push("The absolute position of a feature better than the vehicle's own estimate.".to_owned());
-    let mut blocks = vec![heading("What is not known"), Block::List(items)];
+    items.push(
+        "Positions of features more exactly than the vehicle's estimate of its own position.".to_owned(),
+    );
+    let mut blocks = vec![
+        heading("Limits of the inspection"),
+        paragraph("The following is not known after this dive:"),
+        Block::List(items),
+    ];
     let doubts: Vec<String> = report
         .alert_list
         .iter()

@@ -19,12 +19,12 @@ use crate::pictures::shape::Drawing;
 
 const WIDTH_PX: u32 = 700;
 /// Left and right ends of the charts over chainage.
-const ENDS_PX: [f64; 2] = [58.0, 628.0];
+const ENDS_PX: [f64; 2] = [58.0, 614.0];
 /// Length of wall up to which a map has one strip, m.
 const STRIP_M: f64 = 80.0;
-const MOST_STRIPS: u32 = 5;
-/// Height of a strip, and of a strip with its axis.
-const STRIP_PX: [f64; 2] = [112.0, 166.0];
+const MOST_STRIPS: u32 = 4;
+/// Height of a strip's axis.
+const AXIS_PX: f64 = 50.0;
 /// Height of the legend above the strips.
 const LEGEND_PX: f64 = 34.0;
 /// Least width of a missed section. A narrower one would not be seen.
@@ -76,10 +76,11 @@ fn strips(
 ) {
     let count = strip_count(to_m - from_m);
     let length_m = (to_m - from_m) / f64::from(count);
+    let height_px = strip_px(count);
     for number in 0..count {
         let ends_m = [f64::from(number), f64::from(number + 1)].map(|place| from_m + place * length_m);
-        let top = LEGEND_PX + f64::from(number) * STRIP_PX[1];
-        let frame = Frame { left: ENDS_PX[0], top, right: ENDS_PX[1], bottom: top + STRIP_PX[0] };
+        let top = LEGEND_PX + f64::from(number) * (height_px + AXIS_PX);
+        let frame = Frame { left: ENDS_PX[0], top, right: ENDS_PX[1], bottom: top + height_px };
         let x = Axis::new("chainage from the portal, m", ends_m[0], ends_m[1], 10).with_name_at(32.0);
         let y = Axis::new("wall from floor, m", 0.0, profile.perimeter_m(), 4).with_name_at(26.0);
         let chart = Chart::new(canvas, frame, &x, &y);
@@ -87,7 +88,11 @@ fn strips(
         let [left, right] = ENDS_PX;
         let corners = [[left, top], [right, top], [right, frame.bottom], [left, frame.bottom], [left, top]];
         canvas.line(&corners, &OUTLINE);
-        clock::at_right(&chart, profile);
+        for hour in clock::hours(profile).iter().filter(|hour| !hour.place.is_empty()) {
+            let y = chart.px([0.0, hour.arc_m])[1];
+            canvas.line(&[[right, y], [right + 4.0, y]], &OUTLINE);
+            canvas.text([right + 7.0, y], &hour.words(), Side::Right, SMALL);
+        }
     }
 }
 
@@ -95,8 +100,14 @@ fn strip_count(length_m: f64) -> u32 {
     (1..MOST_STRIPS).find(|count| length_m <= STRIP_M * f64::from(*count)).unwrap_or(MOST_STRIPS)
 }
 
+/// Height of a strip. Fewer strips are higher.
+fn strip_px(count: u32) -> f64 {
+    90.0 + 140.0 / f64::from(count)
+}
+
 fn strips_canvas(length_m: f64) -> Canvas {
-    let height_px = LEGEND_PX + f64::from(strip_count(length_m)) * STRIP_PX[1];
+    let count = strip_count(length_m);
+    let height_px = LEGEND_PX + f64::from(count) * (strip_px(count) + AXIS_PX);
     Canvas::untitled([WIDTH_PX, u32::try_from(math::round_to_i64(height_px)).unwrap_or(0)])
 }
 
@@ -275,7 +286,7 @@ pub(super) fn deviation(wall: &Wall, extent_m: [f64; 2]) -> Drawing {
         Colour(222, 204, 92),
         Colour(254, 234, 120),
     ];
-    let step_m = round_up(spread_m(wall, extent_m) / 3.5);
+    let step_m = round_up(spread_m(wall, extent_m) / 6.0);
     let limit = |number: usize| (number as f64 - 2.5) * step_m;
     let words = |number: usize| match number {
         0 => format!("below {:.2}", limit(0)),
@@ -358,7 +369,7 @@ pub(super) const SECTIONS_EACH: usize = 12;
 /// `length_m` of wall.
 pub(super) fn cross_sections(wall: &Wall, report: &Report, places_m: &[f64], length_m: f64) -> Drawing {
     const COLUMNS: usize = 3;
-    const SIZE_PX: [f64; 2] = [700.0 / 3.0, 236.0];
+    const SIZE_PX: [f64; 2] = [700.0 / 3.0, 212.0];
     let rows = places_m.len().div_ceil(COLUMNS);
     let height_px = math::round_to_i64(SIZE_PX[1] * rows as f64);
     let canvas = Canvas::untitled([WIDTH_PX, u32::try_from(height_px).unwrap_or(0)]);

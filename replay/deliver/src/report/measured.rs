@@ -15,7 +15,7 @@ const STEPS_M: [f64; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0
 
 /// Chapter on the wall in comparison with the design. `every_m` is the distance between cross-sections, m.
 pub(super) fn chapter(report: &Report, wall: &Wall, extent_m: [f64; 2], every_m: Option<f64>) -> Vec<Block> {
-    let mut blocks = vec![Block::PageBreak, Block::Heading("Measured wall and design".to_owned())];
+    let mut blocks = vec![Block::Heading("Measured wall and design".to_owned())];
     if wall.is_empty() {
         blocks.push(Block::Paragraph("No sample of the wall was measured.".to_owned()));
         return blocks;
@@ -52,7 +52,6 @@ fn cross_sections(report: &Report, wall: &Wall, extent_m: [f64; 2], every_m: Opt
     let places_m = places_m(extent_m, every_m);
     let length_m = report.target_m.max(report.section_m);
     let mut blocks = vec![
-        Block::PageBreak,
         Block::Subheading("Cross-sections".to_owned()),
         Block::Paragraph(format!(
             "A cross-section every {every_m} m, seen along the tunnel from the portal. Dashed: design. Solid with dots: mean \

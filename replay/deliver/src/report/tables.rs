@@ -1,7 +1,6 @@
 //! Tables of the report. All numbers are those of [`Report`], rounded.
 
-use headrace_coverage::Verdict;
-use headrace_monitor::live_text::of_it_text;
+use headrace_coverage::{Unsure, Verdict};
 use headrace_monitor::pilot_text::{cause_text, station};
 use headrace_monitor::report::{NoVerdictReport, Report, RunReport, SourceReport};
 use headrace_monitor::section_row::SectionRow;
@@ -88,13 +87,17 @@ pub(super) fn missed(report: &Report) -> Table {
 /// Stretches without a verdict.
 pub(super) fn no_verdict(report: &Report) -> Table {
     let row = |stretch: &NoVerdictReport| {
-        let why = unsure_text(&stretch.stretch);
-        let of_it = of_it_text(stretch.no_verdict_m, stretch.end_m - stretch.start_m);
-        [station(stretch.start_m), station(stretch.end_m), format!("{:.2}", stretch.no_verdict_m), {
-            if of_it.is_empty() { why } else { format!("{why} (in parts of the stretch)") }
-        }]
+        let reason = match stretch.stretch.why {
+            Unsure::Position => "the position is too uncertain for this hole".to_owned(),
+            Unsure::NotInspected => "not passed by all heads".to_owned(),
+            _ => unsure_text(&stretch.stretch),
+        };
+        let metres = [stretch.no_verdict_m, stretch.hole_m, stretch.hole_sd_m];
+        let [length, hole, sd] = metres.map(|value_m| format!("{value_m:.2}"));
+        [station(stretch.start_m), station(stretch.end_m), length, hole, sd, reason]
     };
-    table(["from", "to", "without verdict, m", "reason"], report.no_verdict.iter().map(row))
+    let columns = ["from", "to", "without verdict, m", "largest hole, m", "sd of hole, m", "reason"];
+    table(columns, report.no_verdict.iter().map(row))
 }
 
 /// Neighbouring sections with the same verdict.
