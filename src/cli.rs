@@ -25,7 +25,7 @@ use value_parsers::{
 };
 
 pub(crate) use common_options::{Completions, Man, Overwrite, Threads};
-pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
+pub(crate) use logs::{Deliver, Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use setup::{GivenPort, Setup, mount};
 pub(crate) use value_parsers::{Speed, length, speed, target, time};
@@ -139,6 +139,14 @@ pub(crate) enum Command {
     /// inside (docs/how-to/read-the-page.md). Exit codes are those of replay.
     #[command(after_help = "Example:\n  headrace export dive.mcap --html dive.html")]
     Export(Export),
+    /// Write a recorded dive's report for the owner of the plant, as HTML, PDF and JSON.
+    ///
+    /// The log is replayed through the same processing. The report states what was inspected, what was
+    /// missed and what is not known. Two runs write identical bytes. Exit codes are those of replay.
+    #[command(
+        after_help = "Example:\n  headrace deliver dive.mcap -o report --about about.toml\n  headrace deliver dive.mcap -o report --plant Ceran --crew 'A. Berg' --every 5"
+    )]
+    Deliver(Deliver),
     /// List the notes of a recorded dive, and write the recordings of its voice notes as files.
     ///
     /// The log isn't replayed: places are those that the dive published. Exit code 3 if a part of the log or

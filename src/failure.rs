@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::calibrate::collect::CollectError;
 use headrace_config::{ConfigError, ConfigErrors};
 use headrace_dashboard::export::ExportError;
+use headrace_deliver::files::PathError;
 use headrace_geometry::snapshot::SnapshotError;
 use headrace_import::ImportError;
 use headrace_import::routing::RoutingError;
@@ -66,6 +67,8 @@ pub(crate) enum Failure {
     Snapshot(#[from] SnapshotError),
     #[error(transparent)]
     Export(#[from] ExportError),
+    #[error(transparent)]
+    Delivery(#[from] PathError),
     #[error("writing the report as JSON: {0}")]
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]

@@ -6,6 +6,7 @@ mod calibrate;
 mod check;
 mod cli;
 mod commands;
+mod deliver;
 mod dive;
 mod emulate;
 mod expect;
@@ -87,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Run(run) => commands::run(&run),
         Command::Replay(replay) => commands::replay(&replay),
         Command::Export(args) => export::export(&args),
+        Command::Deliver(args) => deliver::deliver(&args),
         Command::Notes(args) => notes::notes(&args),
         Command::Verify(args) => verify::verify(&args),
         Command::Recover(args) => recover::recover(&args),

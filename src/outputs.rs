@@ -44,6 +44,8 @@ pub(crate) enum Kind {
     Picture,
     Manual,
     Page,
+    /// A file of a delivery, which is written into an empty folder.
+    Delivered,
     /// The recording of a voice note. The file doesn't show to which note it belongs.
     Voice,
     /// A vehicle file. People edit it.
@@ -65,6 +67,7 @@ impl Kind {
             Self::Picture => "isn't a plan's picture",
             Self::Manual => "isn't a page of headrace's manual",
             Self::Page => "isn't an exported dive",
+            Self::Delivered => "a delivery replaces no file",
             Self::Voice => "may be another recording",
             Self::Vehicle => "may have been edited",
         }
@@ -77,7 +80,7 @@ impl Kind {
             log.is_ok_and(|log| log.header().metadata.contains_key(key))
         };
         match self {
-            Self::Dive | Self::Voice | Self::Vehicle => false,
+            Self::Dive | Self::Delivered | Self::Voice | Self::Vehicle => false,
             Self::Simulation => logged(SIMULATED),
             Self::Import => logged(IMPORTED),
             Self::Trimmed => logged(TRIMMED),

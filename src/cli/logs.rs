@@ -7,7 +7,7 @@ use headrace_geometry::time::DurNs;
 use headrace_import::FileKind;
 
 use super::common_options::{Overwrite, Threads};
-use super::value_parsers::{chainage_range, file_kind, source_line, time};
+use super::value_parsers::{chainage_range, file_kind, length, source_line, time};
 
 #[derive(Debug, Args)]
 pub(crate) struct Export {
@@ -20,6 +20,44 @@ pub(crate) struct Export {
     /// Vehicle file, overriding the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Deliver {
+    /// Log of the dive, or the parts of a recording.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Folder to write. It must be empty or absent.
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: PathBuf,
+    /// File with the facts for the cover: plant, tunnel, client, date, and crew (a list).
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) about: Option<PathBuf>,
+    /// Name of the plant. This and the following options override the file.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) plant: Option<String>,
+    /// Name of the tunnel.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) tunnel: Option<String>,
+    /// Client of the inspection.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) client: Option<String>,
+    /// Date of the dive.
+    #[arg(long, value_name = "DATE")]
+    pub(crate) date: Option<String>,
+    /// Member of the crew. Give it once per member.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) crew: Vec<String>,
+    /// Distance between the report's cross-sections, metres. The default gives at most 24 of them.
+    #[arg(long, value_name = "METRES", value_parser = length)]
+    pub(crate) every: Option<f64>,
+    /// Vehicle file, overriding the one attached to the log.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
 }

@@ -11,10 +11,10 @@ use datafusion::arrow::array::{Array as _, ArrayRef, RecordBatch};
 use datafusion::arrow::compute::{cast, concat_batches};
 use datafusion::arrow::datatypes::{DataType, SchemaRef};
 use datafusion::error::DataFusionError;
-use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side, width_px};
-use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::look::{Colour, of_several};
-use headrace_pictures::polyline::Frame;
+use headrace_deliver::pictures::canvas::{Canvas, NORMAL, SMALL, Side, width_px};
+use headrace_deliver::pictures::chart::{Axis, Chart, short};
+use headrace_deliver::pictures::look::{Colour, of_several};
+use headrace_deliver::pictures::polyline::Frame;
 
 use crate::error::Error;
 

@@ -1,9 +1,9 @@
 //! Draws a detail of the sampling pattern around its largest gap, to scale.
 
-use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
-use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::look::{self, Colour, Look};
-use headrace_pictures::polyline::{Frame, Px};
+use headrace_deliver::pictures::canvas::{Canvas, NORMAL, SMALL, Side};
+use headrace_deliver::pictures::chart::{Axis, Chart, short};
+use headrace_deliver::pictures::look::{self, Colour, Look};
+use headrace_deliver::pictures::polyline::{Frame, Px};
 
 use super::laid::Laid;
 

@@ -1,10 +1,10 @@
 //! Chart of the duration of a dive, in hours, against the sample spacing T.
 
-use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side, width_px};
-use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::labels::{self, Label};
-use headrace_pictures::look::{self, Colour, Look};
-use headrace_pictures::polyline::Frame;
+use headrace_deliver::pictures::canvas::{BOLD, Canvas, NORMAL, Side, width_px};
+use headrace_deliver::pictures::chart::{Axis, Chart, short};
+use headrace_deliver::pictures::labels::{self, Label};
+use headrace_deliver::pictures::look::{self, Colour, Look};
+use headrace_deliver::pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 
 use super::advised;

@@ -1,7 +1,7 @@
 //! Computes the sampling pattern on the wall, and the chainages that all heads have passed.
 
+use headrace_deliver::pictures::polyline;
 use headrace_geometry::math;
-use headrace_pictures::polyline;
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::PatternSample;
 

@@ -1,6 +1,6 @@
 //! Names and results of the modes, for the charts of speeds and hours.
 
-use headrace_pictures::look::{self, Look};
+use headrace_deliver::pictures::look::{self, Look};
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::Planner;
 

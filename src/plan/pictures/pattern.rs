@@ -1,10 +1,10 @@
 //! Chart of the sampling pattern on the unrolled wall.
 
-use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
-use headrace_pictures::chart::{Axis, Chart};
-use headrace_pictures::clock;
-use headrace_pictures::look::{self, Look};
-use headrace_pictures::polyline::{Frame, Px};
+use headrace_deliver::pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
+use headrace_deliver::pictures::chart::{Axis, Chart};
+use headrace_deliver::pictures::clock;
+use headrace_deliver::pictures::look::{self, Look};
+use headrace_deliver::pictures::polyline::{Frame, Px};
 use headrace_sampling::SamplingError;
 
 use super::detail::{self, CIRCLE};

@@ -1,11 +1,11 @@
 //! Chart of the spacing around the wall.
 
-use headrace_pictures::canvas::{self, Canvas, NORMAL, SMALL, Side, width_px};
-use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::clock::{self, Hour};
-use headrace_pictures::labels::{self, Label};
-use headrace_pictures::look::{self, BLACK, Colour, Look, PALE};
-use headrace_pictures::polyline::Frame;
+use headrace_deliver::pictures::canvas::{self, Canvas, NORMAL, SMALL, Side, width_px};
+use headrace_deliver::pictures::chart::{Axis, Chart, short};
+use headrace_deliver::pictures::clock::{self, Hour};
+use headrace_deliver::pictures::labels::{self, Label};
+use headrace_deliver::pictures::look::{self, BLACK, Colour, Look, PALE};
+use headrace_deliver::pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 use headrace_sampling::plan::WallPlace;
 

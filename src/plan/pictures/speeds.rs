@@ -1,10 +1,10 @@
 //! Chart of the sample spacing T against speed.
 
-use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side};
-use headrace_pictures::chart::{Axis, Chart};
-use headrace_pictures::labels::{self, Label};
-use headrace_pictures::look;
-use headrace_pictures::polyline::Frame;
+use headrace_deliver::pictures::canvas::{BOLD, Canvas, NORMAL, Side};
+use headrace_deliver::pictures::chart::{Axis, Chart};
+use headrace_deliver::pictures::labels::{self, Label};
+use headrace_deliver::pictures::look;
+use headrace_deliver::pictures::polyline::Frame;
 use headrace_sampling::SamplingError;
 
 use super::advised;

@@ -2,8 +2,8 @@
 //! right content.
 
 use clap::Parser;
+use headrace_deliver::pictures::xml::well_formed;
 use headrace_geometry::frames::Vec3;
-use headrace_pictures::xml::well_formed;
 use headrace_sampling::SamplingError;
 use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::{Inspection, Planner, Question};

@@ -6,6 +6,8 @@ mod bad_input;
 mod check;
 #[cfg(unix)]
 mod conventions;
+mod deliver;
+mod deliver_files;
 mod go_back_advice;
 mod logging;
 mod mavlink_out;

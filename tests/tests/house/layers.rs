@@ -16,7 +16,8 @@ const FOR_DEVICES: [&str; 1] = ["sensor"];
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
 /// Each crate in `replay/`, with the crates of `replay/` and the plugins that it may use in addition to the core.
-const FOR_REPLAY: [(&str, &[&str]); 3] = [
+const FOR_REPLAY: [(&str, &[&str]); 4] = [
+    ("replay/deliver", &[]),
     ("replay/simulator", &[]),
     ("replay/player", &["replay/simulator"]),
     (
@@ -74,7 +75,6 @@ fn may_need(place: &Path, needed: &Path) -> bool {
             let others = others.unwrap_or_else(|| panic!("{} has no layer", place.display()));
             core(needed).is_some() || others.iter().any(|other| needed == Path::new(other))
         }
-        "pictures" => core(needed).is_some(),
         // The program may use every library, but no test package.
         "" => !needed.starts_with("tests"),
         "tests" => true,
@@ -118,7 +118,7 @@ fn layer_rule_rejects_forbidden_dependencies() {
         ("replay/import", "plugins/mavlink", true),
         ("replay/import", "plugins/ports", false),
         ("replay/import", "plugins/devices", false),
-        ("pictures", "replay/player", false),
+        ("replay/deliver", "replay/player", false),
         ("", "plugins/mavlink", true),
         ("", "tests/oracle", false),
         ("tests", "", true),

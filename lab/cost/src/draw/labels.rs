@@ -1,7 +1,7 @@
 //! Places labels beside markers so that they cover neither markers nor one another.
 
-use headrace_pictures::canvas::{Letters, Side, width_px};
-use headrace_pictures::polyline::{Frame, Px};
+use headrace_deliver::pictures::canvas::{Letters, Side, width_px};
+use headrace_deliver::pictures::polyline::{Frame, Px};
 
 /// Space between a marker and its label, pixels.
 const APART_PX: f64 = 9.0;
@@ -81,7 +81,7 @@ fn overlap(a: &Frame, b: &Frame) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use headrace_pictures::canvas::SMALL;
+    use headrace_deliver::pictures::canvas::SMALL;
 
     const SHEET: Frame = Frame { left: 0.0, top: 0.0, right: 400.0, bottom: 200.0 };
 

@@ -3,9 +3,9 @@
 mod labels;
 mod panel;
 
-use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side, width_px};
-use headrace_pictures::look::{self, DIM, Look};
-use headrace_pictures::polyline::Px;
+use headrace_deliver::pictures::canvas::{Canvas, NORMAL, SMALL, Side, width_px};
+use headrace_deliver::pictures::look::{self, DIM, Look};
+use headrace_deliver::pictures::polyline::Px;
 
 use crate::point::Trade;
 use crate::words::number;
@@ -69,7 +69,7 @@ fn legend(canvas: &Canvas, trade: &Trade) {
 fn left_out(trade: &Trade) -> Vec<String> {
     let fits = |line: String| {
         let room_px = f64::from(WIDTH_PX) - 28.0;
-        let letters = headrace_pictures::canvas::Letters { colour: DIM, ..SMALL };
+        let letters = headrace_deliver::pictures::canvas::Letters { colour: DIM, ..SMALL };
         if width_px(&line, letters) <= room_px {
             return line;
         }

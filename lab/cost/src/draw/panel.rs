@@ -2,11 +2,11 @@
 //!
 //! Text states the default, the knee and the price of the next step.
 
-use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, SMALL, Side};
-use headrace_pictures::chart::{Axis, Chart};
-use headrace_pictures::labels::{self as ends, Label};
-use headrace_pictures::look::{self, Colour, Look};
-use headrace_pictures::polyline::Frame;
+use headrace_deliver::pictures::canvas::{BOLD, Canvas, NORMAL, SMALL, Side};
+use headrace_deliver::pictures::chart::{Axis, Chart};
+use headrace_deliver::pictures::labels::{self as ends, Label};
+use headrace_deliver::pictures::look::{self, Colour, Look};
+use headrace_deliver::pictures::polyline::Frame;
 
 use super::labels::Taken;
 use crate::point::{Point, Trade};

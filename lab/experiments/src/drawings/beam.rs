@@ -1,11 +1,11 @@
 //! Figure 15: wall covered by a beam.
 
 use headrace_geometry::math;
-use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, SMALL, Side};
-use headrace_pictures::chart::{Axis, Chart, short};
-use headrace_pictures::labels::{self, Label};
-use headrace_pictures::look::{self, Look};
-use headrace_pictures::polyline::Frame;
+use headrace_deliver::pictures::canvas::{BOLD, Canvas, NORMAL, SMALL, Side};
+use headrace_deliver::pictures::chart::{Axis, Chart, short};
+use headrace_deliver::pictures::labels::{self, Label};
+use headrace_deliver::pictures::look::{self, Look};
+use headrace_deliver::pictures::polyline::Frame;
 
 use crate::figures::{Footprint, Footprints};
 

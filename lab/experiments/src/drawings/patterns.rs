@@ -1,10 +1,10 @@
 //! Draws Figures 6 and 8: sampling patterns of heads in the phase-shift layout and in the sector-offset layout.
 
-use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side, width_px};
-use headrace_pictures::chart::{Axis, Chart};
-use headrace_pictures::clock;
-use headrace_pictures::look::{self, BLACK, Colour, Look, Marker};
-use headrace_pictures::polyline::{Frame, Px};
+use headrace_deliver::pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side, width_px};
+use headrace_deliver::pictures::chart::{Axis, Chart};
+use headrace_deliver::pictures::clock;
+use headrace_deliver::pictures::look::{self, BLACK, Colour, Look, Marker};
+use headrace_deliver::pictures::polyline::{Frame, Px};
 
 use crate::figures::{PhaseShift, Place, Sectors, Way};
 

@@ -1,9 +1,9 @@
 //! A colour scale from pale to dark. Larger values are darker, also in greyscale print and for colour-blind readers.
 
 use headrace_geometry::math;
-use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
-use headrace_pictures::look::Colour;
-use headrace_pictures::polyline::Px;
+use headrace_deliver::pictures::canvas::{Canvas, NORMAL, SMALL, Side};
+use headrace_deliver::pictures::look::Colour;
+use headrace_deliver::pictures::polyline::Px;
 
 /// Colours at equal intervals, from the pale end. Source: Nuñez, Anderton, Renslow, "Optimizing colormaps with
 /// consideration for color vision deficiency", 2018 (cividis).
@@ -52,7 +52,7 @@ pub(super) fn legend(canvas: &Canvas, [left, top]: Px, [width, height]: Px, word
         let share = f64::from(quarter) / 4.0;
         let over = if quarter == 4 { " and more" } else { "" };
         let x = left + share * width;
-        canvas.line(&[[x, top + height], [x, top + height + 4.0]], &headrace_pictures::look::AXIS);
+        canvas.line(&[[x, top + height], [x, top + height + 4.0]], &headrace_deliver::pictures::look::AXIS);
         let words = format!("{:.0}{over}", share * most);
         canvas.text([x - 4.0, top + height + 13.0], &words, Side::Right, SMALL);
     }

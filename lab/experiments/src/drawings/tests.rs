@@ -1,6 +1,6 @@
 //! Tests that the pictures are well-formed, reproducible and have the expected content.
 
-use headrace_pictures::xml::well_formed;
+use headrace_deliver::pictures::xml::well_formed;
 
 use super::*;
 use crate::figures::{self, AT_GAPS, PHASES, Walls};

@@ -1,11 +1,11 @@
 //! Figures 12 and 13: samples on the unrolled wall, and the distance of the surface through them.
 
 use headrace_geometry::math;
-use headrace_pictures::canvas::{BOLD, Canvas, Letters, SMALL, Side, width_px};
-use headrace_pictures::chart::{Axis, Chart};
-use headrace_pictures::clock;
-use headrace_pictures::look::{BLACK, Colour, Look, Marker};
-use headrace_pictures::polyline::{Frame, Px};
+use headrace_deliver::pictures::canvas::{BOLD, Canvas, Letters, SMALL, Side, width_px};
+use headrace_deliver::pictures::chart::{Axis, Chart};
+use headrace_deliver::pictures::clock;
+use headrace_deliver::pictures::look::{BLACK, Colour, Look, Marker};
+use headrace_deliver::pictures::polyline::{Frame, Px};
 
 use super::scale;
 use crate::figures::{Panel, Walls};

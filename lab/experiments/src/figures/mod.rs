@@ -4,7 +4,7 @@ mod beam;
 mod patterns;
 mod walls;
 
-use headrace_pictures::polyline;
+use headrace_deliver::pictures::polyline;
 
 use crate::runs::{Dive, Sample};
 

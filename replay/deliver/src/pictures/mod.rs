@@ -1,4 +1,4 @@
-//! Draws figures as SVG text: sheet, charts, looks of lines and markers, and labels.
+//! Draws figures: sheet, charts, looks of lines and markers, and labels.
 //!
 //! Figures are made for white paper: each line has its own dash pattern and label as well as its own colour. Equal
 //! input gives equal bytes.
@@ -9,4 +9,5 @@ pub mod clock;
 pub mod labels;
 pub mod look;
 pub mod polyline;
+pub mod shape;
 pub mod xml;

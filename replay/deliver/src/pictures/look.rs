@@ -1,7 +1,7 @@
 //! Colours, and looks of lines and markers. No two looks differ in colour alone.
 
 /// A colour as red, green and blue.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Colour(pub u8, pub u8, pub u8);
 
 /// Colour of text and main curves.

@@ -1,0 +1,11 @@
+//! A printable document, and its forms as HTML and PDF. Equal documents give equal bytes.
+
+mod helvetica;
+mod html;
+mod layout;
+mod model;
+mod pdf;
+
+pub use html::html;
+pub use model::{Block, Document, Table};
+pub use pdf::{Pdf, pdf};
