@@ -1,7 +1,7 @@
 //! The shapes of a drawing, and their form as SVG. Positions are in pixels from the upper left corner.
 
-use svg::node::element;
 use svg::Node;
+use svg::node::element;
 
 use super::look::{Colour, Look};
 use super::polyline::Px;
