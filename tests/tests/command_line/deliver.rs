@@ -60,7 +60,11 @@ fn numbers_of(value: &Value, numbers: &mut Vec<f64>) {
 
 /// A number as printed, in metres if it is a station.
 fn printed(word: &str) -> Option<String> {
-    let word = word.trim_matches(|c: char| !c.is_ascii_digit() && c != '-');
+    // Words such as `sonar_0` and checksums aren't numbers.
+    let word = word.trim_matches(|c: char| !c.is_ascii_alphanumeric() && c != '-');
+    if !word.chars().all(|c| c.is_ascii_digit() || "+-.".contains(c)) {
+        return None;
+    }
     let number = match word.split_once('+') {
         Some((kilometres, metres)) => {
             let metres = 1000.0 * kilometres.parse::<f64>().ok()? + metres.parse::<f64>().ok()?;

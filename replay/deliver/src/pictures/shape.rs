@@ -1,7 +1,7 @@
 //! The shapes of a drawing, and their form as SVG. Positions are in pixels from the upper left corner.
 
+use svg::Node;
 use svg::node::element;
-use svg::{Document, Node};
 
 use super::look::{Colour, Look};
 use super::polyline::Px;
@@ -79,7 +79,7 @@ impl Drawing {
     /// Returns the drawing as SVG.
     pub fn svg(&self) -> String {
         let [width, height] = self.size_px;
-        let mut document = Document::new()
+        let mut document = element::SVG::new()
             .set("width", width)
             .set("height", height)
             .set("viewBox", (0, 0, width, height))
@@ -92,7 +92,7 @@ impl Drawing {
 }
 
 impl Shape {
-    fn append_to(&self, document: &mut Document) {
+    fn append_to(&self, document: &mut element::SVG) {
         match self {
             Self::Text { at, down_px, text, side, letters } => {
                 document.append(text_element(*at, *down_px, text, (*side, *letters)));

@@ -235,7 +235,7 @@ fn coverage(report: &Report, wall: &Wall, extent_m: [f64; 2]) -> Vec<Block> {
         ("Size of a survey square", size),
         ("Survey squares", survey.nodes.to_string()),
         ("Share with enough samples", share),
-        ("Samples that are enough", survey.enough.to_string()),
+        ("Samples that a square needs", survey.enough.to_string()),
         ("Squares without a sample", survey.empty.to_string()),
     ];
     let mut blocks = vec![

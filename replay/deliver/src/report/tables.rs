@@ -1,7 +1,7 @@
 //! Tables of the report. All numbers are those of [`Report`], rounded.
 
 use headrace_coverage::{Unsure, Verdict};
-use headrace_monitor::pilot_text::{cause_text, station};
+use headrace_monitor::pilot_text::station;
 use headrace_monitor::report::{NoVerdictReport, Report, RunReport, SourceReport};
 use headrace_monitor::section_row::SectionRow;
 use headrace_monitor::unsure_stretch::unsure_text;
@@ -48,11 +48,6 @@ pub(super) fn verdicts(report: &Report) -> Table {
 /// Missed stretches, with their causes, and whether a later pass has filled them.
 pub(super) fn missed(report: &Report) -> Table {
     let row = |run: &RunReport| {
-        let cause = run.figures.as_ref();
-        let cause = cause.map_or_else(
-            || run.cause.as_str().replace('_', " "),
-            |figures| cause_text(figures, &report.heads),
-        );
         let refilled = match (run.merged_into, run.cleared_s) {
             (Some(other), _) => format!("part of {other}"),
             (None, Some(at_s)) => format!("yes, at {at_s:.0} s"),
@@ -65,7 +60,7 @@ pub(super) fn missed(report: &Report) -> Table {
             format!("{:.2}", run.failed_m),
             format!("{:.2}", run.hole_m),
             run.hole_clock.clone(),
-            cause,
+            causes(run),
             format!("{:.0}", run.raised_s),
             refilled,
         ]
@@ -82,6 +77,13 @@ pub(super) fn missed(report: &Report) -> Table {
         "refilled",
     ];
     table(columns, report.runs.iter().map(row))
+}
+
+/// Causes of a missed stretch in words, the main cause first.
+fn causes(run: &RunReport) -> String {
+    let causes: Vec<String> = run.causes.iter().map(|cause| cause.as_str().replace('_', " ")).collect();
+    let silent = run.silent_sources.join(", ");
+    if silent.is_empty() { causes.join(", ") } else { format!("{} ({silent})", causes.join(", ")) }
 }
 
 /// Stretches without a verdict.
