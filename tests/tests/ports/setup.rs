@@ -151,7 +151,7 @@ fn questions_on_a_terminal_are_repeated_until_the_answer_is_allowed() {
 }
 
 #[test]
-fn self_test_names_an_unplugged_head_and_what_to_do() {
+fn unplugged_head_fails_the_self_test() {
     let folder = Folder::new();
     let mut emulator = Piped::emulator(&folder);
     emulator.until("vehicle", "rehearsal");
