@@ -34,7 +34,7 @@ fn plain(page: &str) -> String {
     for (number, part) in body.split("<svg").enumerate() {
         let part = if number == 0 { part } else { part.split_once("</svg>").unwrap().1 };
         text.push_str(
-            &part.replace("</td><td>", " | ").replace("</th><th>", " | ").replace("</dt><dd>", ": "),
+            &part.replace("</td><td", " | <td").replace("</th><th", " | <th").replace("</dt><dd>", ": "),
         );
     }
     let mut lines = Vec::new();

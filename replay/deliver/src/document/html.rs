@@ -56,8 +56,9 @@ fn append(text: &mut String, block: &Block) {
         Block::Paragraph(words) => writeln!(text, "<p>{}</p>", escaped(words)),
         Block::Warning(words) => writeln!(text, "<p class=\"warning\">{}</p>", escaped(words)),
         Block::List(items) => {
-            let items: String = items.iter().map(|item| format!("<li>{}</li>\n", escaped(item))).collect();
-            writeln!(text, "<ul>\n{items}</ul>")
+            let items: Vec<String> =
+                items.iter().map(|item| format!("<li>{}</li>\n", escaped(item))).collect();
+            writeln!(text, "<ul>\n{}</ul>", items.concat())
         }
         Block::Values(values) => {
             let pair = |(name, value): &(String, String)| {

@@ -24,7 +24,7 @@ pub(super) struct Cell {
 
 impl Cell {
     /// Mean deviation from the design, m; `None` without samples.
-    pub(super) fn mean_m(&self) -> Option<f64> {
+    pub(super) fn mean_m(self) -> Option<f64> {
         (self.samples > 0).then(|| f64::from(self.sum_m) / f64::from(self.samples))
     }
 }
