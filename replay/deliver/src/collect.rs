@@ -135,9 +135,14 @@ impl<'a> Collector<'a> {
     /// Completes points and track.
     ///
     /// Errors: the first error since the beginning.
-    pub fn finish(self, folder: &Path) -> Result<(), PathError> {
+    pub fn finish(mut self, folder: &Path) -> Result<(), PathError> {
         let at = |(name, source)| PathError { path: folder.join(name), source };
         self.error.map_or(Ok(()), Err).map_err(at)?;
+        // At the end of a dive, the surveyor counts returns that still wait as doubtful.
+        for point in self.waiting.into_values() {
+            let doubtful = Point { is_doubtful: true, ..point };
+            self.points.add(&doubtful).map_err(|error| at((POINTS, error)))?;
+        }
         self.points.finish().map_err(|error| at((POINTS, error)))?;
         self.track.finish().map_err(|error| at((TRACK, error)))?;
         Ok(())

@@ -38,7 +38,7 @@ fn two_deliveries_have_the_same_files_for_other_programs() {
 
 #[test]
 fn points_are_the_samples_and_doubtful_returns_of_the_report() {
-    for name in ["too-fast", "steel"] {
+    for name in ["too-fast", "steel", "murk"] {
         let folder = delivered(name);
         let report: Value = serde_json::from_slice(&folder.read("out/report.json")).unwrap();
         let dive = &report["dive"];
@@ -47,6 +47,6 @@ fn points_are_the_samples_and_doubtful_returns_of_the_report() {
         let points: Vec<_> = text.lines().filter(|line| !line.starts_with('#')).collect();
         let count = |doubtful: &str| points.iter().filter(|line| line.ends_with(doubtful)).count() as u64;
         assert_eq!(stated.map(|value| value.as_u64().unwrap()), [count(" 0"), count(" 1")], "{name}");
-        assert!(count(" 0") > 1000, "{name}");
+        assert!(count(" 0") > 900, "{name}");
     }
 }

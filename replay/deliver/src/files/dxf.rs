@@ -94,10 +94,16 @@ impl<W: Write> Drawing<W> {
         Ok(())
     }
 
-    /// Writes a polyline. Fewer than two corners draw nothing.
+    /// Writes a polyline. A single corner between gaps becomes a point.
     fn polyline(&mut self, layer: &str, is_closed: bool, corners_m: &[[f64; 3]]) -> Result<(), FileError> {
-        if corners_m.len() < 2 {
-            return Ok(());
+        match corners_m {
+            [] => return Ok(()),
+            [corner] => {
+                self.groups(&[(0, "POINT"), (8, layer)])?;
+                self.entities += 1;
+                return self.place(10, *corner);
+            }
+            _ => {}
         }
         let flags = POLYLINE_3D | if is_closed { CLOSED } else { 0 };
         self.groups(&[(0, "POLYLINE"), (8, layer), (66, "1"), (70, &flags.to_string())])?;

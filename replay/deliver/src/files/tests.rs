@@ -347,13 +347,14 @@ fn profile_is_interrupted_where_the_wall_was_not_measured() {
         measured: Edges { crown_m, ..Edges::default() },
         design: Edges { floor_m: Some(0.0), crown_m: Some(3.0), ..Edges::default() },
     };
-    let crowns = [Some(3.1), Some(3.2), None, Some(3.1), Some(3.0), Some(2.9)];
+    let crowns = [Some(3.1), Some(3.2), None, Some(3.3), None, Some(2.9), Some(3.1)];
     let stations = (0_u32..).zip(crowns).map(|(x, crown)| station(x.into(), crown)).collect::<Vec<_>>();
     let mut bytes = Vec::new();
-    assert_eq!(dxf::write_profile(&mut bytes, &info(), &stations).unwrap(), 4 + 1);
+    assert_eq!(dxf::write_profile(&mut bytes, &info(), &stations).unwrap(), 5 + 1);
+    assert_eq!(count(&groups(&bytes), 0, "POINT"), 1);
     assert_eq!(count(&groups(&bytes), 20, "3.100"), 2);
     let mut bytes = Vec::new();
-    assert_eq!(tables::write_profile(&mut bytes, &stations).unwrap(), 6);
+    assert_eq!(tables::write_profile(&mut bytes, &stations).unwrap(), 7);
 }
 
 fn deviation_m(column: u32, row: u32) -> Option<f64> {
