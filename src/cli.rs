@@ -139,10 +139,11 @@ pub(crate) enum Command {
     /// inside (docs/how-to/read-the-page.md). Exit codes are those of replay.
     #[command(after_help = "Example:\n  headrace export dive.mcap --html dive.html")]
     Export(Export),
-    /// Write a recorded dive's report for the owner of the plant, as HTML, PDF and JSON.
+    /// Write a recorded dive's report for the owner of the plant (HTML, PDF, JSON), and files for other programs.
     ///
     /// The log is replayed through the same processing. The report states what was inspected, what was
-    /// missed and what is not known. Two runs write identical bytes. Exit codes are those of replay.
+    /// missed and what is not known. Points, sections, profile, map, track and wall are files for CAD and
+    /// point cloud programs. Two runs write identical bytes. Exit codes are those of replay.
     #[command(
         after_help = "Example:\n  headrace deliver dive.mcap -o report --about about.toml\n  headrace deliver dive.mcap -o report --plant Ceran --crew 'A. Berg' --every 5"
     )]

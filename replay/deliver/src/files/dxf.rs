@@ -1,6 +1,6 @@
 //! Sections and profile as DXF, release 12, which all CAD programs read.
 //!
-//! The crate `dxf` holds the whole drawing in memory and takes dates from the clock, so this writer is its own.
+//! Release 12 is a text format of few records, so no library writes it. The drawing never lies in memory as a whole.
 
 use std::io::{BufWriter, Write};
 
