@@ -47,7 +47,11 @@ mod tests {
         assert!(page.to_lowercase().contains("<!doctype html>"));
         let referred: Vec<&str> =
             page.split(['"', '\'']).filter_map(|part| part.strip_prefix("./assets/")).collect();
-        assert_eq!(referred.len(), 3, "script, style and icon, by relative addresses, because proxies add a path");
+        assert_eq!(
+            referred.len(),
+            3,
+            "script, style and icon, by relative addresses, because proxies add a path"
+        );
         for path in referred {
             assert!(asset(&format!("assets/{path}")).is_some(), "{path}");
         }
