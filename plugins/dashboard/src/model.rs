@@ -87,6 +87,8 @@ pub struct Model {
     places: VecDeque<(u64, usize)>,
     state: Option<Box<(Box<LiveStateJson>, Beside)>>,
     state_is_new: bool,
+    /// Whether viewers need the lists again, because playback jumped and the state after the jump comes later.
+    lists_due: bool,
     playback: Option<PlaybackState>,
     new_events: Vec<Value>,
     events: VecDeque<(u64, Utf8Bytes)>,
@@ -115,6 +117,7 @@ impl Model {
             places: VecDeque::new(),
             state: None,
             state_is_new: false,
+            lists_due: false,
             playback: None,
             new_events: Vec::new(),
             events: VecDeque::new(),
@@ -207,6 +210,7 @@ impl Model {
 
     fn jump(&mut self, at: MonoNs) {
         self.jumps += 1;
+        (self.state, self.lists_due) = (None, true);
         self.sections.clear();
         self.changed.clear();
         self.events.clear();
@@ -254,6 +258,10 @@ impl Model {
         if core::mem::take(&mut self.state_is_new)
             && let Some(state) = self.state()
         {
+            if core::mem::take(&mut self.lists_due) {
+                let lists = self.lists();
+                messages.extend(lists.into_iter().map(|list| self.text(list, Sort::Other)));
+            }
             messages.push(self.text(state, Sort::State));
         }
         if core::mem::take(&mut self.end_is_new)

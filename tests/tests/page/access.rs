@@ -41,8 +41,8 @@ fn client_without_a_token_gets_nothing_of_the_dive() {
         assert!(!answer.contains("dive"), "{answer}");
     }
     assert_eq!(serving.ask("POST", "/actions/mark", &[], "").0, 401);
-    for path in ["/", "/widget/alerts", "/widget/assets/page.js", "/register_service", "/cockpit_extras.json"]
-    {
+    assert_eq!(serving.ask("GET", "/widget/assets/page.js", &[], "").0, 200);
+    for path in ["/", "/widget/alerts", "/register_service", "/cockpit_extras.json"] {
         let (status, answer) = serving.ask("GET", path, &[], "");
         assert_eq!(status, 200, "{path}");
         assert!(!answer.contains("short") && !answer.contains("0123456789"), "{answer}");
