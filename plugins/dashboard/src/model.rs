@@ -87,8 +87,8 @@ pub struct Model {
     places: VecDeque<(u64, usize)>,
     state: Option<Box<(Box<LiveStateJson>, Beside)>>,
     state_is_new: bool,
-    /// Whether viewers need the lists again, because playback jumped and the state after the jump comes later.
-    lists_due: bool,
+    /// Number of jumps after which the lists were sent. The state after a jump comes later than the jump.
+    listed: u32,
     playback: Option<PlaybackState>,
     new_events: Vec<Value>,
     events: VecDeque<(u64, Utf8Bytes)>,
@@ -117,7 +117,7 @@ impl Model {
             places: VecDeque::new(),
             state: None,
             state_is_new: false,
-            lists_due: false,
+            listed: 0,
             playback: None,
             new_events: Vec::new(),
             events: VecDeque::new(),
@@ -210,7 +210,7 @@ impl Model {
 
     fn jump(&mut self, at: MonoNs) {
         self.jumps += 1;
-        (self.state, self.lists_due) = (None, true);
+        self.state = None;
         self.sections.clear();
         self.changed.clear();
         self.events.clear();
@@ -258,7 +258,7 @@ impl Model {
         if core::mem::take(&mut self.state_is_new)
             && let Some(state) = self.state()
         {
-            if core::mem::take(&mut self.lists_due) {
+            if core::mem::replace(&mut self.listed, self.jumps) != self.jumps {
                 let lists = self.lists();
                 messages.extend(lists.into_iter().map(|list| self.text(list, Sort::Other)));
             }
