@@ -57,7 +57,8 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     let (is_served, recording_is_on) = (page::is_wanted(&args.page, true), recording.is_some());
     let mut dive =
         Assembly::of(vehicle, text).recorded(recording).kept(is_served).assemble()?.operated(Clock::Ours);
-    if let (Some(log), true) = (logs.first(), recording_is_on) {
+    // After a restart, the recordings come in another order. The states stay beside the same one.
+    if let (Some(log), true) = (logs.iter().min(), recording_is_on) {
         dive.keep_states(log);
     }
     let rebuild = resuming.as_ref().map(|resuming| resuming.begin(vehicle, &mut dive)).transpose()?;
