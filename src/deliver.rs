@@ -31,9 +31,10 @@ pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let given = Given::read(args.vehicle.as_deref())?;
     let about = about(args)?;
+    // The log comes before the folder, so that a log that can't be read leaves no empty folder behind.
+    let mut player = Player::open(&files)?;
     let inputs = files.iter().chain(&given.files).chain(&args.about).cloned();
     let [html_file, pdf_file, json_file] = claimed(args, inputs)?;
-    let mut player = Player::open(&files)?;
     let (text, vehicle) = given.or_attached(player.info(), &player.losses(), log)?;
     let utc_of_zero_s = page::utc_of_zero_s(&player.info().metadata);
     let dive = Assembly::of(&vehicle, &text).kept(true).assemble()?;

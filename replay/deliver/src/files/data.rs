@@ -124,8 +124,6 @@ pub struct Finding {
     pub stations: [String; 2],
     /// First and last chainage.
     pub chainages_m: [f64; 2],
-    /// First and last clock position, hours, clockwise; `None` for the whole perimeter.
-    pub clock_h: Option<[f64; 2]>,
     /// Kind, for instance missed or deposit.
     pub kind: String,
     /// Cause, or empty.

@@ -10,7 +10,6 @@ use super::rounding::{push_decimal, steps};
 const M: usize = 3;
 const DEG: usize = 2;
 const S: usize = 3;
-const H: usize = 2;
 
 /// Value of a cell.
 enum Cell<'a> {
@@ -144,7 +143,7 @@ pub fn write_profile(write: impl Write, stations: &[ProfileStation]) -> Result<u
 ///
 /// Errors: a number is not finite; the stream fails.
 pub fn write_findings(write: impl Write, findings: &[Finding]) -> Result<u64, FileError> {
-    let columns = "from_station,to_station,from_m,to_m,clock_from_h,clock_to_h,kind,cause,text";
+    let columns = "from_station,to_station,from_m,to_m,kind,cause,text";
     let mut table = Table::new(write, "findings as CSV", columns)?;
     for finding in findings {
         table.row(&[
@@ -152,8 +151,6 @@ pub fn write_findings(write: impl Write, findings: &[Finding]) -> Result<u64, Fi
             Cell::Text(&finding.stations[1]),
             Cell::Number(Some(finding.chainages_m[0]), M),
             Cell::Number(Some(finding.chainages_m[1]), M),
-            Cell::Number(finding.clock_h.map(|[from, _]| from), H),
-            Cell::Number(finding.clock_h.map(|[_, to]| to), H),
             Cell::Text(&finding.kind),
             Cell::Text(&finding.cause),
             Cell::Text(&finding.text),

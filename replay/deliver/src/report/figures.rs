@@ -57,6 +57,11 @@ pub(super) fn word(verdict: Verdict) -> &'static str {
     if verdict == Verdict::CannotSay { "no verdict" } else { verdict_words(verdict) }
 }
 
+/// Word of the report for a section.
+pub(super) fn section_word(row: &SectionRow) -> &'static str {
+    if row.not_inspected { NOT_INSPECTED } else { word(row.verdict) }
+}
+
 fn verdict_tone(verdict: Verdict) -> Tone {
     let (ground, hatched) = match verdict {
         Verdict::Pass => (Colour(212, 232, 222), 0),

@@ -1,16 +1,17 @@
 //! Sections, profile, map, mesh and findings of a dive, as plain values for the files of other programs.
 
+use headrace_coverage::{Unsure, Verdict};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Yz;
-use headrace_monitor::pilot_text::{cause_text, station};
+use headrace_monitor::pilot_text::station;
 use headrace_monitor::report::RunReport;
 use headrace_monitor::section_row::SectionRow;
-use headrace_monitor::unsure_stretch::unsure_text;
 use headrace_monitor::words::NOT_INSPECTED;
 
 use super::chapters::Delivery;
-use super::figures::word;
+use super::figures::{section_word, word};
 use super::measured::{places_m, usual_step_m};
+use super::tables::{causes, reason};
 use super::wall::{SECTORS, Wall};
 use crate::files::data::{Edges, Finding, ProfileStation, Section, WallMap, WallMesh};
 
@@ -48,7 +49,7 @@ impl Delivery<'_> {
             chainage_m: x_m,
             measured_m: pieces(&corners),
             design_m: (0..2 * SECTORS).map(|half| wall_point(self.wall, half as f64 / 2.0, 0.0)).collect(),
-            verdict: row.map_or(NOT_INSPECTED, verdict).to_owned(),
+            verdict: row.map_or(NOT_INSPECTED, section_word).to_owned(),
             hole_m: row.and_then(|row| row.hole_m),
             hole_sd_m: row.filter(|row| row.hole_m.is_some()).map(|row| row.hole_sd_m),
         }
@@ -126,19 +127,13 @@ impl Delivery<'_> {
     pub fn findings(&self) -> Vec<Finding> {
         let report = self.report;
         let stated = report.runs.iter().filter(|run| run.merged_into.is_none());
-        let mut findings: Vec<_> = stated.map(|run| self.missed(run)).collect();
+        let mut findings: Vec<_> = stated.map(missed).collect();
         findings.extend(report.no_verdict.iter().map(|stretch| {
             let text = format!("{:.2} m without verdict", stretch.no_verdict_m);
-            let cause = unsure_text(&stretch.stretch);
-            Finding { cause, text, ..finding([stretch.start_m, stretch.end_m], "no verdict") }
+            let is_inspected = stretch.stretch.why != Unsure::NotInspected;
+            let kind = if is_inspected { word(Verdict::CannotSay) } else { NOT_INSPECTED };
+            Finding { cause: reason(stretch), text, ..finding([stretch.start_m, stretch.end_m], kind) }
         }));
-        for rows in report.sections.chunk_by(|a, b| a.not_inspected == b.not_inspected) {
-            if let ([first, ..], [.., last]) = (rows, rows)
-                && first.not_inspected
-            {
-                findings.push(finding([first.start_m, last.end_m], NOT_INSPECTED));
-            }
-        }
         findings.extend(report.wall_stretches.iter().map(|stretch| {
             let [mean, inmost, outmost] = [stretch.mean_m, stretch.inmost_m, stretch.outmost_m];
             let text =
@@ -148,26 +143,16 @@ impl Delivery<'_> {
         findings.sort_by(|a, b| a.chainages_m[0].total_cmp(&b.chainages_m[0]));
         findings
     }
+}
 
-    fn missed(&self, run: &RunReport) -> Finding {
-        let figures = run.figures.as_ref();
-        let cause = figures.map_or_else(
-            || run.cause.as_str().replace('_', " "),
-            |figures| cause_text(figures, &self.report.heads),
-        );
-        let kind = if run.cleared_s.is_some() { "missed, then refilled" } else { "missed" };
-        let text = format!("largest hole {:.2} m at {}", run.hole_m, run.hole_clock);
-        Finding { cause, text, ..finding([run.start_m, run.end_m], kind) }
-    }
+fn missed(run: &RunReport) -> Finding {
+    let kind = if run.cleared_s.is_some() { "missed, then refilled" } else { "missed" };
+    let text = format!("largest hole {:.2} m at {}", run.hole_m, run.hole_clock);
+    Finding { cause: causes(run), text, ..finding([run.start_m, run.end_m], kind) }
 }
 
 fn finding(chainages_m: [f64; 2], kind: &str) -> Finding {
     Finding { stations: chainages_m.map(station), chainages_m, kind: kind.to_owned(), ..Finding::default() }
-}
-
-/// Verdict of a section in words.
-fn verdict(row: &SectionRow) -> &'static str {
-    if row.not_inspected { NOT_INSPECTED } else { word(row.verdict) }
 }
 
 /// Point at a sector, `off_m` outside the design along the ray from the reference point.

@@ -7,7 +7,7 @@ use headrace_monitor::section_row::SectionRow;
 use headrace_monitor::unsure_stretch::unsure_text;
 use headrace_monitor::words::NOT_INSPECTED;
 
-use super::figures::word;
+use super::figures::{section_word, word};
 use crate::document::Table;
 
 /// Text for a value that doesn't exist.
@@ -80,23 +80,27 @@ pub(super) fn missed(report: &Report) -> Table {
 }
 
 /// Causes of a missed stretch in words, the main cause first.
-fn causes(run: &RunReport) -> String {
+pub(super) fn causes(run: &RunReport) -> String {
     let causes: Vec<String> = run.causes.iter().map(|cause| cause.as_str().replace('_', " ")).collect();
     let silent = run.silent_sources.join(", ");
     if silent.is_empty() { causes.join(", ") } else { format!("{} ({silent})", causes.join(", ")) }
 }
 
+/// Reason for which a stretch has no verdict.
+pub(super) fn reason(stretch: &NoVerdictReport) -> String {
+    match stretch.stretch.why {
+        Unsure::Position => "the position is too uncertain for this hole".to_owned(),
+        Unsure::NotInspected => "not passed by all heads".to_owned(),
+        _ => unsure_text(&stretch.stretch),
+    }
+}
+
 /// Stretches without a verdict.
 pub(super) fn no_verdict(report: &Report) -> Table {
     let row = |stretch: &NoVerdictReport| {
-        let reason = match stretch.stretch.why {
-            Unsure::Position => "the position is too uncertain for this hole".to_owned(),
-            Unsure::NotInspected => "not passed by all heads".to_owned(),
-            _ => unsure_text(&stretch.stretch),
-        };
         let metres = [stretch.no_verdict_m, stretch.hole_m, stretch.hole_sd_m];
         let [length, hole, sd] = metres.map(|value_m| format!("{value_m:.2}"));
-        [station(stretch.start_m), station(stretch.end_m), length, hole, sd, reason]
+        [station(stretch.start_m), station(stretch.end_m), length, hole, sd, reason(stretch)]
     };
     let columns = ["from", "to", "without verdict, m", "largest hole, m", "sd of hole, m", "reason"];
     table(columns, report.no_verdict.iter().map(row))
@@ -104,13 +108,12 @@ pub(super) fn no_verdict(report: &Report) -> Table {
 
 /// Neighbouring sections with the same verdict.
 pub(super) fn by_chainage(report: &Report) -> Table {
-    let name = |row: &SectionRow| if row.not_inspected { NOT_INSPECTED } else { word(row.verdict) };
-    let runs = report.sections.chunk_by(|a, b| name(a) == name(b));
+    let runs = report.sections.chunk_by(|a, b| section_word(a) == section_word(b));
     let row = |run: &[SectionRow]| {
         let (first, last) = (run.first()?, run.last()?);
         let hole_m = run.iter().filter_map(|row| row.hole_m).max_by(f64::total_cmp);
         let least = run.iter().map(|row| row.density_perm2).min_by(f64::total_cmp);
-        let verdict = name(first).to_owned();
+        let verdict = section_word(first).to_owned();
         Some([station(first.start_m), station(last.end_m), verdict, or_none(hole_m, 2), or_none(least, 1)])
     };
     let columns = ["from", "to", "verdict", "largest hole, m", "least samples per m²"];
