@@ -229,6 +229,17 @@ fn wait_for_more(path: &Path, than: u64, dive: &mut Child) -> u64 {
     }
 }
 
+/// Returns the number of missing messages that the text about a recording states.
+#[track_caller]
+fn missing_messages(text: &str) -> u64 {
+    let number = text.split_once(" message").and_then(|(before, _)| before.rsplit(' ').next());
+    match number {
+        Some("no") => 0,
+        Some(number) => number.parse().unwrap_or_else(|error| panic!("{error}: {text}")),
+        None => panic!("no number of messages: {text}"),
+    }
+}
+
 #[test]
 fn removed_medium_loses_the_log_but_not_the_report() {
     let folder = Folder::with_dive();
@@ -324,11 +335,11 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
     ];
     for (words, take) in cases {
         let mut dive = headrace_tests::program();
-        let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
+        // The dive takes seven seconds, so that it reports the next part before its end even if each sync takes a second.
+        let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "3x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        // The file grows at each sync, twice a second. After four syncs, it surely contains data whose loss can be
-        // detected.
+        // The file grows at each write, twice a second. After four writes, it contains data of the dive.
         (0..4).fold(0, |len, _| wait_for_more(&log, len, &mut dive));
         take();
         let output = dive.wait_with_output().unwrap();
@@ -345,18 +356,18 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
             "{words}: {}",
             recording_lines[0]
         );
-        assert!(
-            recording_lines[1]["text"].as_str().unwrap().contains("messages are missing"),
-            "{}",
-            recording_lines[1]
-        );
+        let missing = missing_messages(recording_lines[1]["text"].as_str().unwrap());
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(report["digest"], digest.as_str());
         assert!(losses(&report).contains(words), "{words}: {}", losses(&report));
         // The second part of the recording has the rest of the data and states the loss before it.
         let (code, rest) = folder.replay("log.part002.mcap", &[]);
         assert!(code == Some(3) && losses(&rest).contains(words), "{code:?}: {}", losses(&rest));
-        assert!(rest["log"]["messages"].as_u64() > Some(1000), "{}", rest["log"]);
+        // Each message of the dive is in the second part or counted as missing. On a disk with slow syncs, all may still
+        // be in memory when the file is removed.
+        let (kept, of) =
+            (rest["log"]["messages"].as_u64().unwrap(), report["log"]["messages"].as_u64().unwrap());
+        assert!(kept > 1000 && kept + missing >= of, "{kept} and {missing} of {of}");
         for file in ["log.mcap", "log.part002.mcap", "aside.mcap"] {
             std::fs::remove_file(folder.path(file)).ok();
         }

@@ -97,7 +97,7 @@ impl DiveLog<File> {
     fn single(reader: LogReader<File>, file: &Path) -> Self {
         let path = file.to_owned();
         let number = reader.header().part.as_ref().map(|part| part.head.number);
-        let between = between(&[Glance::of(&reader, number.unwrap_or_default())]);
+        let between = between(&[Glance::of(&reader, number.unwrap_or_default())], &[]);
         let files = vec![PartFile { path: path.clone(), messages: 0, number }];
         Self::start(Box::new(move |_| LogReader::open(&path)), reader, files, between)
     }
@@ -105,7 +105,8 @@ impl DiveLog<File> {
     fn parts(files: &[PathBuf]) -> Result<Self, LogError> {
         let Arranged { parts, mut losses } = arrange(files)?;
         let glances: Vec<Glance> = parts.iter().map(|(_, glance)| glance.clone()).collect();
-        losses.extend(between(&glances));
+        let missing = between(&glances, &losses);
+        losses.extend(missing);
         let files: Vec<PartFile> = parts
             .into_iter()
             .map(|(path, glance)| PartFile { path, messages: 0, number: Some(glance.number) })
@@ -436,8 +437,8 @@ fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Returns losses before, between and after the parts of a recording.
-fn between(parts: &[Glance]) -> Vec<Loss> {
+/// Returns losses before, between and after the parts of a recording. `unread` are the losses of unreadable parts.
+fn between(parts: &[Glance], unread: &[Loss]) -> Vec<Loss> {
     let mut losses = Vec::new();
     let from = |glance: &Glance| glance.times.map(|times| times.1);
     let to = |glance: &Glance| glance.times.map(|times| times.0);
@@ -455,7 +456,11 @@ fn between(parts: &[Glance]) -> Vec<Loss> {
             losses.push(loss(LossKind::PartUnlike { part, messages, wanted }, from(one), to(next)));
         }
     }
-    if let Some(last) = parts.last().filter(|last| goes_on(last)) {
+    // If the recording was cut off just after the last part, the next part's file exists, but without its header.
+    let is_begun = |number| {
+        unread.iter().any(|loss| matches!(loss.kind, LossKind::PartUnreadable { part, .. } if part == number))
+    };
+    if let Some(last) = parts.last().filter(|last| goes_on(last) && !is_begun(last.number + 1)) {
         let kind = LossKind::PartsMissing { first: last.number + 1, last: None };
         losses.push(loss(kind, from(last), None));
     }

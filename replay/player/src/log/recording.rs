@@ -41,7 +41,7 @@ struct OpenPart {
     began: Option<MonoNs>,
     /// File size at which the open part should end, bytes.
     ends_at: u64,
-    /// Whether only the part's header has been synced so far.
+    /// Whether at most the part's header has been synced so far.
     fresh: bool,
     /// Number of synced raw messages in this part.
     raw_messages: u64,
@@ -99,7 +99,7 @@ impl Recording {
         header: &LogHeader,
     ) -> Result<Self, LogError> {
         let mut recording = Self::empty(storage, path, rotation, header);
-        recording.open = Some(recording.begin_part()?);
+        recording.open = Some(recording.begin_synced_part()?);
         recording.number = 1;
         Ok(recording)
     }
@@ -142,7 +142,7 @@ impl Recording {
             ..Self::empty(storage, &unfinished.recording, rotation, header)
         };
         recording.rotation.dive.clone_from(&unfinished.dive);
-        recording.open = Some(recording.begin_part()?);
+        recording.open = Some(recording.begin_synced_part()?);
         recording.number += 1;
         recording.state(Some(unfinished.last), Some(*to), words);
         Ok(recording)
@@ -284,7 +284,7 @@ impl Recording {
 
     /// Begins another part after an error, and writes the unsynced messages to it.
     fn resume(&mut self) {
-        let part = match self.begin_part() {
+        let part = match self.begin_synced_part() {
             Ok(part) => part,
             Err(error) => {
                 tracing::debug!("the recording can't continue yet: {error}");
@@ -352,7 +352,8 @@ impl Recording {
 
     /// Ends the part and begins the next one, whose first message has time `at`.
     ///
-    /// If the next part can't be begun, the present part continues.
+    /// If the next part can't be begun, the present part continues. A slow disk may need 0.3 s for each access, so the
+    /// next part's header is only synced together with its first messages.
     fn rotate(&mut self, at: MonoNs) {
         self.sync();
         if self.open.is_none() {
@@ -379,15 +380,27 @@ impl Recording {
         }
     }
 
-    /// Creates the file of the next part, writes its header and syncs it.
+    /// Begins a part, and syncs its header.
+    fn begin_synced_part(&mut self) -> Result<OpenPart, LogError> {
+        let mut part = self.begin_part()?;
+        match part.log.flush() {
+            Ok(()) => Ok(part),
+            Err(error) => {
+                let path = part.path.clone();
+                drop(part);
+                self.discard(&path);
+                Err(error)
+            }
+        }
+    }
+
+    /// Creates the file of the next part, and writes its header.
     fn begin_part(&mut self) -> Result<OpenPart, LogError> {
         let before = self.settled.progress(&self.header);
         let part = PartHead { dive: self.rotation.dive.clone(), number: self.number + 1, before };
         let header = LogHeader { part: Some(part), ..self.header.clone() };
         let (path, file) = self.create()?;
-        let begun =
-            LogWriter::new(Buffered::new(file), &header).and_then(|mut log| log.flush().map(|()| log));
-        match begun {
+        match LogWriter::new(Buffered::new(file), &header) {
             Ok(log) => {
                 let ends_at = match self.rotation.every {
                     Some(Every::Bytes(bytes)) => bytes,

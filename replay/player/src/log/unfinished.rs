@@ -214,7 +214,9 @@ fn unended(files: &[PathBuf]) -> Result<Option<(&Path, PartHead)>, LogError> {
     let end = reader.header().part.as_ref().and_then(|part| part.end.as_ref());
     let has_ended = end.is_some_and(|end| !end.follows);
     let is_empty = head.number == 1 && reader.times().is_none();
-    Ok(if has_ended || is_empty || is_being_written(last) { None } else { Some((last.as_path(), head)) })
+    // The newest file may not have its header yet.
+    let is_open = is_being_written(last) || files.last().is_some_and(|file| is_being_written(file));
+    Ok(if has_ended || is_empty || is_open { None } else { Some((last.as_path(), head)) })
 }
 
 /// Whether a program holds the lock of a log that it writes.

@@ -4,7 +4,7 @@ use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
 use super::super::{
-    DiveLog, Interrupted, Recorder, RecorderHandle, RecorderPort, Rotation, Unfinished, files_of,
+    DiveLog, Every, Interrupted, Recorder, RecorderHandle, RecorderPort, Rotation, Unfinished, files_of,
 };
 use super::parts::{Folder, all};
 use super::*;
@@ -93,6 +93,29 @@ fn recording_cut_at_any_byte_is_continued_without_gaps_or_repetitions() {
         }
     }
     assert!(continued > 20 && ended > 0, "{continued} continued, {ended} had ended in order");
+}
+
+/// A program that is killed just after it has ended a part leaves an empty file of the next part.
+#[test]
+fn recording_killed_just_after_a_part_is_continued() {
+    let folder = Folder::new("after-a-part");
+    let recording = folder.0.join("dive.mcap");
+    let rotation = Rotation { every: Some(Every::Span(DurNs::from_millis(2000))), dive: "one".to_owned() };
+    record(Recorder::create(&recording, &header(true), &rotation, QUEUE_BYTES, None).unwrap(), 0..50);
+    let next = folder.part(2);
+    (3..10).for_each(|part| std::fs::remove_file(folder.part(part)).unwrap_or_default());
+    let lock = std::fs::File::create(&next).unwrap();
+    lock.lock().unwrap();
+    assert!(!Unfinished::is_at(&recording).unwrap(), "another program writes the next part");
+    drop(lock);
+    let unread =
+        "the file that is named like part 2 can't be read: it begins with [], which no MCAP file does";
+    let (before, losses) = messages(&recording);
+    assert!(before.len() > 30 && losses == [unread], "{} messages, {losses:?}", before.len());
+    let stated = go_on(&recording);
+    let (after, losses) = messages(&recording);
+    assert!(after.len() == before.len() + 90 && after[..before.len()] == before);
+    assert_eq!(losses, [unread, &stated]);
 }
 
 #[test]
