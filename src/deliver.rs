@@ -2,6 +2,7 @@
 //! other programs.
 
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use headrace_config::Document;
 use headrace_deliver::collect::{self, Collector};
@@ -23,18 +24,36 @@ use crate::report_output::{exit_code, note_losses, state_utc};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
-/// Files of a delivery.
+/// Files of the report.
 const FILES: [&str; 3] = ["report.html", "report.pdf", "report.json"];
+/// Folder for the files while they are written, in the folder of the delivery. They are moved when all are complete.
+const UNFINISHED: &str = ".unfinished";
 
 /// Runs `headrace deliver`.
 pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
-    let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
+    let files = files_of(&args.logs)?;
     let given = Given::read(args.vehicle.as_deref())?;
     let about = about(args)?;
     // The log comes before the folder, so that a log that can't be read leaves no empty folder behind.
-    let mut player = Player::open(&files)?;
-    let inputs = files.iter().chain(&given.files).chain(&args.about).cloned();
-    let [html_file, pdf_file, json_file] = claimed(args, inputs)?;
+    let player = Player::open(&files)?;
+    claim(args, files.iter().chain(&given.files).chain(&args.about).cloned())?;
+    let unfinished = args.output.join(UNFINISHED);
+    remove(&unfinished)?;
+    outputs::folder(&unfinished)?;
+    let delivered = deliver_to(&unfinished, args, player, given, &about);
+    remove(&unfinished)?;
+    delivered
+}
+
+/// Writes the files to a folder and moves them from there when all are complete.
+fn deliver_to(
+    unfinished: &Path,
+    args: &Deliver,
+    mut player: Player,
+    given: Given,
+    about: &About,
+) -> Result<u8, Failure> {
+    let log = files::first_named(&args.logs);
     let (text, vehicle) = given.or_attached(player.info(), &player.losses(), log)?;
     let utc_of_zero_s = page::utc_of_zero_s(&player.info().metadata);
     let dive = Assembly::of(&vehicle, &text).kept(true).assemble()?;
@@ -43,29 +62,26 @@ pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
     let program = concat!("headrace ", env!("CARGO_PKG_VERSION")).to_owned();
     // Date and identity follow from the replay.
     let info = FileInfo { title: about.title(), program, date: None, id: [0; 16] };
-    let mut collector = Collector::new(&args.output, &info)?;
+    let mut collector = Collector::new(unfinished, &info)?;
     let feed = (&mut player as _, Pace::default());
     let threads = args.threads.of_replay();
     let mut report = dive.run_on(threads, feed, &mut Watch::quiet(), &mut |dive| {
         wall.take(dive);
         collector.take(dive);
     })?;
-    collector.finish(&args.output)?;
+    collector.finish(unfinished)?;
     note_losses(&mut report, log, &player);
     state_utc(&mut report, utc_of_zero_s);
     let delivery =
-        Delivery { about: &about, report: &report, wall: &wall, every_m: args.every, vehicle: &vehicle.name };
-    let document = delivery.document();
-    files::write(&html_file, html(&document).as_bytes())?;
-    let pdf = pdf(&document);
-    files::write(&pdf_file, &pdf.bytes)?;
-    files::write_json(&json_file, &report)?;
-    collect::write_files(&args.output, &info, &delivery)?;
-    say(&format!("report {}, {} and {}", html_file.display(), pdf_file.display(), json_file.display()));
-    if !pdf.unknown.is_empty() {
-        let letters: String = pdf.unknown.iter().collect();
+        Delivery { about, report: &report, wall: &wall, every_m: args.every, vehicle: &vehicle.name };
+    let unknown = write_report(unfinished, &delivery)?;
+    collect::write_files(unfinished, &info, &delivery)?;
+    publish(unfinished, &args.output)?;
+    let [html, pdf, json] = FILES.map(|name| args.output.join(name).display().to_string());
+    say(&format!("report {html}, {pdf} and {json}"));
+    if !unknown.is_empty() {
         say(&format!(
-            "the PDF shows question marks for {letters}, which its font lacks; print the HTML instead"
+            "the PDF shows question marks for {unknown}, which its font lacks; print the HTML instead"
         ));
     }
     for loss in report.log.iter().flat_map(|log| &log.losses) {
@@ -74,10 +90,29 @@ pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
     Ok(exit_code(&report))
 }
 
+/// Writes the report in its three forms. Returns the letters that the PDF can't show.
+fn write_report(folder: &Path, delivery: &Delivery<'_>) -> Result<String, Failure> {
+    let least_m = delivery.least_every_m();
+    if let Some(every_m) = delivery.every_m.filter(|every_m| *every_m < least_m) {
+        return Err(Failure::Usage(format!(
+            "--every {every_m}: the dive would have over 2000 cross-sections; allowed is {least_m:.2} m or more"
+        )));
+    }
+    let document = delivery.document();
+    let [html_file, pdf_file, json_file] = FILES.map(|name| folder.join(name));
+    files::write(&html_file, html(&document).as_bytes())?;
+    let pdf = pdf(&document);
+    files::write(&pdf_file, &pdf.bytes)?;
+    files::write_json(&json_file, delivery.report)?;
+    Ok(pdf.unknown.iter().collect())
+}
+
 /// Creates the folder, and claims its files.
-fn claimed(args: &Deliver, inputs: impl IntoIterator<Item = PathBuf>) -> Result<[PathBuf; 3], Failure> {
+fn claim(args: &Deliver, inputs: impl IntoIterator<Item = PathBuf>) -> Result<(), Failure> {
     let folder = &args.output;
-    let is_empty = || folder.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    let is_foreign =
+        |entry: io::Result<fs::DirEntry>| entry.is_ok_and(|entry| entry.file_name() != UNFINISHED);
+    let is_empty = || folder.read_dir().is_ok_and(|mut entries| !entries.any(is_foreign));
     if folder.exists() && !args.overwrite.force && !is_empty() {
         return Err(Failure::Usage(format!(
             "writing {}: it isn't an empty folder; give another name, or overwrite its files with --force",
@@ -85,12 +120,42 @@ fn claimed(args: &Deliver, inputs: impl IntoIterator<Item = PathBuf>) -> Result<
         )));
     }
     outputs::folder(folder)?;
-    let files = FILES.map(|name| folder.join(name));
     let mut claims = Claims::reading(inputs, &args.overwrite);
-    for file in files.iter().cloned().chain(collect::FILES.map(|name| folder.join(name))) {
+    for file in names().map(|name| folder.join(name)) {
         claims.claim("-o", &file, Kind::Delivered)?;
     }
-    Ok(files)
+    Ok(())
+}
+
+/// Names of all files of a delivery.
+fn names() -> impl Iterator<Item = &'static str> {
+    FILES.into_iter().chain(collect::FILES)
+}
+
+/// Removes the folder of a delivery that was not completed, if there is one.
+fn remove(unfinished: &Path) -> Result<(), Failure> {
+    match fs::remove_dir_all(unfinished) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(Failure::Write { path: unfinished.to_owned(), source: error })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Moves the complete files to the folder of the delivery. Files of an earlier delivery that this one doesn't have are
+/// removed.
+fn publish(unfinished: &Path, folder: &Path) -> Result<(), Failure> {
+    for name in names() {
+        let (from, to) = (unfinished.join(name), folder.join(name));
+        let done = if from.exists() { fs::rename(&from, &to) } else { fs::remove_file(&to) };
+        match done {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(Failure::Write { path: to, source: error });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Facts for the cover: those of the options, or else those of the file.

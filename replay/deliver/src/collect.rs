@@ -1,6 +1,6 @@
 //! Files for other programs, from a replay and its report.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
 use std::path::Path;
 
@@ -44,8 +44,9 @@ const COLOUR_LIMIT_M: f64 = 0.3;
 pub struct Collector<'a> {
     points: PointWriter<'a, File>,
     track: TrackWriter<File>,
-    /// Points whose returns have not been classified yet, by receive time and source.
-    waiting: BTreeMap<[u64; 2], Point>,
+    /// Points whose returns have not been classified yet, in order, by receive time and source. Several returns of a
+    /// head may have been received at once.
+    waiting: BTreeMap<[u64; 2], VecDeque<Point>>,
     /// Standard deviations of angles and of positions at the latest advice update, rad and m.
     sd: Option<[f64; 2]>,
     ticks: u64,
@@ -86,13 +87,23 @@ impl<'a> Collector<'a> {
         while let Some((record, rest)) = first_record(words) {
             words = rest;
             let [received, source, ..] = *record.words else { continue };
-            let Some(mut point) = self.waiting.remove(&[received, source]) else { continue };
+            let Some(mut point) = self.next_waiting([received, source]) else { continue };
             point.is_doubtful = record.kind == Some(RecordKind::Doubtful);
             if point.is_doubtful || record.kind == Some(RecordKind::Sample) {
                 self.points.add(&point).map_err(|error| (POINTS, error))?;
             }
         }
         Ok(())
+    }
+
+    /// Removes the first point that waits for a receive time and source.
+    fn next_waiting(&mut self, key: [u64; 2]) -> Option<Point> {
+        let points = self.waiting.get_mut(&key)?;
+        let point = points.pop_front();
+        if points.is_empty() {
+            self.waiting.remove(&key);
+        }
+        point
     }
 
     /// Keeps a return until it is classified.
@@ -113,7 +124,7 @@ impl<'a> Collector<'a> {
             head: u8::try_from(ping.head).unwrap_or(u8::MAX),
             is_doubtful: false,
         };
-        self.waiting.insert([ping.received.0, u64::from(ping.source.0)], point);
+        self.waiting.entry([ping.received.0, u64::from(ping.source.0)]).or_default().push_back(point);
     }
 
     fn update(&mut self, dive: &Loop, update: &Update) -> Result<(), FileError> {
@@ -139,7 +150,7 @@ impl<'a> Collector<'a> {
         let at = |(name, source)| PathError { path: folder.join(name), source };
         self.error.map_or(Ok(()), Err).map_err(at)?;
         // At the end of a dive, the surveyor counts returns that still wait as doubtful.
-        for point in self.waiting.into_values() {
+        for point in self.waiting.into_values().flatten() {
             let doubtful = Point { is_doubtful: true, ..point };
             self.points.add(&doubtful).map_err(|error| at((POINTS, error)))?;
         }

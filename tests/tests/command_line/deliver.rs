@@ -160,6 +160,35 @@ fn facts_that_nobody_states_are_left_out() {
 }
 
 #[test]
+fn forced_delivery_leaves_no_file_of_the_earlier_one() {
+    let folder = golden("murk");
+    deliver(&folder, &[]);
+    assert!(folder.path("out/map.png").exists());
+    folder.headrace(&["trim", "dive.mcap", "--to", "1", "-o", "short.mcap"]);
+    let answer = folder.headrace(&["deliver", "short.mcap", "-o", "out", "--force"]);
+    assert_eq!(answer.code, Some(1), "nothing was inspected: {}", answer.stderr);
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder.path("out")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert!(
+        names.len() > 10 && names.iter().all(|name| !name.to_string_lossy().starts_with("map.")),
+        "{names:?}"
+    );
+    assert!(!folder.path("out/.unfinished").exists());
+}
+
+#[test]
+fn refused_delivery_keeps_the_earlier_one() {
+    let folder = golden("murk");
+    let report = deliver(&folder, &[]);
+    let answer = folder.headrace(&["deliver", "dive.mcap", "-o", "out", "--force", "--every", "0.001"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    assert!(answer.stderr.contains("--every"), "{}", answer.stderr);
+    assert_eq!(folder.read("out/report.html"), report.as_bytes());
+    assert!(!folder.path("out/.unfinished").exists());
+}
+
+#[test]
 fn delivery_without_its_facts_or_an_empty_folder_is_refused() {
     let folder = golden("murk");
     let refused = |further: &[&str], word: &str| {

@@ -97,12 +97,14 @@ impl Delivery<'_> {
         }
         values.push(("Target".to_owned(), format!("no hole larger than {} m", report.target_m)));
         let sum = &report.summary;
-        for (name, length_m) in [
+        let open = (sum.open_m > 0.0).then_some(("Open", sum.open_m));
+        let sums = [
             ("Passed", sum.pass_m),
             ("Missed", sum.fail_m),
             ("No verdict", sum.cannot_say_m),
             ("Not inspected", sum.not_inspected_m),
-        ] {
+        ];
+        for (name, length_m) in sums.into_iter().chain(open) {
             values.push((name.to_owned(), metres(length_m)));
         }
         let mut blocks = vec![Block::Values(values)];

@@ -31,7 +31,7 @@ const LEGEND_PX: f64 = 34.0;
 const LEAST_PX: f64 = 1.5;
 /// Least width of a map's cell.
 const CELL_PX: f64 = 2.0;
-/// Least length of a map's cell, m.
+/// Least length of a map's cell, m. A cell has at least one section.
 const CELL_M: f64 = 0.5;
 /// Number of clock sectors in half an hour, the width of a map's cell.
 const CELL_SECTORS: usize = 4;
@@ -236,7 +236,7 @@ fn map(
     legend(&canvas, &classes.iter().map(plain).collect::<Vec<_>>());
     strips(&canvas, &wall.profile, extent_m, |chart, ends_m| {
         let length_m = ends_m[1] - ends_m[0];
-        let least_m = CELL_M.max(CELL_PX * length_m / (ENDS_PX[1] - ENDS_PX[0]));
+        let least_m = cell_m(wall).max(CELL_PX * length_m / (ENDS_PX[1] - ENDS_PX[0]));
         let count = math::round_to_i64((length_m / least_m).floor().max(1.0));
         let x_m = |column: i64| ends_m[0] + length_m * column as f64 / count as f64;
         let mut areas = vec![Vec::new(); classes.len()];
@@ -291,11 +291,12 @@ pub(super) fn deviation(wall: &Wall, extent_m: [f64; 2]) -> Drawing {
         Colour(222, 204, 92),
         Colour(254, 234, 120),
     ];
-    let step_m = round_up(spread_m(wall, extent_m) / 6.0);
+    // The outermost classes begin at 2.5 steps, so they have at most the outermost sixth of the deviations.
+    let step_m = round_up(spread_m(wall, extent_m) / 3.0);
     let limit = |number: usize| (number as f64 - 2.5) * step_m;
     let words = |number: usize| match number {
-        0 => format!("below {:.2}", limit(0)),
-        6 => format!("over {:.2} m", limit(5)),
+        0 => format!("below {:.3}", limit(0)),
+        6 => format!("over {:.3} m", limit(5)),
         _ => format!("{:.2}", (number as f64 - 3.0) * step_m),
     };
     let classes: Vec<_> =
@@ -305,14 +306,20 @@ pub(super) fn deviation(wall: &Wall, extent_m: [f64; 2]) -> Drawing {
     })
 }
 
-/// Largest mean deviation of half a metre of wall, inwards or outwards, m.
+/// Least length of a map's cell, m.
+fn cell_m(wall: &Wall) -> f64 {
+    CELL_M.max(wall.section_m)
+}
+
+/// Largest mean deviation of a cell of least length, inwards or outwards, m.
 fn spread_m(wall: &Wall, [from_m, to_m]: [f64; 2]) -> f64 {
-    let count = math::round_to_i64(((to_m - from_m) / CELL_M).ceil());
+    let cell_m = cell_m(wall);
+    let count = math::round_to_i64(((to_m - from_m) / cell_m).ceil());
     let mut most_m = 0.01_f64;
     for column in 0..count {
-        let x_m = from_m + column as f64 * CELL_M;
+        let x_m = from_m + column as f64 * cell_m;
         for first in (0..SECTORS).step_by(CELL_SECTORS) {
-            let mean_m = wall.cell([x_m, x_m + CELL_M], first, CELL_SECTORS).mean_m();
+            let mean_m = wall.cell([x_m, x_m + cell_m], first, CELL_SECTORS).mean_m();
             most_m = most_m.max(mean_m.unwrap_or(0.0).abs());
         }
     }
@@ -331,7 +338,7 @@ pub(super) fn profile(wall: &Wall, extent_m: [f64; 2]) -> Drawing {
     const PLACES: [(&str, usize); 4] = [("crown", 48), ("left wall", 24), ("right wall", 72), ("floor", 0)];
     const HEIGHT_PX: f64 = 118.0;
     let canvas = Canvas::untitled([WIDTH_PX, 530]);
-    let step_m = CELL_M.max((extent_m[1] - extent_m[0]) / 280.0);
+    let step_m = cell_m(wall).max((extent_m[1] - extent_m[0]) / 280.0);
     let count = math::round_to_i64(((extent_m[1] - extent_m[0]) / step_m).ceil());
     let line = |sector: usize| -> Vec<(f64, Option<f64>)> {
         let at = |column: i64| {
@@ -367,12 +374,18 @@ pub(super) fn profile(wall: &Wall, extent_m: [f64; 2]) -> Drawing {
     canvas.finish()
 }
 
+/// The section at a chainage, from sections in order.
+pub(super) fn row_at(sections: &[SectionRow], x_m: f64) -> Option<&SectionRow> {
+    let next = sections.partition_point(|row| row.start_m <= x_m);
+    sections.get(next.checked_sub(1)?).filter(|row| x_m < row.end_m)
+}
+
 /// Number of cross-sections in a drawing.
 pub(super) const SECTIONS_EACH: usize = 12;
 
 /// Cross-sections at up to [`SECTIONS_EACH`] chainages, as measured and as designed. Each shows the samples of
-/// `length_m` of wall.
-pub(super) fn cross_sections(wall: &Wall, report: &Report, places_m: &[f64], length_m: f64) -> Drawing {
+/// the whole sections around its chainage, see [`Wall::around`].
+pub(super) fn cross_sections(wall: &Wall, report: &Report, places_m: &[f64]) -> Drawing {
     const COLUMNS: usize = 3;
     const SIZE_PX: [f64; 2] = [700.0 / 3.0, 212.0];
     let rows = places_m.len().div_ceil(COLUMNS);
@@ -381,7 +394,7 @@ pub(super) fn cross_sections(wall: &Wall, report: &Report, places_m: &[f64], len
     for (number, x_m) in places_m.iter().enumerate() {
         let left = (number % COLUMNS) as f64 * SIZE_PX[0];
         let top = (number / COLUMNS) as f64 * SIZE_PX[1];
-        let row = report.sections.iter().find(|row| (row.start_m..row.end_m).contains(x_m));
+        let row = row_at(&report.sections, *x_m);
         let range = row.and_then(|row| row.deviation).map_or_else(
             || "no samples".to_owned(),
             |deviation| format!("{:.2} to {:.2} m", deviation.inmost_m, deviation.outmost_m),
@@ -394,7 +407,7 @@ pub(super) fn cross_sections(wall: &Wall, report: &Report, places_m: &[f64], len
             right: left + SIZE_PX[0] - 12.0,
             bottom: top + SIZE_PX[1] - 12.0,
         };
-        cross_section(&canvas, frame, wall, [x_m - length_m / 2.0, x_m + length_m / 2.0]);
+        cross_section(&canvas, frame, wall, wall.around(*x_m, report.target_m));
     }
     canvas.finish()
 }

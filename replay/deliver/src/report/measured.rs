@@ -50,7 +50,8 @@ pub(super) fn chapter(report: &Report, wall: &Wall, extent_m: [f64; 2], every_m:
 fn cross_sections(report: &Report, wall: &Wall, extent_m: [f64; 2], every_m: Option<f64>) -> Vec<Block> {
     let every_m = every_m.unwrap_or_else(|| usual_step_m(extent_m[1] - extent_m[0]));
     let places_m = places_m(extent_m, every_m);
-    let length_m = report.target_m.max(report.section_m);
+    let [from_m, to_m] = wall.around(0.0, report.target_m);
+    let length_m = to_m - from_m;
     let mut blocks = vec![
         Block::Subheading("Cross-sections".to_owned()),
         Block::Paragraph(format!(
@@ -62,7 +63,7 @@ fn cross_sections(report: &Report, wall: &Wall, extent_m: [f64; 2], every_m: Opt
     for chunk in places_m.chunks(SECTIONS_EACH) {
         let names =
             [chunk.first(), chunk.last()].map(|x_m| x_m.map_or_else(String::new, |x_m| format!("{x_m:.2}")));
-        let drawing = figures::cross_sections(wall, report, chunk, length_m);
+        let drawing = figures::cross_sections(wall, report, chunk);
         let [first, last] = names;
         blocks.push(Block::Figure(drawing, format!("Cross-sections from chainage {first} m to {last} m.")));
     }

@@ -9,7 +9,7 @@ use headrace_monitor::section_row::SectionRow;
 use headrace_monitor::words::NOT_INSPECTED;
 
 use super::chapters::Delivery;
-use super::figures::{section_word, word};
+use super::figures::{row_at, section_word, word};
 use super::measured::{places_m, usual_step_m};
 use super::tables::{causes, reason};
 use super::wall::{SECTORS, Wall};
@@ -21,6 +21,8 @@ const LEFT: usize = SECTORS / 4;
 const CROWN: usize = SECTORS / 2;
 const RIGHT: usize = SECTORS * 3 / 4;
 const EDGE_SECTORS: usize = 4;
+/// Largest number of cross-sections. The report has a page for each dozen.
+const MOST_SECTIONS: f64 = 2000.0;
 /// Largest number of pixels of a map along the tunnel. Some viewers have a limit of 32,767.
 const MOST_COLUMNS: usize = 30_000;
 /// Largest number of rings of the mesh, and of one of its parts.
@@ -36,14 +38,19 @@ impl Delivery<'_> {
         places_m([from_m, to_m], every_m).into_iter().map(|x_m| self.section(x_m)).collect()
     }
 
+    /// Least distance between cross-sections, m: the coverage extent has at most 2,000 of them.
+    pub fn least_every_m(&self) -> f64 {
+        self.report.coverage_extent.length_m / MOST_SECTIONS
+    }
+
     fn section(&self, x_m: f64) -> Section {
-        let half_m = self.report.target_m.max(self.report.section_m) / 2.0;
+        let outline_m = self.wall.around(x_m, self.report.target_m);
         let corner = |sector: usize| {
-            let mean_m = self.wall.cell([x_m - half_m, x_m + half_m], sector, 1).mean_m();
+            let mean_m = self.wall.cell(outline_m, sector, 1).mean_m();
             mean_m.map(|mean_m| wall_point(self.wall, sector as f64 + 0.5, mean_m))
         };
         let corners: Vec<_> = (0..SECTORS).map(corner).collect();
-        let row = self.report.sections.iter().find(|row| row.start_m <= x_m && x_m < row.end_m);
+        let row = row_at(&self.report.sections, x_m);
         Section {
             station: station(x_m),
             chainage_m: x_m,

@@ -32,7 +32,7 @@ impl Cell {
 /// The wall as measured in a dive. It takes about 800 bytes per section.
 pub struct Wall {
     pub(super) profile: Profile,
-    section_m: f64,
+    pub(super) section_m: f64,
     sections: BTreeMap<i64, Box<[Cell; SECTORS]>>,
     ticks: u64,
 }
@@ -96,6 +96,15 @@ impl Wall {
         sum
     }
 
+    /// Chainages of the least number of whole sections that together have at least a length. The section at `x_m` is
+    /// the middle one, or the one after the middle.
+    pub(super) fn around(&self, x_m: f64, length_m: f64) -> [f64; 2] {
+        // A quotient such as 0.6 / 0.2 may be slightly more than a whole number.
+        let count = math::floor_to_i64((length_m / self.section_m - 1e-9).ceil()).max(1);
+        let first = math::floor_to_i64(x_m / self.section_m) - count / 2;
+        [first, first + count].map(|section| section as f64 * self.section_m)
+    }
+
     /// Length of the sections whose middle is in a range of chainage, m.
     pub(super) fn length_m(&self, [from_m, to_m]: [f64; 2]) -> f64 {
         (self.section(to_m) - self.section(from_m)) as f64 * self.section_m
@@ -129,6 +138,25 @@ impl Wall {
 mod tests {
     use super::*;
     use headrace_geometry::tunnel::shapes;
+
+    #[test]
+    fn outline_has_whole_sections_around_that_of_its_station() {
+        let profile = shapes::circle(3.0).unwrap();
+        let mut wall = Wall { profile, section_m: 0.25, sections: BTreeMap::new(), ticks: 0 };
+        for (section_m, x_m, length_m, [from_m, to_m]) in [
+            (0.25, 5.0, 0.25, [5.0, 5.25]),
+            (0.25, 5.0, 0.1, [5.0, 5.25]),
+            (0.25, 5.0, 0.5, [4.75, 5.25]),
+            (0.25, 5.1, 0.75, [4.75, 5.5]),
+            (0.2, -0.1, 0.6, [-0.4, 0.2]),
+            (2.0, 5.0, 0.5, [4.0, 6.0]),
+        ] {
+            wall.section_m = section_m;
+            let around_m = wall.around(x_m, length_m);
+            let off_m = (around_m[0] - from_m).abs().max((around_m[1] - to_m).abs());
+            assert!(off_m < 1e-9, "{section_m}, {x_m}, {length_m}: {around_m:?}");
+        }
+    }
 
     #[test]
     fn samples_are_found_in_their_section_and_sector() {
