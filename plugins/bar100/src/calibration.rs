@@ -61,7 +61,7 @@ pub enum CalibrationError {
     /// The sensor's memory has an undefined pressure mode.
     #[error("reading cell 0x12: pressure mode {0}; defined are 0 (PR), 1 (PA) and 2 (PAA)")]
     Mode(u8),
-    /// The limits of the pressure range are impossible.
+    /// The limits of the pressure range are not finite, or not in increasing order.
     #[error(
         "reading the pressure limits: {p_min_bar} to {p_max_bar} bar; both must be finite, the second larger"
     )]
@@ -137,7 +137,7 @@ impl Calibration {
         Ok(Self { mode, p_min_bar, p_max_bar })
     }
 
-    /// Absolute pressure of a number of counts, Pa. A vented sensor uses `ambient_bar`, the pressure of the
+    /// Converts raw pressure counts to absolute pressure, Pa. A vented sensor uses `ambient_bar`, the pressure of the
     /// ambient air.
     pub fn pressure_pa(&self, counts: u16, ambient_bar: f64) -> f64 {
         let above_bar =
@@ -152,7 +152,7 @@ impl Calibration {
         u16::try_from(math::round_to_i64(counts).max(1)).unwrap_or(u16::MAX)
     }
 
-    /// Pressure of one count, Pa: the resolution.
+    /// Pressure difference that one count stands for, Pa.
     pub fn resolution_pa(&self) -> f64 {
         (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN * PA_PER_BAR
     }

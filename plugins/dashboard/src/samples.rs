@@ -22,7 +22,8 @@ pub struct Samples {
     chunks: Vec<Chunk>,
     kept: usize,
     visible: usize,
-    /// End time of each tick, ms, with the number of samples up to that time. Seeks need these marks.
+    /// End time of each tick, ms, with the number of samples up to that time. A seek uses these marks to find the
+    /// samples that were visible at a time.
     marks: Vec<(u32, u32)>,
     not_kept: u64,
 }

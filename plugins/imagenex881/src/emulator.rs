@@ -66,7 +66,7 @@ fn echo(tag: Tag, part: Option<f64>) -> Bytes<MAX_ECHO_BYTES> {
 pub struct HeadEmulator {
     settings: Settings,
     latency: DurNs,
-    /// Ratio of a range as measured by the head to the true range at the site.
+    /// Ratio of a range that the head reports to the true range at the site.
     device_per_site: f64,
     /// The emulated host; `None` if a real host polls.
     host: Option<Host>,

@@ -222,7 +222,8 @@ impl State {
     fn take_j1939(&mut self, message: &j1939::Message) -> DelayedReading {
         let order = self.meaning.axis_order;
         let (triple, reading) = match message {
-            // Pitch and roll without yaw are no full attitude. The navigation filter gets pitch and roll from gravity.
+            // Pitch and roll without yaw are no full attitude. The navigation filter can derive pitch and roll from the
+            // direction of gravity.
             j1939::Message::Slope(_) => return None,
             j1939::Message::AngularRate(triple) => {
                 let rates = triple.rates_degps().map(|degps| degps.map(f64::to_radians));

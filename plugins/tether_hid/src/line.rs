@@ -15,7 +15,7 @@ use headrace_sensor::geometry::math;
 /// characters for themselves.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
-/// Maximum length of a text line, bytes.
+/// Maximum length of a text line, bytes. It is the length of the longer template.
 pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
 /// Offset in a template after `RD,`. A match up to this offset is unlikely to be chance.

@@ -3,8 +3,8 @@
 //! - A counter wraps. Changes are therefore taken the short way round.
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other. If
 //!   [`PERSIST`] consecutive reports agree, the counter has really moved, and the reports weren't corrupt.
-//!   - If the first of these reports was near zero, the device counts from zero again. The length continues from its
-//!     latest value. The restart is recorded, because the device may have been replugged.
+//!   - If the first of the agreeing reports was near zero, the device counts from zero again. The length continues from
+//!     its latest value. The restart is recorded, because the device may have been replugged.
 //!   - Otherwise the counter's new value is accepted.
 //! - A step back to near zero is accepted at once only if the winch can cover it in a second. This holds after a
 //!   silence too.
@@ -25,7 +25,7 @@ pub const PERSIST: u32 = 5;
 /// kernel arrive together, with hardly any time between them.
 const SLACK_S: f64 = 0.1;
 
-/// Maximum time for which a replugged device has counted before its first report, s.
+/// Maximum time for which a replugged device has already counted when its first report arrives, s.
 const FRESH_S: f64 = 1.0;
 
 /// Minimum silence of a device that is unplugged and plugged in again. Source: USB 2.0, 7.1.7.3, debounce
@@ -171,7 +171,7 @@ impl CountTracker {
         self.accept(now, change)
     }
 
-    /// Handles another report that agrees with the rejected reports of a jump.
+    /// Handles another report that agrees with the rejected reports of a possible jump.
     fn agree(&mut self, before: Seen, jump: Jump, now: Seen) -> Option<i64> {
         let agreeing = jump.agreeing + 1;
         if agreeing < PERSIST {
@@ -204,7 +204,8 @@ impl CountTracker {
         self.within(to.since(from).as_secs_f64().max(0.0), change)
     }
 
-    /// Whether the winch can have moved by `change` counts in `elapsed_s`. One more count is allowed for rounding.
+    /// Whether the winch can have moved by `change` counts in `elapsed_s`. One count more than the winch can do is
+    /// allowed, because counts are rounded.
     fn within(&self, elapsed_s: f64, change: i64) -> bool {
         (change as f64).abs() <= self.max_counts_per_s * (elapsed_s + SLACK_S) + 1.0
     }

@@ -139,7 +139,8 @@ async fn asset(Path(path): Path<String>) -> Response {
 
 /// Checks a token, and stores it in the browser as a cookie.
 ///
-/// Only this token counts. A cookie sent with the request is from an earlier login and is ignored.
+/// Only the token in the request's query counts. A cookie sent with the request is from an earlier login and is
+/// ignored.
 async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMap, uri: Uri) -> Response {
     // Relative, because a proxy may serve the page below a path.
     let home = [(header::LOCATION, "./")];

@@ -238,7 +238,7 @@ async fn serve(
 ) {
     let pump = pump::pump(fed, Arc::clone(&shared));
     let serving = tokio::spawn(listener::accept(listener, tls, Arc::clone(&shared)));
-    // The pump returns when the page is to end.
+    // The task `pump` ends when the page has to end.
     pump.await;
     drop(shared.fan().take());
     let gone = async {

@@ -67,7 +67,7 @@ impl Served {
         stream
     }
 
-    /// Connects a client whose kernel buffers about this many unread bytes.
+    /// Connects a client whose kernel buffers about `bytes` unread bytes.
     fn connect_with_buffer(&self, bytes: usize) -> TcpStream {
         let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).unwrap();
         socket.set_recv_buffer_size(bytes).unwrap();
@@ -84,7 +84,7 @@ impl Served {
         of(&self.page.shared.counts).load(Ordering::Relaxed)
     }
 
-    /// Sends a message of this many bytes to all viewers.
+    /// Sends a message of `bytes` bytes to all viewers.
     fn feed(&self, bytes: usize) {
         let body = Body::Text(format!("{{\"type\":\"test\",\"text\":\"{}\"}}", "x".repeat(bytes)).into());
         let batch = vec![Message { seq: 1, sort: Sort::Other, body }];
@@ -159,7 +159,7 @@ fn operator_is_served_within_1_s_among_1000_connections() {
             let mut socket = served.connect();
             assert_eq!(ask(&mut socket, "GET /feed", &format!("{OPERATOR}{UPGRADE}"), "").0, 101);
             longest = longest.max(began.elapsed());
-            // An operator may send 20 actions a second.
+            // An operator may send only 20 actions a second, so the client pauses.
             std::thread::sleep(Duration::from_millis(50));
         }
     }

@@ -1,4 +1,4 @@
-//! Access rights of a device file, and the command that grants access.
+//! Access rights of a device file, and the command that grants access to the file.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt as _;

@@ -52,7 +52,7 @@ impl Tree {
         fs::set_permissions(self.file(path, ""), fs::Permissions::from_mode(mode)).unwrap();
     }
 
-    /// Adds a USB adapter with one port for each of `ttys`.
+    /// Adds a USB adapter with one serial port for each name in `ttys`.
     fn usb_serial(&self, place: &str, (vendor, product): (&str, &str), serial: Option<&str>, ttys: &[&str]) {
         let device = format!("/sys/devices/usb1/{place}");
         self.file(&format!("{device}/idVendor"), format!("{vendor}\n"));

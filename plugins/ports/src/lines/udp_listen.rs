@@ -26,7 +26,7 @@ struct UdpListen {
     timeout: ReadTimeout,
     drops: SocketDrops,
     from: From,
-    /// The accepted sender, to which commands are sent.
+    /// Sender that was accepted as the device, and to which commands are sent.
     peer: Option<SocketAddr>,
     candidates: VecDeque<Candidate>,
 }
