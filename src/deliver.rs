@@ -31,7 +31,7 @@ pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let given = Given::read(args.vehicle.as_deref())?;
     let about = about(args)?;
-    // The log comes before the folder, so that a log that can't be read leaves no empty folder behind.
+    // The log is opened before the folder is created, so that a log that can't be read leaves no empty folder behind.
     let mut player = Player::open(&files)?;
     let inputs = files.iter().chain(&given.files).chain(&args.about).cloned();
     let [html_file, pdf_file, json_file] = claimed(args, inputs)?;
@@ -41,7 +41,7 @@ pub(crate) fn deliver(args: &Deliver) -> Result<u8, Failure> {
     player.connect(dive.armed.sources());
     let mut wall = Wall::new(&dive.armed);
     let program = concat!("headrace ", env!("CARGO_PKG_VERSION")).to_owned();
-    // Date and identity follow from the replay.
+    // Date and identity are set after the replay, from which they follow.
     let info = FileInfo { title: about.title(), program, date: None, id: [0; 16] };
     let mut collector = Collector::new(&args.output, &info)?;
     let feed = (&mut player as _, Pace::default());
@@ -93,7 +93,7 @@ fn claimed(args: &Deliver, inputs: impl IntoIterator<Item = PathBuf>) -> Result<
     Ok(files)
 }
 
-/// Facts for the cover: those of the options, or else those of the file.
+/// Facts for the report's cover. Options take precedence over the file.
 fn about(args: &Deliver) -> Result<About, Failure> {
     let file = args.about.as_deref().map(read_about).transpose()?.unwrap_or_default();
     let crew = (!args.crew.is_empty()).then(|| args.crew.join(", "));
