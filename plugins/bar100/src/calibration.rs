@@ -25,9 +25,9 @@ const PA_PER_BAR: f64 = 1.0e5;
 /// Reference of a sensor's pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressureMode {
-    /// PR: relative to ambient air, which enters through a vent.
+    /// Mode PR: the pressure is relative to ambient air, which enters through a vent.
     Vented,
-    /// PA: relative to a sealed reference of one bar.
+    /// Mode PA: the pressure is relative to a sealed reference of one bar.
     Sealed,
     /// PAA: relative to vacuum.
     Absolute,
@@ -76,7 +76,8 @@ pub enum CalibrationError {
 impl PressureMode {
     /// Converts the two mode bits of memory cell 0x12 to a pressure mode.
     ///
-    /// Errors: a mode of 3 or more. It must not be guessed, because a wrong mode shifts the depth by ten metres.
+    /// Errors: a mode of 3 or more. Such a mode must not be replaced by a guess, because a wrong mode shifts the depth
+    /// by ten metres.
     pub fn from_wire(mode: u8) -> Result<Self, CalibrationError> {
         match mode {
             0 => Ok(Self::Vented),
@@ -177,8 +178,8 @@ impl Calibration {
     }
 }
 
-/// Values of the vehicle file that override the sensor's memory. A log that begins during a dive lacks the memory's
-/// content.
+/// Values of the vehicle file that override the sensor's memory. They are needed for a log that begins during a dive,
+/// because such a log lacks the memory's content.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Overrides {
     /// Lower limit of the pressure range, bar.

@@ -414,7 +414,7 @@ impl Collector {
     /// Passes a message to the queue. A replay waits for room; in a live dive a full queue drops the message.
     fn hand(&self, message: Fed) {
         if self.waits {
-            // Sending fails once the page has ended. This needs no action.
+            // Sending fails once the page has ended. The failure needs no action.
             let _gone = self.to.blocking_send(message);
         } else if let Err(TrySendError::Full(_)) = self.to.try_send(message) {
             tracing::debug!("the page is behind");

@@ -4,8 +4,8 @@ use crate::wire::SampleRecord;
 
 /// Number of samples in a chunk, which then takes 1.25 MiB.
 const CHUNK: usize = 1 << 16;
-/// Maximum number of samples kept, which take 160 MB. Four heads give fewer in ten hours over 7 km. Further samples are
-/// only counted.
+/// Maximum number of samples kept, which take 160 MB. A dive of ten hours over 7 km with four heads has fewer samples.
+/// Further samples are only counted.
 pub const MOST_SAMPLES: usize = 8_000_000;
 
 /// A chunk of samples and its range of chainage.

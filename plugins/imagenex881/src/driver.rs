@@ -137,7 +137,7 @@ impl HeadDriver {
         self.foreign_id = None;
         self.refused = !header.status.accepted() || header.status.overrun();
         let position = u16::try_from(i32::from(header.position) % COUNTS_PER_TURN).unwrap_or(0);
-        // Without a command in flight, this is a duplicate or late answer.
+        // If no command is in flight, the received answer is a duplicate or late.
         let Some((aim, _)) = self.asked else { return };
         if let Aim::Ping(number) = aim {
             let planned = self.timetable.ping(number).map(|ping| ping.position);
@@ -187,8 +187,8 @@ impl HeadDriver {
         let from = homing::Standing { angle_rad: self.settings.sensor_rad(position), growing };
         let current = self.timetable.first_at(now);
         self.joins_at = current;
-        // The homing distance depends on the program's position on arrival. This position depends on the homing
-        // distance. Both are therefore found by iteration.
+        // The homing distance depends on the program's position when the head arrives, and this position depends on the
+        // homing distance. Both are therefore found by iteration.
         for _ in 0..3 {
             let Some(Planned { position, clockwise, .. }) = self.timetable.ping(self.joins_at).copied()
             else {

@@ -73,7 +73,7 @@ pub struct HeadEmulator {
     codec: CommandCodec,
     head: Head,
     ping_at: MonoNs,
-    /// Soundings requested by a real host, not yet started.
+    /// Soundings that a real host has requested and that the head hasn't started yet.
     waiting: Vec<Sounding>,
     asked: VecDeque<Asked>,
 }

@@ -15,8 +15,8 @@ const MICRO_G: f64 = 9.806_65e-6;
 const WANDERS_OVER_S: f64 = 300.0;
 /// Constant bias of a factory-calibrated unit after power-on, rad/s.
 ///
-/// It is the turn rate that a unit reads while it rests on deck. Data sheets bound the bias by the worst case of a year
-/// (0.2 degrees/s, 30 mm/s^2).
+/// It is the turn rate that a unit reads while it rests on deck. Data sheets state larger limits, which hold for the
+/// worst case of a year (0.2 degrees/s, 30 mm/s^2).
 const GYRO_TURN_ON: f64 = 0.05 * DEGREE;
 const ACCEL_TURN_ON_MPS2: f64 = 0.02;
 /// In-run instability of accelerometers, increased for mounting, temperature and resolution, m/s^2.

@@ -57,7 +57,7 @@ pub struct PingEmulator {
     /// Time of the next ping, if no real host requests it. The emulated host requests it, or the device pings
     /// continuously.
     ping_at: Option<MonoNs>,
-    /// Pings requested by a real host, not yet started.
+    /// Pings that a real host has requested and that the device hasn't started yet.
     waiting: Vec<Sounding>,
     /// Message ids of the answers to the pings that a real host has requested.
     asked: VecDeque<u16>,

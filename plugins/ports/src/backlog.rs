@@ -1,21 +1,21 @@
 //! Receive times of data that were read late, in one burst.
 //!
-//! While the computer or a line stalls, a device's data wait, and then all of them are read at once. Each part belongs
-//! to the time at which it would have been read without the stall. The device's usual period gives this time, or the
-//! data are spread evenly over the stall.
+//! While the computer or a line stalls, a device's data wait, and then all of them are read at once. Each part of the
+//! data gets the time at which it would have been read without the stall. This time follows from the device's usual
+//! period, or from spreading the data evenly over the stall.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Shortest and longest gap before a burst. Shorter gaps are ordinary jitter. After a gap beyond the longest, the times
-/// of the data aren't known: the computer was suspended, or the data are from any part of the gap.
+/// Shortest and longest gap before a burst. Shorter gaps are ordinary jitter. After a longer gap, the times of the data
+/// aren't known, because the computer was suspended, or because the data may be from any part of the gap.
 const SHORTEST: DurNs = DurNs::from_millis(100);
 const LONGEST: DurNs = DurNs::from_millis(8_000);
-/// A line has stalled if nothing arrives for this many usual gaps, and then several messages at once: at least
-/// `LEAST_MESSAGES`, and the share `LEAST_SHARE` of the usual number. A device that was only silent comes back with a
-/// single message.
+/// A line has stalled if nothing arrives for this many usual gaps, and then several messages arrive at once. They must
+/// be at least `LEAST_MESSAGES`, and at least the share `LEAST_SHARE` of the usual number. A device that was only
+/// silent comes back with a single message.
 const UNUSUAL: f64 = 3.0;
 const LEAST_MESSAGES: f64 = 2.0;
 const LEAST_SHARE: f64 = 0.1;
@@ -95,8 +95,8 @@ impl ReadTimes {
 
     /// Takes all bytes that waited until `now`. Returns their times; `None` if they did not arrive late.
     ///
-    /// If the program itself was late, the read says nothing about the device. Otherwise the device may have changed its
-    /// period or its messages, so the read counts like any other.
+    /// If the program itself was late, the read says nothing about the device. If not, the device may have changed its
+    /// period or its messages, so the read counts like any other read.
     pub(crate) fn take_waiting(&mut self, now: MonoNs, bytes: usize, is_late: bool) -> Option<Spread> {
         let spread = self.spread(now, bytes, is_late);
         if is_late {
@@ -221,7 +221,8 @@ mod tests {
         assert!(!times.may_be_burst(at_ms(1140), false), "less than three periods");
         assert!(!times.may_be_burst(at_ms(9001), true), "the computer was suspended");
         assert!(!ReadTimes::default().may_be_burst(at_ms(500), true), "nothing is known about the device");
-        // A device that was silent for a second comes back with one message, or for five seconds with three.
+        // A device comes back with one message after a silence of one second, or with three messages after five
+        // seconds.
         assert!(
             times.may_be_burst(at_ms(2000), false) && device().take_waiting(at_ms(2000), 10, false).is_none()
         );

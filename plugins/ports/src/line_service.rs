@@ -409,7 +409,7 @@ impl LineService {
                 device.last_bytes = (device.last_bytes + late).min(now);
                 device.last_frame = (device.last_frame + late).min(now);
             }
-            // A signal may have ended the wait. Drivers must take waiting bytes before they give up an answer.
+            // A signal may have ended the wait. Drivers must take waiting bytes before they stop waiting for an answer.
             if read.is_none() {
                 read = self.read_once(open.line.as_mut(), Duration::ZERO, &mut buffer)?;
             }
@@ -439,7 +439,7 @@ impl LineService {
                     total += count;
                     parts.push((received, buffer.get(..count).unwrap_or_default().to_vec()));
                 }
-                // Bytes that were read before the connection was lost still count.
+                // Bytes that were read before the connection was lost are still used.
                 Err(error) => {
                     ended = Err(error);
                     break;
@@ -533,8 +533,8 @@ impl LineService {
 
     /// Wakes drivers that are due, unless another driver on the line awaits an answer.
     ///
-    /// Several drivers may await answers, e.g. just after the line was opened. The first of these drivers is woken all
-    /// the same, so that it can time out. Otherwise these drivers would wait for each other for ever.
+    /// Several drivers may await answers, e.g. just after the line was opened. The first of them is woken nevertheless,
+    /// so that it can time out, because otherwise these drivers wait for each other for ever.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();

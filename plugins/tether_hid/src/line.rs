@@ -34,7 +34,8 @@ pub struct Decimal {
     places: u8,
 }
 
-/// Measurement time of a winch, with digits as sent. The calendar isn't checked, because readings use the receive time.
+/// Measurement time that a monitor states for a winch, with the digits as sent. The calendar isn't checked, because
+/// readings use the receive time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamp {
     /// Winch number, 0 to 99.

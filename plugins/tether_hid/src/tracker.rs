@@ -6,8 +6,8 @@
 //!   - If the first of the agreeing reports was near zero, the device counts from zero again. The length continues from
 //!     its latest value. The restart is recorded, because the device may have been replugged.
 //!   - Otherwise the counter's new value is accepted.
-//! - A step back to near zero is accepted at once only if the winch can cover it in a second. This holds after a
-//!   silence too.
+//! - A step back to near zero is accepted at once only if the winch can cover it in a second. This rule also applies
+//!   after a silence.
 //! - After an accepted jump, and whenever counts may have been lost, the length is uncertain. `re_zero_needed` is then
 //!   set, and stays set.
 
@@ -21,8 +21,8 @@ use crate::report::{Report, Width};
 /// Number of consecutive reports, consistent with each other, that are needed to accept a jump of the count.
 pub const PERSIST: u32 = 5;
 
-/// Time added to the interval between two reports when the change of the count is checked, s. Reports queued in the
-/// kernel arrive together, with hardly any time between them.
+/// Time added to the interval between two reports when the change of the count is checked, s. It is needed because
+/// reports that were queued in the kernel arrive together, with hardly any time between them.
 const SLACK_S: f64 = 0.1;
 
 /// Maximum time for which a replugged device has already counted when its first report arrives, s.
@@ -199,13 +199,13 @@ impl CountTracker {
         Some(self.total)
     }
 
-    /// Whether the winch can have moved by `change` counts between two times.
+    /// Whether the winch can have moved the cable by `change` counts between two times.
     fn reaches(&self, from: MonoNs, to: MonoNs, change: i64) -> bool {
         self.within(to.since(from).as_secs_f64().max(0.0), change)
     }
 
-    /// Whether the winch can have moved by `change` counts in `elapsed_s`. One count more than the winch can do is
-    /// allowed, because counts are rounded.
+    /// Whether the winch can have moved the cable by `change` counts in `elapsed_s`. One count more than the winch can
+    /// do is allowed, because counts are rounded.
     fn within(&self, elapsed_s: f64, change: i64) -> bool {
         (change as f64).abs() <= self.max_counts_per_s * (elapsed_s + SLACK_S) + 1.0
     }

@@ -186,7 +186,7 @@ impl Page {
         let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
     }
 
-    /// Ends the page. Within a second, viewers get the last messages, and `end` after all others.
+    /// Ends the page. Within a second, viewers get the remaining messages, and `end` as the last of them.
     pub fn end(mut self, end: Option<serde_json::Value>) {
         if let Some(end) = end {
             self.show_result(end);

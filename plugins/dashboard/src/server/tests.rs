@@ -245,8 +245,8 @@ fn unread_streams_are_dropped_10_s_after_their_machine_takes_no_more_data() {
     }
     println!("dropped after {dropped:.1?} s: WebSocket, lines with a small buffer and with the usual one");
     assert_eq!(dropped.len(), unread.len());
-    // At first the clients' kernels take up to some 200 kB, depending on the machine. The server counts these bytes as
-    // sent, although no client has read them.
+    // At first the kernels of the clients take some 200 kB at most, depending on the machine. The server counts these
+    // bytes as sent, although no client has read them.
     assert!(dropped[0] < 15.0 && dropped[2] < 40.0, "{dropped:?}");
     assert_eq!(served.page.viewers(), 0);
 }

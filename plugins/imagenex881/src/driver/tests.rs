@@ -42,7 +42,7 @@ struct Rig {
     answers: usize,
     /// Whether the latest answer has been duplicated.
     doubled: bool,
-    /// Time and position of each ping whose return was delivered and has the dive's range setting.
+    /// Time and position of each ping whose return was delivered to the host and has the dive's range setting.
     pings: Vec<(MonoNs, u16)>,
     delivered: Vec<u8>,
 }

@@ -79,7 +79,7 @@ stateful!(Vector<4> { slots: came; fixed: parts; });
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mixed;
 
-/// Validity of a quantity as reported by the unit. Values count as valid until the unit reports otherwise.
+/// Validity of a quantity as reported by the unit. Values count as valid until the unit reports that they aren't.
 #[derive(Debug, Clone, Copy)]
 struct Well {
     condition: Option<Condition>,

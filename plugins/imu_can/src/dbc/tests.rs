@@ -274,8 +274,8 @@ fn vector_in_several_frames_is_reported_when_its_last_frame_arrives() {
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
     assert!([force.x(), force.y(), force.z()].iter().all(|mps2| (mps2 - 0.5 * 9.806_65).abs() < 1e-3));
     assert_eq!(got[0].valid_at, MonoNs(9_000_000));
-    // After a lost frame, the components that did arrive aren't combined with the next sample. The sample after the gap
-    // is complete.
+    // After a lost frame, the components that have arrived must not be combined with the next sample. The sample after
+    // the gap is complete.
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len()), (0, 0));
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len(), send(0x576, 1).len()), (0, 0, 1));
     assert_eq!(decoder.withheld(), 0);

@@ -84,7 +84,7 @@ pub enum Message {
     Temperature(i16),
     /// Air pressure inside the housing.
     BaroPressure(u32),
-    /// Specific force at high rate. Some sources swap this code with the code of [`Message::RateOfTurnHr`].
+    /// Specific force at high rate. Some published sources swap this code with the code of [`Message::RateOfTurnHr`].
     AccelerationHr([i16; 3]),
     /// Turn rate at high rate; see [`Message::AccelerationHr`] about its code.
     RateOfTurnHr([i16; 3]),

@@ -168,7 +168,7 @@ fn denied_user_gets_the_command_that_grants_access() {
     let join = "sudo usermod -aG dialout $USER, and log in again";
     for (mode, machine, right) in [
         (0o660, tree.seen_by_stranger(), join),
-        // Ann has joined the group, but her session began before that.
+        // The user Ann has joined the group, but her session began earlier.
         (
             0o660,
             tree.seen_by(4001, &[4001]),

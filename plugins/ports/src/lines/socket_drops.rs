@@ -1,8 +1,8 @@
 //! Counts datagrams that the kernel dropped because a socket's queue was full.
 //!
 //! A socket's queue fills while the program that reads it, or the whole computer, stalls. Linux has a count for each
-//! socket in `/proc/net/udp`: the tenth column is the socket's inode, the thirteenth the count. Other systems have no
-//! count.
+//! socket in `/proc/net/udp`: the tenth column is the socket's inode, and the thirteenth column is the count. Other
+//! systems have no count.
 
 use std::fs;
 use std::net::UdpSocket;
@@ -55,7 +55,7 @@ mod tests {
         let mut drops = SocketDrops::default();
         assert_eq!(drops.new_ones(&socket), 0);
         let to = socket.local_addr().unwrap();
-        // These are more datagrams than fit into the queue, whatever the kernel's default size is.
+        // This number of datagrams doesn't fit into the queue, whatever the kernel's default size is.
         let sent: u64 = 40_000;
         for _ in 0..sent {
             sender.send_to(&[7; 1000], to).unwrap();

@@ -1,6 +1,6 @@
 //! UDP from a device that sends to a local port, where any machine may send.
 //!
-//! Only one sender is accepted, by address and port. It is the sender given by `?from=`, or the first one whose
+//! Only one sender is accepted, by address and port. It is the sender given by `?from=`, or the first sender whose
 //! message a driver of the line accepts. Drivers get no data of other senders, and other senders get no commands. A
 //! device that falls silent may return from another port, but not from another address.
 
